@@ -1,8 +1,8 @@
 """The `actionlib` command (also `rosaction`): actions, topics, services and interfaces.
 
-Every module beside this one that has a function `register(subparsers)` adds commands: it adds its
-parsers and sets `run=function(args) -> int`. Names are ROS names, renamed by `a:=b`, `__ns:=...` or
-`--ros-args` as in every node.
+Each module of this package without a leading underscore adds commands: its `register(subparsers)`
+adds parsers and sets `run=function(args) -> int`. Names are ROS names and are remapped by `a:=b`,
+`__ns:=...` or `--ros-args`, as in every node.
 """
 
 from __future__ import annotations
@@ -32,28 +32,26 @@ if TYPE_CHECKING:
 EXIT_FAILED = 1
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 128 + signal.SIGINT
-
-
 EXIT_TERMINATED = 128 + signal.SIGTERM
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM came: what a command does on Ctrl-C it does then too."""
+    """SIGTERM was received; commands react as to Ctrl-C, since this is a `KeyboardInterrupt`."""
 
 
 class UsageError(ActionlibError):
-    """What the user asked for cannot be done; the text says why and what to try."""
+    """A command that cannot be carried out; the text says why and what to try."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """argparse with the house's exit code and a way out in every error."""
+    """An argument parser with our exit code, and advice in every error."""
 
     def error(self, message: str) -> NoReturn:
         way_out = f"Try '{self.prog} --help'."
         if message.startswith("unrecognized arguments: "):
             options = [word.partition("=")[0] for word in message.split()]
             early = [word for word in options if word in self._option_string_actions]
-            if early:  # of the command as a whole
+            if early:  # options of `actionlib` itself, which come before the command
                 way_out = f"Try {early[0]} before the verb: {self.prog} {early[0]} ... VERB."
         self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\n{way_out}\n")
 
@@ -71,8 +69,8 @@ def main(
 
     Args:
         argv: The arguments; those of the process when None.
-        node: Where to work; None joins the network for this command.
-        on_ready: Called when everything is imported, before the command begins.
+        node: The node to use; None: the command joins the network itself.
+        on_ready: Called after all imports, before the command starts.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     return run_program("actionlib", lambda: _run(given, node, on_ready))
@@ -85,7 +83,7 @@ def _run(given: list[str], node: Node | None, on_ready: Callable[[], object]) ->
         args = _parser().parse_args(names.rest)
         args.node, args.names = node, names
         on_ready()
-        code = 0  # `actionlib list | head`: the reader has seen enough
+        code = 0  # remains if `while_read` ends the command: `actionlib list | head`
         with _terminable(), while_read(), ros2_of_options(args):
             code = int(args.run(args))
             sys.stdout.flush()
@@ -104,7 +102,7 @@ def _run(given: list[str], node: Node | None, on_ready: Callable[[], object]) ->
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """Raise `Terminated` in the main thread when SIGTERM comes."""
+    """Raise `Terminated` in the main thread on SIGTERM, inside the `with` block."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""What every command has: a parser, numbers that are in range, and output as YAML or JSON."""
+"""Common parts of the commands: parsers, checks of numbers, and output as YAML or JSON."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def add_command(
     return parser
 
 
-# -- numbers: what cannot be used is refused with the range that can -------------------------------
+# -- numbers ---------------------------------------------------------------------------------------
 
 
 def seconds(text: str) -> float:
@@ -39,7 +39,7 @@ def rate(text: str) -> float:
 
 
 def count(text: str) -> int:
-    """Read how many, 1 at least."""
+    """Read a number of items, at least 1."""
     try:
         number = int(text)
     except ValueError:
@@ -50,7 +50,7 @@ def count(text: str) -> int:
 
 
 def size(text: str) -> int:
-    """Read how many, 0 at least."""
+    """Read a number of items, at least 0."""
     return 0 if text == "0" else count(text)
 
 
@@ -68,24 +68,24 @@ def _positive(text: str, wanted: str) -> float:
 
 
 def print_json(**fields: Any) -> None:
-    """Print one JSON object on a line, at once."""
+    """Print a JSON object on one line, and flush it."""
     print(json.dumps(fields), flush=True)
 
 
 def print_message(title: str, message: Any) -> None:
-    """Print a message as YAML, indented under a title, and an empty line."""
+    """Print a title, a message as indented YAML, and an empty line."""
     print(f"{title}\n{textwrap.indent(message.to_yaml().rstrip() or '{}', '    ')}\n", flush=True)
 
 
 def print_progress(args: argparse.Namespace, text: str) -> None:
-    """Print what a command does now, for people only."""
+    """Print the progress of a command, except with `--json`."""
     if not args.json:
         print(text, flush=True)
 
 
 @contextlib.contextmanager
 def while_read() -> Iterator[None]:
-    """Leave the block when the reader of the output has gone, and discard what is printed then."""
+    """Leave the block when the reader of the output is gone, and discard further output."""
     try:
         yield
     except BrokenPipeError:

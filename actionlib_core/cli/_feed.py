@@ -1,4 +1,4 @@
-"""From callbacks to the main thread, which prints and gets the Ctrl-C."""
+"""A queue from callbacks to the main thread, which prints, and which receives Ctrl-C."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ if TYPE_CHECKING:
 
 
 class Feed:
-    """Hands what callbacks bring to the main thread.
+    """A queue with many writers and one reader.
 
-    Threads: `put` may be called from any; `next` is for one.
+    Threads: `put` may be called from any thread, `next` from one.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -21,7 +21,7 @@ class Feed:
         self._changed = clock.event()
 
     def put(self, item: Any) -> None:
-        """Take one item in."""
+        """Append an item."""
         self._items.append(item)
         self._changed.set()
 
@@ -32,12 +32,12 @@ class Feed:
             deadline: A time of the clock [s]; None waits for ever.
 
         Raises:
-            TimeoutError: nothing has come by then.
+            TimeoutError: there was no item by then.
 
         Blocks: until there is one.
         """
         while True:
-            self._changed.clear()
+            self._changed.clear()  # before the check: a later `put` sets it again
             if self._items:
                 return self._items.popleft()
             left = None if deadline is None else deadline - self._clock.now()

@@ -1,8 +1,8 @@
-"""Expressions over a message, for `topic echo --filter`: comparisons and arithmetic, nothing else.
+"""Expressions over a message, for `topic echo --filter`: comparisons and arithmetic only.
 
-An expression is Python's, read as a tree and worked out here step by step: names are the message's
-fields (`m` is the whole message), calls are of the few functions below, and whatever else could be
-written is refused before the first message.
+An expression has Python's syntax, but is evaluated here and not by `eval`, so that it cannot run
+other code: names are the message's fields (`m` is the whole message), the only calls are those of
+the functions below, and everything else is refused before the first message.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 WHOLE = "m"
 LONGEST = 1000  # characters
-DEEPEST = 40  # expressions within expressions
-_LARGEST = 1e300  # a number beyond ends the arithmetic, so that no expression can take for ever
+DEEPEST = 40  # nested expressions
+# Limits of results: an integer of billions of digits would take much time and memory.
+_LARGEST = 1e300
 _MOST_ITEMS = 100_000
 
 _FUNCTIONS: Final[Mapping[str, Callable[..., Any]]] = {
@@ -66,10 +67,10 @@ _NOT_KNOWN: Final = (
 
 
 class FilterError(ActionlibError, ValueError):
-    """An expression that cannot be read, or not be worked out for a message.
+    """An expression that cannot be parsed, or not be evaluated for a message.
 
     Attributes:
-        expression: As typed.
+        expression: Its text.
     """
 
     def __init__(self, expression: str, problem: str, column: int = 0) -> None:
@@ -78,13 +79,13 @@ class FilterError(ActionlibError, ValueError):
 
 
 class Filter:
-    """Tells which messages are wanted.
+    """A condition for messages.
 
     Args:
         expression: For example `pose.position.x > 2 and status in [1, 3]`.
 
     Raises:
-        FilterError: it is no expression, or does what it may not.
+        FilterError: it is not an expression, or contains something that is not allowed.
     """
 
     def __init__(self, expression: str) -> None:
@@ -105,7 +106,7 @@ class Filter:
         self._check(self._tree, 0)
 
     def __call__(self, fields: Mapping[str, Any]) -> bool:
-        """Tell whether a message is wanted.
+        """Return whether a message fulfils the condition.
 
         Args:
             fields: The message as nested dicts, lists and scalars.
@@ -118,7 +119,7 @@ class Filter:
     # -- before the first message --------------------------------------------------------------
 
     def _check(self, node: ast.expr, depth: int) -> None:
-        """Refuse what is not on the list."""
+        """Refuse everything that is not allowed."""
         if depth > DEEPEST:
             raise self._error(node, f"nested deeper than {DEEPEST}; expected less.")
         problem = self._problem(node)
@@ -163,13 +164,13 @@ class Filter:
 
     def _value(self, node: ast.expr, fields: Mapping[str, Any]) -> Any:
         try:
-            return self._worked_out(node, fields)
+            return self._evaluate(node, fields)
         except FilterError:
             raise
         except (TypeError, ValueError, ArithmeticError, LookupError) as error:
             raise self._error(node, f"{type(error).__name__}: {error}.") from error
 
-    def _worked_out(self, node: Any, fields: Mapping[str, Any]) -> Any:
+    def _evaluate(self, node: Any, fields: Mapping[str, Any]) -> Any:
         match node:
             case ast.Constant():
                 return node.value
@@ -180,10 +181,10 @@ class Filter:
                 return self._field(node, self._value(node.value, fields), node.attr)
             case ast.BoolOp():
                 return self._logic(node, fields)
-        # All others are made of values.
-        return self._worked_out_of_values(node, fields)
+        # All other expressions first evaluate their operands.
+        return self._evaluate_operation(node, fields)
 
-    def _worked_out_of_values(self, node: Any, fields: Mapping[str, Any]) -> Any:
+    def _evaluate_operation(self, node: Any, fields: Mapping[str, Any]) -> Any:
         value = partial(self._value, fields=fields)
         match node:
             case ast.BinOp():

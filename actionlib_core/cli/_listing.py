@@ -1,4 +1,4 @@
-"""`list` and `type`, which actions, topics and services have in common."""
+"""The commands `list` and `type` of actions, topics and services."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def add_list(
     """Add the command `list`.
 
     Args:
-        verbs: Where to.
-        what: What the names are, in the plural.
-        kinds: The ends that count.
-        record: Makes a name and its ends into what `--json` prints.
+        verbs: An argparse subparsers object.
+        what: The kind of names, in the plural.
+        kinds: The kinds of ends to list.
+        record: Returns the object that `--json` prints for a name and its ends.
     """
     run = partial(_list, kinds, record)
     parser = add_command(verbs, "list", run, f"list the {what} there are")

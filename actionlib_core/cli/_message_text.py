@@ -1,4 +1,4 @@
-"""A message as text on the terminal: YAML, CSV or JSON, whole or shortened, or one field."""
+"""A message as text for the terminal: YAML, CSV or JSON, complete or shortened, or one field."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _STEP = re.compile(r"\.?(?P<field>[A-Za-z_]\w*)|\[(?P<index>-?\d+)\]")
 
 
 class FieldPathError(ActionlibError, ValueError):
-    """A path that leads to no field of a message."""
+    """A path that does not lead to a field of a message."""
 
 
 class MessageText:
-    """Formats messages as the flags of `topic echo` say.
+    """Formats messages according to the options of `topic echo`.
 
     Args:
         args: `field`, `csv`, `json`, `no_arr`, `no_str`, `flow_style`, `full_length`,
@@ -40,7 +40,7 @@ class MessageText:
         """Return the text of one message.
 
         Raises:
-            FieldPathError: the field asked for is not there.
+            FieldPathError: there is no such field.
         """
         args = self._args
         value = follow(message.to_dict(), self._path, args.field or "")
@@ -56,7 +56,7 @@ def split_path(path: str) -> list[str | int]:
     """Return the steps of a path: "pose.position[0].x" is ["pose", "position", 0, "x"].
 
     Raises:
-        FieldPathError: it is no path.
+        FieldPathError: it is not a path.
     """
     steps: list[str | int] = []
     position = 0
@@ -73,7 +73,7 @@ def split_path(path: str) -> list[str | int]:
 
 
 def follow(value: Any, steps: list[str | int], path: str) -> Any:
-    """Return what a path leads to.
+    """Return the value at the end of a path.
 
     Raises:
         FieldPathError: there is no such field or item.
@@ -94,9 +94,9 @@ def shorten(value: Any, limit: int | None, *, no_arr: bool, no_str: bool) -> Any
 
     Args:
         value: Nested dicts, lists and scalars.
-        limit: Longest array or text; None cuts nothing.
-        no_arr: Say only how long arrays are.
-        no_str: Say only how long texts are.
+        limit: Longest array or text; None: no limit.
+        no_arr: Show only the lengths of arrays.
+        no_str: Show only the lengths of texts.
     """
     if isinstance(value, dict):
         return {
@@ -131,7 +131,7 @@ def _csv_line(values: list[Any]) -> str:
 
 
 def to_yaml(value: Any, *, flow: bool = False) -> str:
-    """Return plain data as YAML: arrays of scalars on one line, or everything (`flow`)."""
+    """Return plain data as YAML: arrays of scalars on one line; with `flow`, everything."""
     return _flow(value) if flow else "\n".join(_block(value, ""))
 
 

@@ -1,4 +1,4 @@
-"""What the commands need of the network: a node, who is there, and answers from a server."""
+"""Network functions of the commands: a node, the ends on the network, and queries to servers."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Presence, Reply
     from actionlib_core.wire.presence import Endpoint
 
-ABSENT_S = 3.0  # who waits longer for an action server is told where it is looked for
-FIND_S = 2.0  # a name that is not there then may still come within this: a busy machine is slow
-ASK_S = 2.0
+ABSENT_S = 3.0  # after this time without an action server, print where it was looked for
+FIND_S = 2.0  # a missing name may still appear within this time, on a busy computer
+ASK_S = 2.0  # longest wait for an answer
 
 ACTION_KINDS = (Kind.ACTION_SERVER, Kind.ACTION_CLIENT)
 TOPIC_KINDS = (Kind.PUBLISHER, Kind.SUBSCRIBER)
 SERVICE_KINDS = (Kind.SERVICE,)
-_WORDS = {  # kind -> what a name of it is, what ROS calls its types, what lists it
+_WORDS = {  # kind -> word for a name, ROS's word for its types, the command that lists it
     **dict.fromkeys(ACTION_KINDS, ("action", "action", "list")),
     **dict.fromkeys(TOPIC_KINDS, ("topic", "msg", "topic list")),
     **dict.fromkeys(SERVICE_KINDS, ("service", "srv", "service list")),
 }
 
 INTERFACES = "smachpy.interfaces"
-"""Entry points of modules that make definitions known when they are imported."""
+"""Entry points of modules that register definitions when they are imported."""
 
 T = TypeVar("T")
 
 
 @contextlib.contextmanager
 def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator[Node]:
-    """Give the command its node and close it afterwards.
+    """Open the command's node, and close it afterwards.
 
     Args:
-        args: What `main` has parsed.
-        settle: Wait until nobody new has been found for so long [s]; 0 does not wait.
+        args: The parsed arguments.
+        settle: Wait until no new end was found for this time [s]; 0: do not wait.
     """
     if args.node is not None:
         yield args.node
@@ -72,11 +72,11 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
         yield node
 
 
-# -- who is there ----------------------------------------------------------------------------------
+# -- ends ------------------------------------------------------------------------------------------
 
 
 def list_names(node: Node, kinds: Collection[Kind]) -> dict[str, list[Endpoint]]:
-    """Return the ends of some kinds there are, by full name.
+    """Return the present ends of the given kinds, by full name.
 
     Blocks: until the network has answered, a second at most.
     """
@@ -89,9 +89,9 @@ def list_names(node: Node, kinds: Collection[Kind]) -> dict[str, list[Endpoint]]
 def find_by_name(
     node: Node, full: str, kinds: Collection[Kind], timeout: float | None = FIND_S
 ) -> list[Endpoint]:
-    """Return the ends of a full name, of some kinds; waits for the first.
+    """Return the ends of a full name, of the given kinds; wait for the first one.
 
-    Blocks: until there is one, `timeout` [s] at most; None waits for ever.
+    Blocks: until there is one, `timeout` [s] at most; None: no limit.
     """
     late: list[Endpoint] = []
     came = node.clock.event()
@@ -117,14 +117,14 @@ def find_by_name(
     try:
         with watching(node, on_end):
             if timeout is None and Kind.ACTION_SERVER in kinds and not came.wait(ABSENT_S):
-                _tell_absence(node, full)
+                _print_absence(node, full)
             came.wait(timeout)
     finally:
         watch.close()
     return there() or late
 
 
-def _tell_absence(node: Node, full: str) -> None:
+def _print_absence(node: Node, full: str) -> None:
     if why := explain_absence(node, full):
         print(f"actionlib: action '/{full}': no server yet: {why}", file=sys.stderr)
 
@@ -132,10 +132,10 @@ def _tell_absence(node: Node, full: str) -> None:
 def find_ends(
     node: Node, name: str, kinds: Collection[Kind], timeout: float | None = FIND_S
 ) -> list[Endpoint]:
-    """Return the ends of a name as typed, of some kinds; there is one at least.
+    """Return the ends of a name in a command line, of the given kinds; at least one.
 
     Raises:
-        UsageError: there are none; the text says which there are.
+        UsageError: there are none; the text lists the names that exist.
 
     Blocks: as `find_by_name`.
     """
@@ -160,11 +160,11 @@ def find_server(node: Node, name: str, timeout: float | None = FIND_S) -> Endpoi
 
 
 def which_there_are(wanted: str, names: Iterable[str]) -> str:
-    """Return what to say when `wanted` is not there: the others, and the nearest.
+    """Return the part of an error text that lists the existing names and the most similar one.
 
     Args:
-        wanted: A full name.
-        names: The full names that are there.
+        wanted: The full name that was not found.
+        names: The full names that exist.
     """
     there = [f"/{name}" for name in names]
     if not there:
@@ -190,10 +190,10 @@ def types_of(ends: Iterable[Endpoint]) -> list[str]:
 
 
 def only_type(ends: list[Endpoint], name: str) -> str:
-    """Return the type that all ends of a name have.
+    """Return the type of all ends of a name.
 
     Raises:
-        UsageError: they have several.
+        UsageError: the ends have several types.
     """
     types = sorted({end.type for end in ends})
     if len(types) > 1:
@@ -203,7 +203,7 @@ def only_type(ends: list[Endpoint], name: str) -> str:
 
 
 def load_packages() -> None:
-    """Make known what installed packages define.
+    """Register the definitions of installed packages.
 
     Raises:
         InterfaceError: such a package cannot be imported.
@@ -212,8 +212,8 @@ def load_packages() -> None:
         try:
             point.load()
         except Exception as error:
-            # A user's own package may have the name of one that is installed, and hide it: then
-            # only the definitions of that one are missing.
+            # A package in the current folder may hide an installed one with the same name. Then
+            # only the definitions of the hidden one are missing.
             absent = isinstance(error, ModuleNotFoundError) and error.name
             if absent and f"{point.module}.".startswith(f"{absent}."):
                 tell("actionlib", f"interfaces of {point.name!r} are not known: {error}")
@@ -225,10 +225,10 @@ def load_packages() -> None:
 
 
 def known(get: Callable[[str], T], name: str) -> T:
-    """Return what `get` finds under `name`, in installed packages too.
+    """Return `get(name)`, if necessary after loading installed packages.
 
     Raises:
-        InterfaceError: it is nowhere.
+        InterfaceError: there is no such definition.
     """
     try:
         return get(name)
@@ -238,10 +238,10 @@ def known(get: Callable[[str], T], name: str) -> T:
 
 
 def class_of_end(node: Node, end: Endpoint) -> Any:
-    """Return the class of the type of an end, of ROS 1 or of ROS 2.
+    """Return the class of an end's type, of ROS 1 or of ROS 2.
 
     Raises:
-        InterfaceError: its definition is not known here, or a ROS 2 robot has another one.
+        InterfaceError: its definition is unknown here, or differs from a ROS 2 robot's.
     """
     if is_ros2(end.type):
         from actionlib_core.wire.ros2.ends import class_of
@@ -259,10 +259,10 @@ def class_of_end(node: Node, end: Endpoint) -> Any:
 
 
 def typed_class(node: Node, kind: Literal["action", "message", "service"], name: str) -> Any:
-    """Return the class of a type that was typed: of ROS 2 where a robot of it is in use.
+    """Return the class of a type in a command line: a ROS 2 class if such a robot is configured.
 
     Raises:
-        InterfaceError: its definition is not known here.
+        InterfaceError: its definition is unknown here.
     """
     from actionlib_core import interfaces
 
@@ -274,16 +274,16 @@ def typed_class(node: Node, kind: Literal["action", "message", "service"], name:
 
 
 def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = "result") -> Reply:
-    """Ask the server of an action about a goal, or about all ("").
+    """Query the server of an action for a goal, or for the status list.
 
     Args:
-        node: Asks.
+        node: The command's node.
         name: The action.
-        goal_id: The goal, "" for all.
-        about: What became of it, or what it was.
+        goal_id: The goal; "": all goals.
+        about: "result": its result or status; "goal": its goal message.
 
     Raises:
-        UsageError: no answer came, or an error.
+        UsageError: there was no answer, or an error.
 
     Blocks: `ASK_S` at most.
     """

@@ -1,4 +1,4 @@
-"""The names, types and goals of ROS 2 robots, for the commands: from tokens, and by asking."""
+"""The names, types and goals of ROS 2 robots, for the commands: from tokens and by queries."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ if TYPE_CHECKING:
     from actionlib_core.wire.presence import Endpoint, Kind
     from actionlib_core.wire.ros2.action_messages import Canceling, GoalState
 
-ASK_S = 2.0
-STATUS_S = 1.0  # the last status comes within this from a server that has had a goal
+ASK_S = 2.0  # longest wait for an answer
+STATUS_S = 1.0  # longest wait for a server's latched status; one that never had a goal has none
 
 
 def is_ros2(type_name: str) -> bool:
-    """Tell whether a type that a token names is one of ROS 2: "pkg/kind/Name"."""
+    """Return whether the type in a token is one of ROS 2: "pkg/kind/Name"."""
     return type_name.count("/") > 1
 
 
 def _ends() -> ModuleType:
-    """The room that knows ROS 2's tokens; without a robot it is not loaded."""
+    """Import the module for ROS 2's tokens, which commands without such a robot do not need."""
     from actionlib_core.wire.ros2 import ends
 
     return ends
 
 
-# -- who is there ----------------------------------------------------------------------------------
+# -- ends ------------------------------------------------------------------------------------------
 
 
 def list_ros2_ends(node: Node) -> list[Endpoint]:
-    """Return the ends there are on networks of ROS 2, by their names here.
+    """Return the ends on ROS 2 networks, with their names here.
 
-    Those that ROS 2's tools hide are left out, and those of the command's own node.
+    Ends that ROS 2's tools hide are left out, and so are those of the command's own node.
 
     Blocks: until the networks have answered, a second each at most.
     """
@@ -57,7 +57,7 @@ def list_ros2_ends(node: Node) -> list[Endpoint]:
 
 @contextlib.contextmanager
 def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]:
-    """Tell of every end that is there or comes, on the networks' threads."""
+    """Call `on_end` for each present and future end, on the networks' threads."""
 
     def on_change(end: Endpoint, _key: str, alive: bool) -> None:
         if alive:
@@ -70,9 +70,9 @@ def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]
 
 
 def explain_absence(node: Node, full: str) -> str:
-    """Return where the server of an action was looked for in vain on ROS 2, and what to try.
+    """Return why there may be no server of an action on ROS 2, and what to try.
 
-    "" without a network of ROS 2 that may have the name. Blocks: as `list_ros2_ends`.
+    "" if the name is on no ROS 2 network. Blocks: as `list_ros2_ends`.
     """
     if not node.config.ros2:
         return ""
@@ -89,7 +89,7 @@ def explain_absence(node: Node, full: str) -> str:
 
 
 def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]) -> list[Closable]:
-    """Receive the bytes of a topic from the publishers of ROS 2 that are there now.
+    """Receive the bytes of a topic from the present publishers on ROS 2 networks.
 
     Blocks: until the networks have answered, a second each at most.
     """
@@ -110,10 +110,10 @@ def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]
 
 
 def typed(node: Node, kind: str, name: str) -> Any:
-    """Return the ROS 2 class of a type that the user has typed; None when it is not for ROS 2.
+    """Return the ROS 2 class of a type in a command line; None when it is not for ROS 2.
 
     Args:
-        node: Its configuration counts.
+        node: The node, whose configuration counts.
         kind: "message", "service" or "action".
         name: "pkg/Name" or "pkg/msg/Name".
     """
@@ -131,14 +131,14 @@ def typed(node: Node, kind: str, name: str) -> Any:
 
 
 class RemoteAction:
-    """An action of a robot, asked by a command.
+    """An action of a ROS 2 robot.
 
     Args:
-        node: Asks.
-        server: What `find_server` has found.
+        node: The command's node.
+        server: The server, from `find_server`.
 
     Raises:
-        InterfaceError: our definition of the action is another one.
+        InterfaceError: our definition of the action differs.
     """
 
     def __init__(self, node: Node, server: Endpoint) -> None:
@@ -162,16 +162,15 @@ class RemoteAction:
         return data_key(self._network.settings.domain, name, ros_type.name, ros_type.hash)
 
     def subscribe(self, part: str, callback: Callable[[Sample], None]) -> Closable:
-        """Receive "feedback" or "status"; of the latter the last one first."""
+        """Receive "feedback" or "status", which begins with the last one."""
         return self._network.transport.subscribe(
             self.key(part), callback, history=False, cached=int(part == "status")
         )
 
     def states(self) -> list[GoalState]:
-        """Return the goals that the server knows.
+        """Return the goals that the server tracks.
 
-        Blocks: until its last status has come, `STATUS_S` at most: a server that never had a goal
-            has sent none.
+        Blocks: until its last status list has arrived, `STATUS_S` at most.
         """
         from actionlib_core.wire.ros2.action_messages import unpack_statuses
 
@@ -188,7 +187,7 @@ class RemoteAction:
         return unpack_statuses(samples[-1].payload) if samples else []
 
     def cancel(self, uuid: bytes, stamp_ns: int) -> Canceling:
-        """Ask the server to cancel; see `Asked`.
+        """Send a cancel to the server; see `Asked`.
 
         Raises:
             UsageError: no answer came.
@@ -201,7 +200,7 @@ class RemoteAction:
         return unpack_canceling(self._ask("cancel_goal", self.parts.cancel_goal, request))
 
     def result(self, uuid: bytes) -> tuple[int, Any]:
-        """Return state and result of a goal that has ended; state 0 when it is not known.
+        """Return state and result of a goal that has ended; state 0: it is unknown.
 
         Raises, blocks: as `cancel`.
         """
@@ -241,5 +240,5 @@ class RemoteAction:
 
 
 def merged(own: list[Endpoint], node: Node, kinds: Collection[Kind]) -> list[Endpoint]:
-    """Return the ends of our own network and of those of ROS 2, of some kinds."""
+    """Return the ends of the given kinds on our own network and on ROS 2 networks."""
     return [end for end in (*own, *list_ros2_ends(node)) if end.kind in kinds]

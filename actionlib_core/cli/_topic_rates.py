@@ -1,4 +1,4 @@
-"""`actionlib topic hz|bw`: how often messages come, and how many bytes."""
+"""`actionlib topic hz|bw`: the rate of a topic's messages, in messages and in bytes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Presence, Sample
 
-REPORT_S = 1.0
+REPORT_S = 1.0  # interval of the reports
 
 
 class _Arrival(NamedTuple):
-    """When a message came [s], and its size [bytes]."""
+    """The time [s] and size [bytes] of a received message."""
 
     time: float
     size: int
@@ -54,9 +54,9 @@ def register(verbs: Any) -> None:
 
 @contextlib.contextmanager
 def listening(node: Node, name: str, callback: Callable[[Sample], None]) -> Iterator[None]:
-    """Receive the bytes of a topic; its publishers see a subscriber of the first one's type.
+    """Receive the bytes of a topic, and announce a subscriber with the first publisher's type.
 
-    Publishers that send nothing, or less, while nobody listens need to see it.
+    Some publishers send less, or nothing, as long as they see no subscriber.
     """
     full = node.resolve(name, "topic name")
     announced: list[Closable] = []
@@ -79,7 +79,7 @@ def listening(node: Node, name: str, callback: Callable[[Sample], None]) -> Iter
 
 
 def _measure(show: Callable[[list[_Arrival]], tuple[Any, str]], args: argparse.Namespace) -> int:
-    """Show something about the last messages once a second."""
+    """Print a report about the last messages every `REPORT_S`."""
     arrivals: deque[_Arrival] = deque(maxlen=args.window)
     with open_node(args) as node:
         clock = node.clock
@@ -116,7 +116,7 @@ def _show_rate(known: list[_Arrival]) -> tuple[dict[str, float], str]:
 
 def _show_bandwidth(known: list[_Arrival]) -> tuple[dict[str, float], str]:
     sizes = [arrival.size for arrival in known]
-    # The first message ends a gap that was not seen: its bytes belong to the time before.
+    # Without the first message: its bytes belong to the time before it.
     speed = sum(sizes[1:]) / max(known[-1].time - known[0].time, 1e-9)
     mean, low, high = sum(sizes) / len(sizes), min(sizes), max(sizes)
     record = {"bytes_per_s": speed, "mean": mean, "min": low, "max": high, "window": len(sizes)}

@@ -1,4 +1,4 @@
-"""`actionlib list|info|type|find`: which actions there are."""
+"""`actionlib list|info|type|find`: the actions on the network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`actionlib echo`: print what goes over an action's keys."""
+"""`actionlib echo`: print the messages of an action."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _echo_ros2(node: Node, server: Endpoint, args: argparse.Namespace) -> int:
-    """Print feedback, and statuses: goals and results are between a client and its server there."""
+    """Print feedback and statuses; in ROS 2, goals and results go to one receiver only."""
     action, feed = RemoteAction(node, server), Feed(node.clock)
 
     def subscribe(part: str) -> Closable:

@@ -60,7 +60,7 @@ def register(subparsers: Any) -> None:
 
 
 def _goals(node: Node, name: str) -> list[StatusEntry]:
-    """Return the goals that a server tracks, without cancels whose goals never came."""
+    """Return the goals that a server tracks, without early cancels whose goals never came."""
     from actionlib_core.goal.states import Status
     from actionlib_core.wire.actions import unpack_statuses
 
@@ -95,13 +95,13 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
-    if not args.id:  # which the server would take for all of them
+    if not args.id:  # to the server, an empty id means all goals
         raise UsageError(
             "goal info: ID: got ''; expected a goal's id. Try 'actionlib goal list NAME'."
         )
     with open_node(args) as node:
         server = find_server(node, args.name)
-        goal = None  # which ROS 2 does not tell
+        goal = None  # ROS 2 servers do not send it
         if is_ros2(server.type):
             entry, result = _ros2_status(node, server, args.id)
         else:
@@ -145,7 +145,7 @@ def _not_there(entry: StatusEntry, what: str, args: argparse.Namespace) -> int:
 
 
 def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntry, Any]:
-    """Return the status of a goal and its result, None when it is not there."""
+    """Return the status of a goal, and its result or None."""
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
     from actionlib_core.wire.actions import unpack_report, unpack_status
     from actionlib_core.wire.encoding import encoding_of
@@ -158,7 +158,7 @@ def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntr
 
 
 def _goal(node: Node, args: argparse.Namespace, spec: Any) -> Any:
-    """Return what a goal was, None when the server has let go of it."""
+    """Return the goal message of a goal, None when the server no longer has it."""
     from actionlib_core.wire.actions import unpack_goal
 
     try:
@@ -194,7 +194,8 @@ def _cancel(args: argparse.Namespace) -> int:
         ]
         publisher = node.transport.publisher(f"{name}/cancel", encoding_of(GoalID), GOAL)
         publisher.put(pack_goal_id(args.id, stamp_ns))
-        ask(node, f"/{name}", "")  # the answer comes after the cancel was taken
+        # The reply to a query shows that the cancel before it has arrived: only then close.
+        ask(node, f"/{name}", "")
         publisher.close()
     missed = bool(args.id) and args.id not in asked
     if args.json:
@@ -246,7 +247,7 @@ def _ros2_goals(node: Node, server: Endpoint) -> list[StatusEntry]:
 
 
 def _ros2_status(node: Node, server: Endpoint, goal_id: str) -> tuple[StatusEntry, Any]:
-    """Return the status of a goal and its result, None when it has none."""
+    """Return the status of a goal, and its result or None."""
     from actionlib_core.goal.states import TERMINAL
     from actionlib_core.wire.ros2.action_messages import GoalState
     from actionlib_core.wire.ros2.names import goal_uuid
@@ -255,7 +256,8 @@ def _ros2_status(node: Node, server: Endpoint, goal_id: str) -> tuple[StatusEntr
     known = {state.uuid: state for state in action.states()}
     state = known.get(uuid)
     if state is not None and _entry(state).status not in TERMINAL:
-        return _entry(state)._replace(id=goal_id), None  # the result would be waited for
+        # Not asking for the result: the server would answer only when the goal has ended.
+        return _entry(state)._replace(id=goal_id), None
     code, result = action.result(uuid)
     stamp_ns = state.stamp_ns if state is not None else 0
     entry = _entry(GoalState(uuid, stamp_ns, code))._replace(id=goal_id)

@@ -1,4 +1,4 @@
-"""`actionlib interface show|list|stubs`: what messages, services and actions there are."""
+"""`actionlib interface show|list|stubs`: the known messages, services and actions."""
 
 from __future__ import annotations
 

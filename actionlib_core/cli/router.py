@@ -1,4 +1,4 @@
-"""`actionlib router`: the meeting point of networks without multicast."""
+"""`actionlib router`: a Zenoh router, for networks without multicast."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from actionlib_core.action.sent_goal import SentGoal
 
 _TYPE = re.compile(r"\w+(/\w+){1,2}")
-CANCEL_S = 10.0  # how long the answer to a cancel is awaited
+CANCEL_S = 10.0  # longest wait for the answer to a cancel
 CANCELED = {"PREEMPTED", "RECALLED"}
 
 
@@ -84,7 +84,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _split(words: list[str], *, stdin: bool) -> tuple[str, str]:
-    """Tell type and YAML apart."""
+    """Split the words into type and YAML."""
     words = list(words)
     type_name = words.pop(0) if words and _TYPE.fullmatch(words[0]) else ""
     if stdin:
@@ -108,13 +108,14 @@ def _drive(
     with while_read():
         try:
             _follow(handle, args)
-        except KeyboardInterrupt as error:  # Ctrl-C, or a signal that asks the same
+        except KeyboardInterrupt as error:  # Ctrl-C or SIGTERM; raised again after the cancel
             interrupted = error
             _cancel(handle, args)
         except TimeoutError:
             timed_out = True
             _cancel(handle, args)
-        except BaseException:  # the reader has gone, say: nobody looks after the goal any more
+        except BaseException:  # for example, the reader of the output is gone
+            # A robot must not go on with a goal that no program follows any more.
             handle.cancel()
             handle.wait(CANCEL_S)
             raise

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class Operator:
-    """Whoever types the commands: sees the goals that have come, by number, and answers them."""
+    """Shows goals to the operator, by number, and carries out the operator's commands."""
 
     def __init__(self, args: argparse.Namespace) -> None:
         self.types: Any = None
@@ -85,7 +85,7 @@ class Operator:
             print(f"Goal {number} is asked to stop.", flush=True)
 
     def obey(self, line: str) -> None:
-        """Carry out one command; a mistake is told and changes nothing."""
+        """Carry out one command; a wrong one is reported and changes nothing."""
         first, _, rest = line.strip().partition(" ")
         try:
             if not first:

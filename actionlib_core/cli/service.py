@@ -80,7 +80,7 @@ def _call(args: argparse.Namespace) -> int:
 
 
 def _words(args: argparse.Namespace) -> tuple[str, str]:
-    """Return type and YAML; either may be left out, YAML is what is no type's name."""
+    """Return type and YAML; both are optional, and a word with ':' or '{' is YAML."""
     words = list(args.words)
     type_name = words.pop(0) if words and "{" not in words[0] and ":" not in words[0] else ""
     text = words.pop(0) if words else ""

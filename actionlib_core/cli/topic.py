@@ -102,7 +102,7 @@ def _register_pub(parser: argparse.ArgumentParser) -> None:
     )
 
 
-# -- who is there ----------------------------------------------------------------------------------
+# -- publishers and subscribers --------------------------------------------------------------------
 
 
 def _list_by_direction(args: argparse.Namespace) -> int:
@@ -150,7 +150,7 @@ def _info(args: argparse.Namespace) -> int:
 
 
 def _message_class(node: Node, args: argparse.Namespace) -> type[Message]:
-    """Return the class of a topic's messages; one that is not known here may come with it."""
+    """Return the class of a topic's messages; an unknown one is defined by its publisher."""
     from actionlib_core.exceptions import InterfaceError
     from actionlib_core.wire.definitions import ask_definition, define
 
