@@ -1,7 +1,7 @@
 """Actions, services, topics, messages and time over Zenoh, without ROS.
 
 `import actionlib_core as actionlib` runs programs written for ROS 1's actionlib. Everything here is
-loaded when it is first used, so importing the package costs next to nothing.
+imported on first use, so importing the package itself takes very little time.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from actionlib_core.time import Duration as Duration
     from actionlib_core.time import Time as Time
 
-# Module -> the names that are taken from it.
+# Module -> the names that are imported from it.
 _NAMES = {
     "action.client": (
         "ActionClient",

@@ -1,4 +1,4 @@
-"""Arguments that would fail later, in another thread: refused where they are given."""
+"""Checks of arguments, so that a wrong one fails at the call and not later in another thread."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from actionlib_core.time import to_seconds
 
 
 def check_functions(where: str, **callbacks: object) -> None:
-    """Refuse callbacks, given by their names, that cannot be called; see `check_function`."""
+    """Check several callbacks by the names of their arguments; see `check_function`."""
     for argument, value in callbacks.items():
         if value is not None and not callable(value):
             check_function(where, argument, value)
 
 
 def check_function(where: str, argument: str, value: object) -> None:
-    """Refuse a callback that cannot be called; None is one that is not wanted.
+    """Check that a callback can be called; None is allowed.
 
     Args:
-        where: Whose callback, "action 'dock'" for example.
-        argument: Its name.
-        value: What was given.
+        where: The owner, for the error: "action 'dock'".
+        argument: The argument's name.
+        value: The callback.
 
     Raises:
-        ActionlibError: it is no function.
+        ActionlibError: it cannot be called.
     """
     if value is not None and not callable(value):
         raise ActionlibError(
@@ -34,26 +34,26 @@ def check_function(where: str, argument: str, value: object) -> None:
 
 
 def check_class(where: str, value: object, attribute: str, kind: str) -> None:
-    """Refuse what is not an interface class of the right kind.
+    """Check that a value is an interface class of the right kind.
 
     Args:
-        where: For what, "service 'open'" for example.
-        value: What was given.
-        attribute: What classes of this kind have.
-        kind: What they are called, for the error.
+        where: The owner, for the error: "service 'open'".
+        value: The value.
+        attribute: An attribute that only classes of this kind have.
+        kind: The kind, for the error.
 
     Raises:
-        ActionlibError: it is none.
+        ActionlibError: it is not.
     """
     if not isinstance(value, type) or not hasattr(value, attribute):
         raise ActionlibError(f"{where}: got {value!r}; expected a {kind}.")
 
 
 def check_queue_size(where: str, value: object) -> None:
-    """Refuse a queue size that is no number; None and, as in rospy, 0 set no limit.
+    """Check that a queue size is a number, or None; 0, as in rospy, and None set no limit.
 
     Raises:
-        ActionlibError: it is none, or negative.
+        ActionlibError: it is not, or negative.
     """
     if value is not None and (not isinstance(value, int) or value < 0):
         raise ActionlibError(
@@ -66,16 +66,16 @@ SECONDS = "seconds, 0 or more, as a number or a Duration"
 
 
 def check_seconds(where: str, argument: str, value: object) -> float:
-    """Return a time that has an end, as a number; refuse what is none.
+    """Return a finite duration in seconds.
 
     Args:
-        where: Whose, "action 'dock'" for example.
-        argument: Its name.
-        value: What was given: seconds as a number or a `Duration`.
+        where: The owner, for the error: "action 'dock'".
+        argument: The argument's name.
+        value: Seconds as a number, or a `Duration`.
 
     Raises:
         DurationTypeError: it is neither.
-        InvalidDurationError: it is negative or NaN, or has no end.
+        InvalidDurationError: it is negative, NaN or infinite.
     """
     seconds = check_limit(where, argument, value)
     if seconds is None:
@@ -85,10 +85,10 @@ def check_seconds(where: str, argument: str, value: object) -> float:
 
 
 def check_limit(where: str, argument: str, value: object) -> float | None:
-    """Return the longest time for something; None, or infinity, sets no limit. As `check_seconds`.
+    """Return a limit in seconds; None and infinity: no limit. Arguments as `check_seconds`.
 
     Raises:
-        DurationTypeError: it is no time.
+        DurationTypeError: it is not a duration.
         InvalidDurationError: it is negative or NaN.
     """
     seconds = _check_number(where, argument, value)
@@ -98,10 +98,12 @@ def check_limit(where: str, argument: str, value: object) -> float | None:
 
 
 def check_delay(where: str, argument: str, value: object) -> float | None:
-    """As `check_limit`, for a wait, often the rest of a time: a negative one is over, as 0 is.
+    """As `check_limit`, but for a wait, where a negative time counts as 0.
+
+    Programs often pass the rest of a time, which may be negative by then.
 
     Raises:
-        DurationTypeError: it is no time.
+        DurationTypeError: it is not a duration.
         InvalidDurationError: it is NaN.
     """
     seconds = _check_number(where, argument, value)
@@ -122,6 +124,6 @@ def _check_number(where: str, argument: str, value: object) -> float | None:
 
 
 def check_wait(where: str, argument: str, value: object) -> float | None:
-    """As `check_delay`, by actionlib's rule: 0 sets no limit, too."""
+    """As `check_delay`, but by actionlib's rule that 0 sets no limit either."""
     seconds = _check_number(where, argument, value)
     return max(seconds, 0.0) if seconds else None

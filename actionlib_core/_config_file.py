@@ -1,4 +1,4 @@
-"""Read a configuration file: YAML into the dataclasses of `config`, every problem with its line."""
+"""The reader of configuration files: YAML to the dataclasses of `config`, problems with lines."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from actionlib_core.yaml_text import YamlTextError, load_yaml
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Files named in a configuration file are looked for beside it.
+# Paths in these fields are relative to the configuration file.
 _FILE_FIELDS = frozenset({"ca", "certificate", "key", "password_file", "users_file"})
 _EXPECTED = {float: "a number", int: "a whole number", bool: "true or false"}
 
 
 def read_config_file(path: Path) -> Config:
-    """Return the configuration that a file holds.
+    """Return the configuration in a file.
 
     Raises:
-        ConfigError: it cannot be read or has errors; the text names all with line and field.
+        ConfigError: it cannot be read or has errors; the text lists all with line and field.
     """
     try:
         data = load_yaml(path.read_text(encoding="utf-8"), "rt")
@@ -46,17 +46,17 @@ def read_config_file(path: Path) -> Config:
 
 
 class _Reader:
-    """Turns plain YAML data into dataclasses, collecting what is wrong."""
+    """Converts plain YAML data to dataclasses, and collects the problems."""
 
     def __init__(self, folder: Path) -> None:
         self.problems: list[str] = []
         self._folder = folder
-        self._line = self._wire_line = 1
+        self._line = self._wire_line = 1  # of the value that is being read, and of `wire`
 
     def take_wire(self, data: MutableMapping[str, Any]) -> tuple[str, ...]:
-        """Take `wire` out of the file: which names are on ROS 2, another way to say `ros2.names`.
+        """Remove `wire` from the data; return the names that it puts on ROS 2.
 
-        It is `ros2` for every name of a program, or a mapping of names to `ros2`.
+        It is a short form of `ros2.names`: `ros2` for all names, or a mapping of names to `ros2`.
         """
         if "wire" not in data:
             return ()
@@ -75,7 +75,7 @@ class _Reader:
         return tuple(str(name) for name in wire)
 
     def put_on_ros2(self, config: Config, names: tuple[str, ...]) -> Config:
-        """Add names to those of the file's only network of ROS 2, the program's own without one."""
+        """Add names to the file's only ROS 2 network, or to a new one."""
         self._line = self._wire_line
         if len(config.ros2) > 1:
             count = f"{len(config.ros2)} networks of ROS 2"
@@ -92,7 +92,7 @@ class _Reader:
         return dataclasses.replace(config, ros2=(network,))
 
     def read_record(self, kind: type, data: object, where: str, **given: str) -> object:
-        """Return a `kind` made from `data`, and `given`, None when a problem was found."""
+        """Make a `kind` from `data` and `given`; return None when a problem was found."""
         if not isinstance(data, Mapping):
             return self._report(where, "not a mapping", data, "lines of 'field: value'")
         before = len(self.problems)
@@ -143,7 +143,7 @@ class _Reader:
         return self._read_sequence(item, value, path)
 
     def _read_mapped(self, data: Mapping[str, Any], path: str) -> object:
-        """Read entries by the names that they are for."""
+        """Read entries whose keys are their names."""
         result = []
         for name, entry in data.items():
             self._go_to(data, name)
@@ -192,7 +192,7 @@ class _Reader:
             self._line = position.data[key][0] + 1
 
     def _place(self, data: Mapping[str, Any], where: str, problem: str) -> str:
-        """Put the line in front of a problem that the dataclass itself found."""
+        """Add the line to a problem that the dataclass itself has found."""
         key = problem.partition(":")[0].partition(".")[0].partition("[")[0]
         if key in data:
             self._go_to(data, key)
@@ -210,7 +210,7 @@ def _required(kind: type) -> set[str]:
 
 
 def _plain(value: object) -> object:
-    """Return YAML's own containers and scalars as Python's, for the error text."""
+    """Convert ruamel.yaml's containers to Python's, for the error text."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Programs that a program starts, and that never outlive it."""
+"""Child processes that never outlive the program that has started them."""
 
 from __future__ import annotations
 
@@ -16,23 +16,25 @@ if TYPE_CHECKING:
 
     from actionlib_core.shutdown import Shutdown
 
-GRACE_S: Final = 1.5  # from the end of its standard input until it is terminated
-LAST_GRACE_S: Final = 1.0  # from then until it is killed
-KEPT_LINES: Final = 40  # of what it said
+GRACE_S: Final = 1.5  # from the end of its standard input to SIGTERM
+LAST_GRACE_S: Final = 1.0  # from then to SIGKILL
+KEPT_LINES: Final = 40  # last lines of its standard error
 
 
 class ChildProcess:
     """Runs `python -m MODULE ARGUMENTS`; a context manager.
 
-    The child lives as long as its standard input is open (`end_with_stdin`): when this process
-    ends, however it ends, the system closes the pipe and the child goes. It has a session of its
-    own, so that Ctrl-C in the terminal reaches only the parent, which can then still use the child.
+    The child lives as long as its standard input is open (`end_with_stdin`): whenever and however
+    this process ends, the system closes the pipe, and the child ends too. The child has its own
+    session, so that Ctrl-C in the terminal reaches only the parent, which can still use the child
+    while it ends.
 
     Args:
-        module: What to run. It prints a line when it is ready, and ends with its standard input.
-        arguments: Further arguments for it.
-        on_change: Called when it is ready, and when it has ended; an attribute too.
-        environment: Added to that of this process.
+        module: The module to run. It prints a line when it is ready, and ends with its standard
+            input.
+        arguments: Its arguments.
+        on_change: Called when it is ready, and when it has ended; also an attribute.
+        environment: Variables that are added to the environment of this process.
 
     Threads: `on_change` is called from threads of the clock.
     """
@@ -46,11 +48,11 @@ class ChildProcess:
         environment: Mapping[str, str] | None = None,
     ) -> None:
         self.module = module
-        # -P: a user's module in the current folder must not take the place of one of ours.
+        # -P, so that a user's module in the current folder does not hide one of ours.
         self._command = [sys.executable, "-P", "-m", module, *arguments]
         self._environment = dict(environment or {})
         self.on_change = on_change
-        self._clock = RealClock()  # processes know no other
+        self._clock = RealClock()  # other processes have no virtual time
         self._said: deque[str] = deque(maxlen=KEPT_LINES)
         self._changed = self._clock.event()
         self._ended = self._clock.event()
@@ -86,22 +88,22 @@ class ChildProcess:
 
     @property
     def first_line(self) -> str:
-        """What it printed when it was ready; "" before."""
+        """The line that it has printed when it was ready; "" before."""
         return self._first_line or ""
 
     @property
     def said(self) -> str:
-        """The last lines that it wrote to standard error."""
+        """The last lines of its standard error."""
         return "".join(self._said).strip()
 
     @property
     def exit_code(self) -> int | None:
-        """How it ended; None while it runs."""
+        """Its exit code; None while it runs."""
         ended = self._ended.is_set() and self._process is not None
         return self._process.returncode if ended and self._process is not None else None
 
     def ready(self) -> bool:
-        """Tell whether it has printed its first line."""
+        """Return whether it has printed its first line."""
         return self._first_line is not None
 
     def wait_ready(self, timeout: float) -> bool:
@@ -113,7 +115,7 @@ class ChildProcess:
         return self.ready()
 
     def let_go(self) -> None:
-        """Tell it to end, without waiting for it."""
+        """Ask it to end, without waiting for it."""
         if self._process is not None and self._process.stdin is not None:
             self._process.stdin.close()
 
@@ -133,10 +135,10 @@ class ChildProcess:
                 self._ended.wait(LAST_GRACE_S)
 
     def on_end(self) -> None:
-        """Take the end of the process, before `on_change`; for subclasses."""
+        """Handle the end of the process, before `on_change`; for subclasses."""
 
     def _listen(self, stdout: IO[str]) -> None:
-        """Wait for the line that says it is ready; read on, so that it never has to wait."""
+        """Wait for the first line, then keep reading, so that the child never blocks in a write."""
         with stdout:
             for line in stdout:
                 if self._first_line is None:
@@ -145,7 +147,7 @@ class ChildProcess:
                 self.on_change()
 
     def _watch(self, stderr: IO[str], listened: Callable[[float], object]) -> None:
-        """Read what it says until it ends."""
+        """Read its standard error until it ends, then report its end."""
         assert self._process is not None
         with stderr:
             for line in stderr:
@@ -159,10 +161,11 @@ class ChildProcess:
 
 
 def end_with_stdin(ending: Shutdown) -> None:
-    """Ask this process to end when nobody holds the other end of its standard input any more.
+    """Request the shutdown of this process when its standard input is closed: by the parent's end.
 
-    Blocks: until then; for a thread of its own in the child.
+    Blocks: until then. The child calls it in a thread of its own.
     """
-    while os.read(sys.stdin.fileno(), 4096):  # not through the buffer: its lock outlives the thread
+    # Not through `sys.stdin`, whose lock this thread would still hold at the interpreter's end.
+    while os.read(sys.stdin.fileno(), 4096):
         pass
     ending.request("the parent has gone")

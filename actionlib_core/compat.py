@@ -1,7 +1,8 @@
 """ROS 1's module names: `from actionlib_core.simple_action_client import SimpleActionClient`.
 
-Programs written for actionlib, SMACH and smach_ros import from their modules, and move by changing
-the package's name only. `alias_modules` maps such a name to the module that holds its classes here.
+Programs written for actionlib, SMACH and smach_ros import from the modules of these packages. To
+port them, only the package's name is changed: `alias_modules` maps the old module names to the
+modules that have the classes here.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class _Aliases(MetaPathFinder, Loader):
         return ModuleSpec(fullname, self) if fullname in self.homes else None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Put the module itself in place of the empty one."""
+        """Replace the empty module by the real one."""
         sys.modules[module.__name__] = import_module(self.homes[module.__name__])
 
 
@@ -51,9 +52,9 @@ _aliases: Final = _Aliases()
 
 
 def alias_modules(homes: Mapping[str, str]) -> None:
-    """Make each name importable: the module of that name is the one it maps to.
+    """Make each name importable, as another name of the module that it maps to.
 
-    Nothing is imported before a program asks for it.
+    The modules are imported only when a program imports them.
     """
     _aliases.homes.update(homes)
     if _aliases not in sys.meta_path:

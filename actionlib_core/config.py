@@ -1,12 +1,12 @@
-"""How this program joins the network: by file, by environment, by argument.
+"""Configuration of a program's network: by a file, the environment or an argument.
 
-Without any configuration a program talks to programs on the same machine, finds them by itself and
-lets nobody else in. Everything beyond that is said here: a router to connect to, TLS, user and
-password, who may use which names, and the name space of a robot.
+Without a configuration, programs on the same machine find each other, and no other machine has
+access. A configuration can add a router to connect to, TLS, user and password, access rules, and
+the namespace of a robot.
 
-The file is YAML with the fields of `Config`; `SMACHPY_CONFIG` names it, or an argument does.
-`SMACHPY_DOMAIN` alone sets the domain where no file does. `SMACHPY_ROS2` names the router of a
-ROS 2 robot, with or without a file, `SMACHPY_ROS2_DOMAIN` and `SMACHPY_ROS2_DISTRO` the rest.
+The file is YAML with the fields of `Config`; `SMACHPY_CONFIG` or an argument has its path. Without
+a file, `SMACHPY_DOMAIN` sets the domain. With or without a file, `SMACHPY_ROS2` is the router of a
+ROS 2 robot, with `SMACHPY_ROS2_DOMAIN` and `SMACHPY_ROS2_DISTRO`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ ROS2_DOMAIN_VARIABLE = "SMACHPY_ROS2_DOMAIN"
 ROS2_DISTRO_VARIABLE = "SMACHPY_ROS2_DISTRO"
 ALL_NAMES = "**"
 LAST_DOMAIN = 9999
-MOST_DIGITS = 9  # of a number that is read
+MOST_DIGITS = 9  # of a number in the environment or command line
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 
-PROBE_S = 5.0  # a ROS 2 server whose tokens are there is asked this often whether it is alive
+PROBE_S = 5.0  # interval of the probes of a ROS 2 server with running goals
 
 Mode = Literal["peer", "client", "router"]
 Distro = Literal["humble", "jazzy", "kilted", "lyrical", "rolling"]
@@ -47,8 +47,8 @@ class Tls:
         ca: File with the certificates (PEM) that this side trusts.
         certificate: File with this side's own certificate (PEM).
         key: File with its private key (PEM).
-        require_client_certificate: Let in only who shows a certificate that `ca` signed.
-        verify_name: Check that the other side's certificate is for the address connected to.
+        require_client_certificate: Accept only clients with a certificate that `ca` has signed.
+        verify_name: Check that the other side's certificate is for the address of the connection.
     """
 
     ca: str = ""
@@ -60,13 +60,13 @@ class Tls:
 
 @dataclass(frozen=True, slots=True)
 class AccessRule:
-    """Who may use which names, enforced by the router or peer that has the rule.
+    """Permission to use names, enforced by the router or peer that has the rule.
 
     Attributes:
-        names: Full names without a slash in front; `*` is one word, `**` any number.
-        users: Names of users it is for; empty, with `certificates` empty too, is everybody.
-        certificates: Common names of client certificates it is for.
-        permission: "allow" or "deny"; deny wins where both apply.
+        names: Full names without a leading slash; `*` matches one word, `**` any number.
+        users: The users that it applies to; with `certificates` empty too: everybody.
+        certificates: Common names of the client certificates that it applies to.
+        permission: "allow" or "deny"; if both apply, "deny" wins.
     """
 
     names: tuple[str, ...]
@@ -77,16 +77,16 @@ class AccessRule:
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """A name here that is on a ROS 2 network under another name or with another type.
+    """A name here that has another name or type on a ROS 2 network.
 
     Attributes:
-        name: Full name here, no slash in front.
-        action: Its name there, when it is an action; "" is the same name, as for the next two.
+        name: Full name here, without a leading slash.
+        action: Its name there, if it is an action; "": the same name, as for the next two.
         topic: The same for a topic.
         service: The same for a service.
-        type: Its type there, "nav2_msgs/NavigateToPose"; "" is the one that corresponds.
-        fields: Pairs of fields that correspond, the one here and the one there ("" for none), where
-            names and types do not tell; of an action with its part in front, "goal.target_pose".
+        type: Its type there, "nav2_msgs/NavigateToPose"; "": the corresponding type.
+        fields: Pairs of corresponding fields, here and there ("": none), where this does not follow
+            from names and types; for an action with its part in front, "goal.target_pose".
     """
 
     name: str
@@ -100,7 +100,7 @@ class Mapped:
         """Check the fields.
 
         Raises:
-            ConfigError: some are wrong; the text names all of them.
+            ConfigError: some are wrong; the text lists all of them.
         """
         given = {word: getattr(self, word) for word in ("action", "topic", "service")}
         named = [word for word, name in given.items() if name]
@@ -129,24 +129,23 @@ class Ros2:
     """A network of ROS 2 nodes whose middleware is rmw_zenoh: a robot's, for example.
 
     Attributes:
-        router: Endpoint of its Zenoh router, `tcp/robot.local:7447`; "" finds its nodes in the
+        router: Endpoint of its Zenoh router, `tcp/robot.local:7447`; "": its nodes are in the
             network that this program has joined anyway.
         domain: ROS_DOMAIN_ID of its nodes.
-        distro: Their release of ROS 2, which decides the definitions of messages.
-        namespace: What names live under there: `navigate_to_pose` here is
-            `<namespace>/navigate_to_pose` there; a name that begins so already stays.
-        robot: Name of the robot here, where several have the same names: `<robot>/odom` here is
+        distro: Their release of ROS 2, which determines the definitions of messages.
+        namespace: Prefix of names there: `navigate_to_pose` here is `<namespace>/navigate_to_pose`
+            there. Names that already begin with it are not changed.
+        robot: Prefix of names here, for several robots with the same names: `<robot>/odom` here is
             `odom` there, under `namespace`.
-        names: Full names here that are on this network, `*` for a word, `**` for any number of
-            them; needed where there are several networks and no `robot`, and for ends whose types
-            are those of ROS 1, which use the corresponding ones of ROS 2 then. `**` alone is every
-            name whose type ROS 2 has, but for std_msgs and std_srvs, which programs use among
-            themselves, too.
+        names: Full names here that are on this network; `*` matches one word, `**` any number.
+            Needed with several networks without `robot`, and for types of ROS 1, for which the
+            corresponding types of ROS 2 are then used. `**` alone means every name whose type ROS 2
+            has, except std_msgs and std_srvs, which programs also use among themselves.
         map: Names here that have another name or type there; they need not be in `names`.
-        mode: "client" reaches nodes through the router only, as it has to be from another machine;
-            "peer" talks to them directly, faster, on the robot's own machine.
-        probe: How often a server with running goals is asked whether it is alive [s], as a link may
-            be silent for a minute before ROS 2 takes it for dead; 0 never asks.
+        mode: "client" reaches nodes only through the router, as is necessary from another machine;
+            "peer" communicates with them directly and faster, on the robot's own machine.
+        probe: Interval in which a server with running goals is probed [s], since ROS 2 may need a
+            minute to notice a dead link; 0: never.
     """
 
     router: str = ""
@@ -163,7 +162,7 @@ class Ros2:
         """Check the fields.
 
         Raises:
-            ConfigError: some are wrong; the text names all of them.
+            ConfigError: some are wrong; the text lists all of them.
         """
         problems = [
             *_check_endpoint("router", self.router),
@@ -188,25 +187,25 @@ class Config:
     """How to join the network.
 
     Attributes:
-        mode: "peer" talks to others directly; "client" goes through a router; "router" is one.
+        mode: "peer" connects to others directly; "client" uses a router; "router" is one.
         connect: Endpoints to connect to, `tcp/192.168.1.2:7447` for example.
-        listen: Endpoints to be reached at; empty is the loopback address (a client has none).
-        discovery: Network interface on which peers find each other: "lo" stays on this machine,
-            "auto" picks one, "off" finds nobody.
-        domain: Programs of different domains, 0 to 9999, do not find each other.
-        namespace: What relative names live under, one per robot.
-        lease: A link that is silent for this long [s] is dead, and so is what was behind it.
-        connect_timeout: How long opening may try to reach `connect` [s].
-        settle: How long opening waits to find others [s]; 0 opens at once and finds them meanwhile.
-        timestamping: Each message carries the time it was sent at, as ROS 2 nodes' messages do.
+        listen: Endpoints to listen at; empty: the loopback address (a client has none).
+        discovery: Network interface on which peers find each other: "lo" is this machine only,
+            "auto" chooses one, "off" disables discovery.
+        domain: 0 to 9999; programs in different domains do not find each other.
+        namespace: Prefix of relative names, usually one per robot.
+        lease: A link that is silent for this time [s] counts as dead, with all programs behind it.
+        connect_timeout: Longest time for reaching `connect` while opening the session [s].
+        settle: How long opening waits for discovery [s]; 0: it does not wait.
+        timestamping: Messages have the time at which they were sent, as those of ROS 2 nodes do.
         tls: Encryption and certificates.
         user: Name to log in with.
         password: Password to log in with.
         password_file: File whose first line is the password, instead of `password`.
-        users_file: File with `user:password` lines: whom this side lets in.
-        access: Who may use which names; without rules everybody may everything.
+        users_file: File with `user:password` lines: the users that may log in here.
+        access: Access rules; without rules, everybody may use all names.
         ros2: Networks of ROS 2 nodes that this program uses as well. `tls`, `user` and the password
-            count for their routers, too.
+            also apply to their routers.
     """
 
     mode: Mode = "peer"
@@ -228,10 +227,10 @@ class Config:
     ros2: tuple[Ros2, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check what fits together.
+        """Check the fields, also against each other.
 
         Raises:
-            ConfigError: some fields do not; the text names all of them.
+            ConfigError: some are wrong; the text lists all of them.
         """
         problems = [line for check in _CHECKS for line in check(self).splitlines()]
         if problems:
@@ -415,11 +414,11 @@ def load_config(source: Config | str | Path | None = None) -> Config:
     """Return the configuration to use.
 
     Args:
-        source: A ready one, or a file; None takes the file that `SMACHPY_CONFIG` names, and
-            without that variable the default.
+        source: A configuration, or a file; None: the file in `SMACHPY_CONFIG`, or without that
+            variable the default.
 
     Raises:
-        ConfigError: the file cannot be read or has errors; the text names all of them with line and
+        ConfigError: the file cannot be read or has errors; the text lists all of them with line and
             field.
     """
     if isinstance(source, Config):
@@ -436,7 +435,7 @@ def load_config(source: Config | str | Path | None = None) -> Config:
 
 
 def _with_ros2_of_environment(config: Config) -> Config:
-    """Add the network that the environment names, or say which robot the file's one is of."""
+    """Add the ROS 2 network in the environment, or apply it to the only one in the file."""
     router = os.environ.get(ROS2_VARIABLE) or ""
     if not router:
         return config

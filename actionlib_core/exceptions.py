@@ -1,27 +1,27 @@
-"""Every exception of actionlib_core; the data of each error is on the object too.
+"""All exceptions of actionlib_core; each has its data as attributes, too.
 
 Exception
  +-- ActionlibError
-      +-- InvalidDurationError  a duration that cannot be waited: negative, NaN
-      |    +-- DurationTypeError  one that is no number
+      +-- InvalidDurationError  a duration that is negative, NaN, or infinite where it may not be
+      |    +-- DurationTypeError  a value that is not a duration
       +-- NameSetupError        several problems in names or arguments, all at once
       |    +-- InvalidNameError a name breaks the ROS name rules (caret text)
       +-- ConfigError           a configuration has errors, all at once
       +-- NodeError             a node is closed, missing or made twice
       +-- TransportError        the network session is closed or could not be opened
       |    +-- AccessDeniedError a name that the router's access rules forbid
-      +-- WaitTimeoutError      what was waited for did not come in time
+      +-- WaitTimeoutError      a wait has timed out
       +-- ServiceException      a service call failed, or its handler raised
       |    +-- ServiceUnavailableError there is no server
       |    +-- ServiceTimeoutError     no answer in time
       |    +-- ServiceLostError        the server died during the call
-      |    +-- ServiceBusyError        too many calls are under way, or the handler calls itself
+      |    +-- ServiceBusyError        too many calls are running, or the handler calls itself
       |    +-- ServiceConflictError    another server has the name
-      +-- RemoteNodeError       a node of a robot refused what it was asked; all at once
+      +-- RemoteNodeError       a node of a ROS 2 robot refused requests, all at once
       +-- TypeMismatchError     two ends of a name disagree on the type
       +-- InterfaceError        a .msg/.srv/.action file or an interface name cannot be used
       |    +-- FieldError       a value does not fit the field of a message
-      +-- Ros1Error             a ROS 1 master or node does not answer, or not as it should
+      +-- Ros1Error             a ROS 1 master or node does not answer, or answers wrongly
       +-- DeserializationError  received bytes are not a message of the expected type
 """
 
@@ -36,15 +36,15 @@ MD5_DIGITS = 32
 
 
 def text_of(error: BaseException, form: Callable[[object], str] = str) -> str:
-    """Return what an exception says; the user's own class may raise when it is asked.
+    """Return the text of an exception, whose class may be the user's own and raise in turn.
 
     Args:
         error: The exception.
-        form: `repr` for one whose class is to be told too.
+        form: `repr` to include the class.
     """
     try:
         return form(error)
-    except Exception as broken:  # noqa: BLE001  a border to user code
+    except Exception as broken:  # noqa: BLE001  user code
         return f"<{type(error).__name__}: its text raised {type(broken).__name__}>"
 
 
@@ -53,11 +53,11 @@ class ActionlibError(Exception):
 
 
 class InvalidDurationError(ActionlibError, ValueError):
-    """A duration that cannot be waited: negative, not a number, or without the end it needs.
+    """A duration that is negative, not a number, or infinite where it may not be.
 
     Attributes:
         argument: Name of the argument.
-        value: What was given.
+        value: The value.
     """
 
     def __init__(self, where: str, argument: str, value: object, expected: str) -> None:
@@ -67,7 +67,7 @@ class InvalidDurationError(ActionlibError, ValueError):
 
 
 class DurationTypeError(InvalidDurationError, TypeError):
-    """A duration that is neither a number nor a `Duration`, a text for example."""
+    """A value that is neither a number nor a `Duration`, for example a text."""
 
 
 class NameSetupError(ActionlibError, ValueError):
@@ -86,9 +86,9 @@ class InvalidNameError(NameSetupError):
     """A name breaks the ROS name rules.
 
     Attributes:
-        name: The name as given.
-        kind: What it names, for example "action name".
-        reason: Which rule it breaks.
+        name: The name.
+        kind: The kind of name, for example "action name".
+        reason: The rule that it breaks.
         index: Position of the first offending character.
     """
 
@@ -131,8 +131,8 @@ class AccessDeniedError(TransportError):
     """A name that the access rules of the other side forbid.
 
     Attributes:
-        key: What was to be used.
-        allowed: The names that may be used.
+        key: The forbidden key.
+        allowed: The names that this program may use.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class AccessDeniedError(TransportError):
 
 
 class WaitTimeoutError(ActionlibError, TimeoutError):
-    """What was waited for did not come in time."""
+    """A wait has timed out."""
 
 
 class ServiceException(ActionlibError):  # noqa: N818  rospy's name
@@ -184,15 +184,15 @@ class ServiceLostError(ServiceException):
 
 
 class ServiceBusyError(ServiceException):
-    """The server runs as many calls at once as it takes."""
+    """The server runs its largest number of calls already."""
 
 
 class ServiceConflictError(ServiceException):
-    """Two servers have one name; this one does not answer, so that no call is executed twice.
+    """Two servers have one name; this one has stopped, so that no call is executed twice.
 
     Attributes:
-        mine: (node, session) of the server that gave way.
-        other: (node, session) of the one that stays.
+        mine: (node, session) of the server that stopped.
+        other: (node, session) of the one that keeps the name.
     """
 
     def __init__(self, name: str, mine: tuple[str, str], other: tuple[str, str]) -> None:
@@ -202,7 +202,7 @@ class ServiceConflictError(ServiceException):
 
 
 class TypeMismatchError(ActionlibError, TypeError):
-    """Two ends of a name disagree on what travels there.
+    """Two ends of a name have different types.
 
     Attributes:
         name: The name.
@@ -233,11 +233,11 @@ class TypeMismatchError(ActionlibError, TypeError):
 
 
 class RemoteNodeError(ActionlibError):
-    """A node of a ROS 2 robot refused what it was asked.
+    """A node of a ROS 2 robot refused requests.
 
     Attributes:
         node: Its full name.
-        problems: What was wrong, by the name of a parameter or transition.
+        problems: Name of a parameter or transition -> reason.
     """
 
     def __init__(self, node: str, problems: dict[str, str]) -> None:
@@ -259,7 +259,7 @@ class InterfaceError(ActionlibError):
 
 
 class FieldError(InterfaceError, TypeError):
-    """Values do not fit the fields of a message; found when it is written or filled.
+    """Values do not fit the fields of a message that is written or filled.
 
     Attributes:
         problems: One text per bad field, "pkg/Type: $.path.of.field: expected X, got Y".
@@ -267,7 +267,7 @@ class FieldError(InterfaceError, TypeError):
 
 
 class CorrespondenceError(InterfaceError):
-    """Fields of a message have no counterpart in the message that it is to become.
+    """Fields of a message have no counterpart in the message that it is converted to.
 
     Attributes:
         problems: One text per field, "pkg/Type -> pkg/msg/Type: field: ...".
@@ -300,11 +300,11 @@ class DeserializationError(ActionlibError, ValueError):
 
 
 class Ros1Error(ActionlibError):
-    """A ROS 1 master or node does not answer, refuses, or answers otherwise than it should.
+    """A ROS 1 master or node does not answer, refuses, or answers wrongly.
 
     Attributes:
-        peer: Whom it is about: the address of a master or node, or a node's name.
-        reason: What is wrong.
+        peer: The address of the master or node, or the node's name.
+        reason: The problem.
     """
 
     def __init__(self, peer: str, reason: str) -> None:
@@ -314,18 +314,18 @@ class Ros1Error(ActionlibError):
 
 
 class ActionException(ActionlibError):  # noqa: N818  actionlib's name
-    """Root of the errors about actions."""
+    """Base class of the errors about actions."""
 
 
 class IllegalTransitionError(ActionException):
-    """A goal cannot do that in the state it is in.
+    """A goal's state does not allow a transition.
 
     Attributes:
-        goal: Names the goal and its action.
-        state: The state it is in.
-        target: The state it was to go to.
-        call: What was called.
-        allowed: The states from which the call is allowed.
+        goal: The goal and its action, as text.
+        state: Its present state.
+        target: The requested state.
+        call: The call that requested it.
+        allowed: The states in which the call is allowed.
     """
 
     def __init__(self, goal: str, state: str, target: str, call: str, allowed: list[str]) -> None:
@@ -357,7 +357,7 @@ class ServerConflictError(ActionException):
     Attributes:
         name: The action's name.
         mine: (node, session) of the server that stopped.
-        other: (node, session) of the one that stays.
+        other: (node, session) of the one that keeps the name.
     """
 
     def __init__(self, name: str, mine: tuple[str, str], other: tuple[str, str]) -> None:
@@ -376,13 +376,13 @@ def _two_servers(mine: tuple[str, str], other: tuple[str, str]) -> str:
 
 
 class GoalFailedError(ActionException):
-    """A goal ended otherwise than SUCCEEDED.
+    """The end of a goal was not SUCCEEDED.
 
     Attributes:
         name: The action's name.
         status: The goal's final status, for example "ABORTED".
-        text: What the server said about it.
-        result: The result that came with it, or None.
+        text: The text of that status.
+        result: The result message, or None.
     """
 
     def __init__(self, name: str, goal_id: str, status: str, text: str, result: object) -> None:
@@ -397,14 +397,14 @@ class GoalFailedError(ActionException):
 
 
 class InterfaceWarning(UserWarning):
-    """A definition was read although it is not quite as ROS wants it."""
+    """A definition was accepted although it deviates from ROS's format."""
 
 
 class GoalTimeoutError(GoalFailedError, TimeoutError):
     """A goal took longer than the caller allowed, and was cancelled.
 
     Attributes:
-        timeout: What was allowed [s].
+        timeout: The allowed time [s].
     """
 
     def __init__(self, name: str, goal_id: str, status: str, timeout: float) -> None:

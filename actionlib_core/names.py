@@ -1,7 +1,7 @@
-"""ROS names: the rules, name spaces, private names, and remapping from the command line.
+"""ROS names: the rules, namespaces, private names, and remapping from the command line.
 
-A name in full has no slash in front here: `robot_1/move_base` is both the ROS name
-`/robot_1/move_base` and the key it has on the network.
+Full names have no leading slash here: `robot_1/move_base` is the ROS name `/robot_1/move_base` and
+also its key on the network.
 
 Source:
     https://wiki.ros.org/Names (valid names, resolving, remapping arguments) and, for
@@ -32,7 +32,7 @@ def check_name(name: str, kind: str = "name") -> str:
         kind: What it names, for the error text: "action name", "topic name".
 
     Raises:
-        InvalidNameError: a rule is broken; the text points at the first offending character.
+        InvalidNameError: a rule is broken; the text marks the first offending character.
     """
     problem = _find_problem(name)
     if problem is not None:
@@ -67,7 +67,7 @@ def _find_problem(name: str) -> tuple[str, int] | None:
 
 
 def check_base_name(name: str, kind: str = "node name") -> str:
-    """Return `name` unchanged if it is one word: no slash, no tilde.
+    """Return `name` unchanged if it is one word, without slash and tilde.
 
     Raises:
         InvalidNameError: it is not.
@@ -80,10 +80,10 @@ def check_base_name(name: str, kind: str = "node name") -> str:
 
 
 def clean_namespace(namespace: str) -> str:
-    """Return a name space without slashes around it; "" and "/" are the root.
+    """Return a namespace without outer slashes; "" and "/" are the root.
 
     Raises:
-        InvalidNameError: it is no valid name, or private.
+        InvalidNameError: it is not a valid name, or private.
     """
     if namespace in {"", "/"}:
         return ""
@@ -106,9 +106,9 @@ def resolve_name(
 
     Args:
         name: Relative, absolute or private name.
-        namespace: What relative names live under, no slashes around it.
-        node: Full name of the node, what private names live under.
-        remappings: Full name -> full name; looked up once, after resolving.
+        namespace: Prefix of relative names, without outer slashes.
+        node: Full name of the node, the prefix of private names.
+        remappings: Full name -> full name; applied once, after resolving.
         kind: What it names, for the error text.
 
     Raises:
@@ -132,7 +132,7 @@ class Rule:
     Attributes:
         old: Left side: a name, `__ns`, `__node` or `__name`.
         new: Right side.
-        node: The only node it is meant for; "" when it is for all.
+        node: The only node that it applies to; "": all nodes.
     """
 
     old: str
@@ -142,12 +142,12 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class NameArguments:
-    """What a command line says about names.
+    """The arguments about names of a command line.
 
     Attributes:
         rules: In the order of the command line.
-        rest: The arguments that are not about names, the program's own (`rospy.myargv`).
-        parameters: The words `_name:=value` of ROS 1, as they stand.
+        rest: The program's own arguments, which are not about names (`rospy.myargv`).
+        parameters: The arguments `_name:=value` of ROS 1, unchanged.
     """
 
     rules: tuple[Rule, ...] = ()
@@ -155,11 +155,11 @@ class NameArguments:
     parameters: tuple[str, ...] = ()
 
     def node_name(self, name: str) -> str:
-        """Return what the node called `name` in the program is called here."""
+        """Return the name of the node that the program calls `name`."""
         return self._last(("__node", "__name"), name) or name
 
     def namespace(self, name: str) -> str | None:
-        """Return the name space for the node called `name` in the program, None when not given."""
+        """Return the namespace of the node that the program calls `name`; None: not given."""
         return self._last(("__ns",), name)
 
     def _last(self, settings: tuple[str, ...], node: str) -> str | None:
@@ -170,8 +170,8 @@ class NameArguments:
         """Return the remappings of a node, full name -> full name; the first rule wins.
 
         Args:
-            name: What the node is called in the program.
-            namespace: Its name space, no slashes around it.
+            name: The node's name in the program.
+            namespace: Its namespace, without outer slashes.
             node: Its full name.
         """
         result: dict[str, str] = {}
@@ -184,7 +184,7 @@ class NameArguments:
 
 @dataclass(slots=True)
 class _Collected:
-    """What has been read of the command line so far."""
+    """The parts of the command line read so far."""
 
     rules: list[Rule] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
@@ -192,7 +192,7 @@ class _Collected:
     parameters: list[str] = field(default_factory=list)
 
     def take_rule(self, text: str, *, node: str = "") -> None:
-        """Read one `from:=to`; parameters are only kept, unknown `__settings` left aside."""
+        """Read one `from:=to`; parameters are stored unchanged, unknown `__settings` ignored."""
         old, _, new = text.partition(":=")
         try:
             if old == "__ns":
@@ -212,7 +212,7 @@ class _Collected:
             self.rules.append(Rule(old, new, node))
 
     def take_ros_args(self, arguments: Sequence[str]) -> None:
-        """Read what stands between `--ros-args` and `--`."""
+        """Read the arguments between `--ros-args` and `--`."""
         queue = list(arguments)
         while queue:
             flag = queue.pop(0)
@@ -227,7 +227,7 @@ class _Collected:
                     )
             elif flag in _FLAGS_WITH_VALUE and queue:
                 queue.pop(0)
-            # All other flags are about logging and parameters, which are not ours.
+            # All other flags concern logging and parameters, and are ignored.
 
 
 _FLAGS_WITH_VALUE = frozenset({
@@ -245,15 +245,15 @@ def _split_node(text: str) -> tuple[str, str]:
 def parse_arguments(argv: Sequence[str]) -> NameArguments:
     """Read remapping from a command line, in the style of ROS 1 and of ROS 2.
 
-    ROS 1: `a:=b __ns:=/robot_1 __name:=patrol`; `_param:=value` is kept as it stands, unknown
-    `__log:=...` is left aside. ROS 2: `--ros-args -r a:=b -r __ns:=/robot_1 -r __node:=patrol
-    [--]`.
+    ROS 1: `a:=b __ns:=/robot_1 __name:=patrol`; `_param:=value` is stored unchanged, unknown ones
+    such as `__log:=...` are ignored. ROS 2: `--ros-args -r a:=b -r __ns:=/robot_1 -r
+    __node:=patrol [--]`.
 
     Args:
-        argv: The arguments; the program's name in front may be there or not.
+        argv: The arguments, with or without the program's name.
 
     Raises:
-        NameSetupError: some are malformed; the text names all of them.
+        NameSetupError: some are malformed; the text lists all of them.
     """
     collected = _Collected()
     position = 0
@@ -274,7 +274,7 @@ def parse_arguments(argv: Sequence[str]) -> NameArguments:
 
 
 def _is_rule(argument: str) -> bool:
-    """Tell `a:=b` from an argument that merely contains `:=`, a YAML text for example."""
+    """Return whether an argument is a rule `a:=b`, not a text with `:=` such as YAML."""
     old, sign, _ = argument.partition(":=")
     return bool(sign) and not re.search(r"[\s{}\[\]\"'=]|^-", old)
 

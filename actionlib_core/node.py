@@ -1,8 +1,8 @@
-"""A node: a name on the network and everything a client or server needs to be there.
+"""A node: a program's name on the network, with its session, clock and name resolution.
 
 Programs need not make one: the first client, server, publisher or subscriber makes the default
-node, named after the program, and it is closed when the interpreter exits, on every path. `init`
-names it; tests use `use_node`.
+node, named after the program, which is closed when the interpreter exits. `init` sets its name;
+tests use `use_node`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-CLOSE_S = 0.8  # what is closed with a node waits no longer, all together
+CLOSE_S = 0.8  # total time for closing everything on a node
 
 _NO_ZENOH = (
     "{what}: the clock is not the real one, so a session on zenoh does not fit; expected one on "
@@ -52,18 +52,18 @@ class Node:
 
     Args:
         name: One word, the node's base name.
-        transport: Its network session, which stays the caller's; None opens one on zenoh, which
-            the node closes.
-        clock: Time and threads; the current clock when None.
-        namespace: What the node's name and its relative names live under, "robot_1" for example.
-        arguments: Renaming from a command line (`actionlib_core.names.parse_arguments`).
-        config: How that session joins the network; None takes `SMACHPY_CONFIG`. Its `namespace`
-            is for the default node only. With a transport of the caller's, only its `ros2` counts,
-            and all of those networks are in that transport.
+        transport: Its network session, which the caller closes; None: the node opens a Zenoh
+            session, and closes it.
+        clock: Its clock; None: the current clock.
+        namespace: Prefix of the node's name and of its relative names, "robot_1" for example.
+        arguments: Remapping from a command line (`actionlib_core.names.parse_arguments`).
+        config: How the session joins the network; None: by `SMACHPY_CONFIG`. Its `namespace` is
+            used by the default node only. With a `transport`, only its `ros2` is used, and all of
+            those networks are in that transport.
 
     Raises:
         InvalidNameError: the name or the namespace breaks the ROS rules.
-        NodeError: there is no transport, but a clock that zenoh does not run on.
+        NodeError: there is no transport, and the clock is not the real one, which Zenoh needs.
         TransportError: no network session could be opened.
 
     Threads: every method may be called from any thread.
@@ -95,11 +95,10 @@ class Node:
             config = load_config() if transport is None else Config()
         self.config = config
         self.transport: Transport = transport if transport is not None else open_zenoh(config)
-        self._lock = threading.Lock()  # guards who is to be closed, and whether it is over
+        self._lock = threading.Lock()  # guards `_closers`, `_asks` and `_closed`
         self._entities = itertools.count(1)
-        self._shared_lock = (
-            threading.RLock()
-        )  # held while something is made, of other shared things, too
+        # Reentrant: making one shared object may need another one.
+        self._shared_lock = threading.RLock()
         self._shared: dict[Hashable, Any] = {}
         self._closers: dict[int, Callable[[], object]] = {}
         self._asks: dict[int, Callable[[], object]] = {}
@@ -116,11 +115,11 @@ class Node:
         return self._closed
 
     def resolve(self, name: str, kind: str = "name") -> str:
-        """Return the full name, remapped, no slash in front; it is the key on the network.
+        """Return the remapped full name without a leading slash, which is the network's key.
 
         Args:
             name: Relative, absolute (`/...`) or private (`~...`) name.
-            kind: What it names, for the error text: "action name".
+            kind: The kind of name, for the error text: "action name".
 
         Raises:
             InvalidNameError: the name breaks the ROS rules.
@@ -134,7 +133,7 @@ class Node:
         )
 
     def endpoint(self, kind: Kind, name: str, type_name: str, md5: str) -> Endpoint:
-        """Return a new end of the full name `name`, not yet shown to anybody."""
+        """Return a new end of the full name `name`, which is not yet announced."""
         return Endpoint(
             kind,
             name,
@@ -146,7 +145,7 @@ class Node:
         )
 
     def announce(self, kind: Kind, name: str, type_name: str, md5: str) -> Closable:
-        """Show the token of a new end of the full name `name`, until closed.
+        """Declare the token of a new end of the full name `name`, until it is closed.
 
         Raises:
             TransportError: the session is closed.
@@ -154,12 +153,13 @@ class Node:
         return self.transport.declare_alive(token_key(self.endpoint(kind, name, type_name, md5)))
 
     def shared(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what was made under `key` on this node, made now when it was not.
+        """Return the object with this key, which is made on first use.
 
-        For what many short-lived objects can share; it is theirs to close it with `on_close`.
+        For objects that many short-lived ones share. The node does not close it, so `make` is to
+        register it with `on_close` if necessary.
 
         Args:
-            key: Identifies it.
+            key: Identifies the object.
             make: Makes it, at most once per key and node.
         """
         with self._shared_lock:
@@ -171,15 +171,15 @@ class Node:
     def on_close(
         self, closer: Callable[[], object], *, ask: Callable[[], object] | None = None
     ) -> Callable[[], None]:
-        """Call `closer` when the node closes, the newest first, before the network is left.
+        """Call `closer` when the node closes, the newest first, before the session is closed.
 
         Args:
-            closer: Closes its owner; it may wait for as long as `time_to_leave` says.
-            ask: Called before, for all owners one after another; it asks what still works to end,
-                and does not wait for that. So they all end at the same time.
+            closer: Closes its owner; it may block for `time_to_leave`.
+            ask: Called first, for all owners; it asks running work to end and does not block. So
+                all owners end at the same time.
 
         Returns:
-            Forgets `closer` again; for owners that were closed before.
+            A function that unregisters both, for owners that close earlier.
 
         Raises:
             NodeError: the node is closed.
@@ -203,35 +203,35 @@ class Node:
         return forget
 
     def let_go(self, closer: Callable[[], object]) -> None:
-        """Call `closer` soon, in another thread: nobody holds any more what it closes.
+        """Call `closer` soon, in another thread, because the program has dropped its owner.
 
-        Threads: any, also one that collects garbage, at any moment.
+        Threads: any, at any moment, also during a garbage collection.
         """
 
         def close() -> None:
             try:
                 closer()
-            except TransportError:  # the node was closed meanwhile, and all that is on it
+            except TransportError:  # the node was closed in the meantime, with everything on it
                 if not self._closed:
                     raise
 
         if not self._closed:
             name = f"let go by node {self.full_name}"
-            # Not here: the garbage collector runs this amid any code, which may hold any lock.
+            # Not in this thread: the garbage collector may have interrupted code that holds a lock.
             self.clock.call_later(0.0, lambda: self.clock.spawn(close, name=name))
 
     def time_to_leave(self, longest: float) -> float:
-        """Return how long what is being closed may wait [s].
+        """Return how long an owner that is being closed may block [s].
 
-        That is `longest`, or what is left of the `CLOSE_S` that all have together when it is closed
-        with its node.
+        That is `longest`, but while the node closes no more than the rest of the `CLOSE_S` that all
+        owners share.
         """
         if self._leave_by is None:
             return longest
         return max(0.0, min(longest, self._leave_by - self.clock.now()))
 
     def close(self) -> None:
-        """Close what was made on this node, then leave the network; a second call does nothing.
+        """Close everything on this node, then its session; a second call does nothing.
 
         Blocks: under a second, however much there is to close.
         """
@@ -246,11 +246,11 @@ class Node:
             )
             self._closers.clear()
             self._asks.clear()
-        # All are asked first, so that their grace runs at the same time; the newest closes first.
+        # All are asked first, so that their graces run at the same time.
         for call in (*asks, *closers):
             try:
                 call()
-            except Exception:  # noqa: BLE001  a border: reported, the others are closed too
+            except Exception:  # noqa: BLE001  reported here; the others are closed too
                 report_thread_exception()
         if self.owns_transport:
             self.transport.close()
@@ -263,7 +263,8 @@ class Node:
 
 
 def open_zenoh(config: Config) -> Transport:
-    """Open a session on zenoh, which is imported only now."""
+    """Open a Zenoh session."""
+    # Imported here: tests and programs with another transport do not need Zenoh.
     from actionlib_core.transport.zenoh import ZenohTransport
 
     return ZenohTransport(config)
@@ -273,9 +274,9 @@ _current: ContextVar[Node | None] = ContextVar("node", default=None)
 
 
 class _Default:
-    """The process's default node, made once.
+    """The process's default node, made on first use.
 
-    The lock is held while the node is made, so that two threads that need it get the same one.
+    The lock is held while the node is made, so that two threads get the same one.
     """
 
     def __init__(self) -> None:
@@ -317,9 +318,9 @@ class _Default:
 
 
 def _leave(node: Node, pid: int) -> None:
-    """Let those finish who asked for it (`Shutdown.at_exit`), then leave the network.
+    """Run the `Shutdown.at_exit` callbacks, then close the node.
 
-    Only in the process that made the node: what a forked one ends with is not its own.
+    Not in a forked process, which has inherited the node but must not close it.
     """
     if os.getpid() != pid:
         return
@@ -332,7 +333,7 @@ _default = _Default()
 
 
 def has_node() -> bool:
-    """Tell whether the process's default node has been made, and so has joined its network."""
+    """Return whether the process's default node exists, and so has joined its network."""
     return _default.exists
 
 
@@ -346,11 +347,11 @@ def init(
     """Make the default node with a name and a configuration of your own; optional.
 
     Args:
-        name: One word; None takes the program's name and process id.
-        argv: Arguments with renaming; None takes `sys.argv[1:]`. What is the program's own is in
-            `node.arguments.rest` afterwards.
-        config: How to join the network, or the file that says it; None takes `SMACHPY_CONFIG`.
-        namespace: What relative names live under; None takes the configuration's.
+        name: One word; None: the program's name and process id.
+        argv: Arguments with remapping; None: `sys.argv[1:]`. The program's own arguments are then
+            in `node.arguments.rest`.
+        config: How to join the network, or a configuration file; None: by `SMACHPY_CONFIG`.
+        namespace: Prefix of relative names; None: that of the configuration.
 
     Raises:
         NodeError: the default node exists already.
@@ -367,11 +368,11 @@ def init(
 
 
 def get_node() -> Node:
-    """Return the node in force here: that of `use_node`, else the default one, made when needed.
+    """Return the current node: that of `use_node`, or else the default one, made on first use.
 
     Raises:
-        NodeError: a clock other than the real one is in use, but no node.
-        NameSetupError: the command line renames something in a way that is not allowed.
+        NodeError: a clock other than the real one is current, but no node is.
+        NameSetupError: the command line has an invalid remapping.
         TransportError: no network session could be opened.
     """
     node = _current.get()

@@ -1,7 +1,7 @@
-"""What command line programs write: no write that failed stays unnoticed, no text moves the cursor.
+"""Output of command-line programs: failed writes are reported, control characters are escaped.
 
 A full disk or a closed standard output ends a program with exit code 2 and a line on standard
-error. A reader that has seen enough (`... | head`) is no error.
+error. A reader that stops reading (`... | head`) is not an error.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 EXIT_OUTPUT: Final = 2
-_LAST_OWN_CODE: Final = 2  # codes above it say which signal ended the program
 _KEPT: Final = frozenset("\n\t")
 
 
 def printable(text: object) -> str:
-    """Return a text for a terminal: characters that are not shown are escaped, lines stay."""
+    """Return a text for a terminal: unprintable characters are escaped, except newline and tab."""
     words = str(text)
     if words.isprintable():
         return words
@@ -35,7 +34,7 @@ def printable(text: object) -> str:
 
 
 class _Checked(io.FileIO):
-    """The file behind standard output; it remembers the first error, whoever catches it."""
+    """The file behind standard output; it stores the first error, even if code above catches it."""
 
     failed: OSError | None = None
 
@@ -48,7 +47,7 @@ class _Checked(io.FileIO):
 
 
 class _Escaping(io.TextIOWrapper):
-    """Standard output of a program that draws nothing: what is not shown is escaped."""
+    """Standard output of a program without control sequences: unprintable text is escaped."""
 
     def write(self, text: str, /) -> int:
         super().write(printable(text))
@@ -63,7 +62,7 @@ def run_program(name: str, run: Callable[[], int], *, draws: bool = False) -> in
     Args:
         name: The program, for the error text.
         run: The program; it returns its exit code, or raises SystemExit.
-        draws: It writes control sequences to standard output, and escapes texts by itself.
+        draws: It writes control sequences to standard output, and escapes texts itself.
 
     Raises:
         SystemExit: as `run`.
@@ -91,12 +90,12 @@ def run_program(name: str, run: Callable[[], int], *, draws: bool = False) -> in
         sys.stdout.flush()
     failed = None if file is None else file.failed
     if failed is not None:
-        discard_output()  # first: what is still buffered is written when the wrapper is freed
+        discard_output()  # first, as the rest of the buffer is written when the wrapper is freed
     sys.stdout = before
     if failed is None and end is not None:
         raise end
     if failed is None or isinstance(failed, BrokenPipeError):
-        return code  # the reader has seen enough; SystemExit is how `rich` takes that
+        return code  # the reader has stopped reading, which `rich` turns into a SystemExit
     tell(
         name,
         f"standard output: got '{failed.strerror or failed}'; expected to write all of it.",
@@ -105,7 +104,7 @@ def run_program(name: str, run: Callable[[], int], *, draws: bool = False) -> in
 
 
 def tell(name: str, text: str) -> None:
-    """Write a line about what went wrong to standard error, if there is one."""
+    """Write an error line to standard error, if there is one."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):
             sys.stderr.write(f"{name}: {printable(text)}\n")
@@ -115,8 +114,8 @@ def tell(name: str, text: str) -> None:
 def _escape_errors() -> None:
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(_Formatter())
-    threading.excepthook = _tell_thread_exception
-    sys.excepthook = _tell_exception
+    threading.excepthook = _print_thread_exception
+    sys.excepthook = _print_exception
 
 
 class _Formatter(logging.Formatter):
@@ -124,10 +123,10 @@ class _Formatter(logging.Formatter):
         return printable(super().format(record))
 
 
-def _tell_exception(
+def _print_exception(
     kind: type[BaseException], error: BaseException, where: TracebackType | None
 ) -> None:
-    """Write what `sys.excepthook` does, escaped."""
+    """Print a traceback as `sys.excepthook` does, but escaped."""
     text = "".join(traceback.format_exception(kind, error, where))
     if sys.stderr is not None:
         with contextlib.suppress(OSError):
@@ -135,8 +134,8 @@ def _tell_exception(
             sys.stderr.flush()
 
 
-def _tell_thread_exception(what: threading.ExceptHookArgs) -> None:
-    """Write what `threading.excepthook` does, escaped."""
+def _print_thread_exception(what: threading.ExceptHookArgs) -> None:
+    """Print a traceback as `threading.excepthook` does, but escaped."""
     if issubclass(what.exc_type, SystemExit) or sys.stderr is None:
         return
     name = what.thread.name if what.thread is not None else "unknown"
@@ -148,7 +147,7 @@ def _tell_thread_exception(what: threading.ExceptHookArgs) -> None:
 
 
 def _replace_output(kind: type[io.TextIOWrapper]) -> _Checked:
-    """Put a checked file in the place of `sys.stdout`; returns it."""
+    """Replace `sys.stdout` by a stream on a checked file; return the file."""
     before = sys.stdout
     assert isinstance(before, io.TextIOWrapper)
     before.flush()
@@ -156,7 +155,7 @@ def _replace_output(kind: type[io.TextIOWrapper]) -> _Checked:
     sys.stdout = kind(
         io.BufferedWriter(file),
         encoding=before.encoding,
-        errors="backslashreplace",  # half a surrogate pair, or a terminal that is not UTF-8
+        errors="backslashreplace",  # for lone surrogates, and for terminals without UTF-8
         newline="\n",
         line_buffering=before.line_buffering,
         write_through=before.write_through,
@@ -165,7 +164,7 @@ def _replace_output(kind: type[io.TextIOWrapper]) -> _Checked:
 
 
 def discard_output() -> None:
-    """Write to nowhere from now on, so that the interpreter does not fail at it in the end."""
+    """Send further output to /dev/null, so that the flush at the interpreter's exit succeeds."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)

@@ -1,7 +1,8 @@
-"""Networks of single programs on one computer, which others do not meet by chance but can find.
+"""Private networks of single programs on one computer, which tools can find.
 
-A program that brings everything it talks to takes a domain that nobody uses, so that two of them do
-not disturb each other. It shows a token in the default domain, by which tools find it:
+A program that starts everything that it communicates with takes an unused domain, so that two such
+programs do not disturb each other. It declares a token in the default domain, by which tools find
+it:
 
     @smachpy/network/<user id>/<domain>/<session>
 """
@@ -29,23 +30,23 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable, Presence, Transport
 
 FIRST_PRIVATE_DOMAIN: Final = 5000
-"""Domains from here to the last one are taken by programs that want one of their own."""
+"""Domains from this one to the last are for private networks."""
 
 
 def network_is_chosen() -> bool:
-    """Tell whether the environment says which network to join."""
+    """Return whether the environment determines which network to join."""
     return any(os.environ.get(name) for name in (ENVIRONMENT_VARIABLE, DOMAIN_VARIABLE))
 
 
 @contextlib.contextmanager
 def private_network() -> Iterator[int]:
-    """Give this process and its children a domain that nobody uses, inside the `with` block.
+    """Give this process and its children an unused domain, inside the `with` block.
 
-    It is for programs that have not joined a network yet: `SMACHPY_DOMAIN` is set.
+    It sets `SMACHPY_DOMAIN`, so it has an effect only before the program joins a network.
 
     Raises:
-        TransportError: no domain is free, or the default one, where the token is shown, cannot be
-            joined.
+        TransportError: no domain is free, or the default domain, where the token is declared,
+            cannot be joined.
     """
     from actionlib_core.transport.zenoh import ZenohTransport
 
@@ -106,14 +107,17 @@ def _prefix() -> str:
 
 @contextlib.contextmanager
 def _free_domain() -> Iterator[int]:
-    """Hold a domain that no other program holds, and in which nobody is."""
+    """Reserve a domain that no other program has reserved, and in which no session is."""
     count = LAST_DOMAIN + 1 - FIRST_PRIVATE_DOMAIN
     for i in range(count):
+        # Starting at different domains, programs that start together rarely compete for one.
         domain = FIRST_PRIVATE_DOMAIN + (os.getpid() + i) % count
         port = FIRST_PORT + domain
-        with _bound("127.0.0.1", port) as mine:  # the others' `mine` fails as long as it is open
+        # The reservation: as long as this socket is open, others cannot bind it.
+        with _bound("127.0.0.1", port) as mine:
             if mine:
-                with _bound(DISCOVERY_GROUP, port) as empty:  # zenoh's sockets would be there
+                # Fails if a session of Zenoh is in the domain, whose discovery has this socket.
+                with _bound(DISCOVERY_GROUP, port) as empty:
                     pass
                 if empty:
                     yield domain
@@ -126,7 +130,7 @@ def _free_domain() -> Iterator[int]:
 
 @contextlib.contextmanager
 def _bound(address: str, port: int) -> Iterator[bool]:
-    """Hold a UDP port; gives False when somebody else has it."""
+    """Bind a UDP port inside the `with` block; yield False when it is in use."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as held:
         try:
             held.bind((address, port))

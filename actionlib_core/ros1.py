@@ -1,11 +1,11 @@
-"""Real ROS 1 robots: a bridge between their ROS master and our network, without ROS installed.
+"""Real ROS 1 robots: a bridge between their ROS master and our network, without installing ROS.
 
     from actionlib_core import ros1
 
     with ros1.bridge("http://robot:11311", actions={"move_base": "move_base_msgs/MoveBaseAction"}):
         ...  # the robot's move_base has a server here
 
-`smachpy bridge ros1` is the same as a program of its own.
+The command `smachpy bridge ros1` does the same.
 """
 
 from __future__ import annotations
@@ -53,33 +53,32 @@ def bridge(
     """Start a bridge; it runs until it is closed, or its node is.
 
     Args:
-        master: Address of the robot's master; None takes `ROS_MASTER_URI`, else this computer's.
-        actions: Actions by their names in ROS 1, with their types if given as a mapping; a type
-            that is "" or not given is learned from whoever is there first.
-        topics: Topics by their names in ROS 1; their types are learned.
-        services: Services by their names in ROS 1; their types are learned.
-        used: Bridge also all actions of the robot, all its services but those for logs, and the
+        master: Address of the robot's master; None: `ROS_MASTER_URI`, or else this computer's.
+        actions: Actions by their names in ROS 1, with their types if given as a mapping. Without a
+            type, or with "", the type of the first end found is used.
+        topics: Topics by their names in ROS 1; their types are those of the first end found.
+        services: Services by their names in ROS 1; likewise.
+        used: Bridge also all actions of the robot, all its services except those for logs, and the
             topics that programs on our network use.
-        all: Bridge everything that there is on both sides, but `/rosout`.
-        on_demand: Bridge also the actions and topics that programs on our network have an end of,
+        all: Bridge everything on both sides, except `/rosout`.
+        on_demand: Bridge also the actions and topics of which programs on our network have an end,
             and the services that this program calls or waits for, as soon as they do.
-        leave_out: Names in ROS 1 that are not bridged, whatever else is asked; `*` stands for any
-            characters.
-        namespace: What the robot's names live under here, "robot_1"; "" is nothing.
-        host: Name or address under which the robot finds this computer; "" takes `ROS_HOSTNAME`,
-            then `ROS_IP`, then the address from which its master is reached.
-        status_timeout: An action server in ROS 1 whose status lists stop for so long is gone [s].
+        leave_out: Names in ROS 1 that are never bridged; `*` matches any characters.
+        namespace: Prefix of the robot's names here, "robot_1"; "": none.
+        host: Name or address under which the robot finds this computer; "": `ROS_HOSTNAME`, or
+            `ROS_IP`, or the address from which the master is reached.
+        status_timeout: A ROS 1 action server without status lists for this time is gone [s].
         service_timeout: Longest time of a service call through the bridge [s].
-        config: How to join our network, or the file that says it; None joins that of the default
-            node, or of `SMACHPY_CONFIG`. The bridge has a node and a session of its own.
+        config: How to join our network, or a configuration file; None: as the default node, or by
+            `SMACHPY_CONFIG`. The bridge has a node and a session of its own.
 
     Returns:
-        The bridge; a master that is not there yet is waited for (`wait_for_master`).
+        The bridge, which waits for the master if necessary (`wait_for_master`).
 
     Raises:
-        NameSetupError: a name breaks the ROS rules; all of them are named.
-        InterfaceError: the type of an action is no name of one.
-        InvalidDurationError: a time-out is no time, or negative.
+        NameSetupError: names break the ROS rules; the text lists all of them.
+        InterfaceError: the type of an action is not a type name.
+        InvalidDurationError: a timeout is not a duration, or negative.
         Ros1Error: the master's address cannot be used.
         ConfigError: the configuration has errors.
         TransportError: our network cannot be joined.
@@ -133,7 +132,7 @@ def bridge(
 
 
 def _config(config: Config | str | Path | None) -> Config:
-    """Return how to join the network: as was said, as the default node has, or as configured."""
+    """Return the given configuration, that of the default node, or that of the environment."""
     joined = (
         getattr(get_node().transport, "config", None) if config is None and has_node() else None
     )
@@ -145,7 +144,7 @@ def _full(name: str) -> str:
 
 
 def _action_type(name: str, type_name: str) -> str:
-    """Return "pkg/XAction" of what a user may call it: "pkg/X", "pkg/action/X", "pkg/XAction"."""
+    """Return "pkg/XAction" for each way to write it: "pkg/X", "pkg/action/X", "pkg/XAction"."""
     from actionlib_core.interfaces._registry import parse_name
 
     if not type_name:

@@ -1,4 +1,4 @@
-"""`--ros2`, `--domain` and `--distro`, which the commands have in common: whose robot to use."""
+"""The options `--ros2`, `--domain` and `--distro`, which select a ROS 2 robot, for all commands."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def add_ros2_options(parser: argparse.ArgumentParser, **endpoint: Any) -> None:
     """Add the options to a command.
 
     Args:
-        parser: Of the command.
-        endpoint: What else argparse is told of `--ros2`.
+        parser: The command's parser.
+        endpoint: Further arguments of `add_argument` for `--ros2`.
     """
     group = parser.add_argument_group("a ROS 2 robot, over rmw_zenoh")
     group.add_argument(
@@ -53,10 +53,10 @@ def _domain(text: str) -> str:
 
 @contextlib.contextmanager
 def ros2_of_options(args: argparse.Namespace) -> Iterator[None]:
-    """Let the networks that are joined inside be those of the options, in child processes too.
+    """Apply the options inside the `with` block, through the environment: also in child processes.
 
     Raises:
-        ConfigError: a domain or a release without a router.
+        ConfigError: a domain or a release was given without a router.
     """
     given = {
         ROS2_VARIABLE: args.ros2,

@@ -1,11 +1,11 @@
-"""The end of the program as one event: requested by a signal, by the program, or by a test.
+"""The shutdown of the program as one event: requested by a signal, by the program, or by a test.
 
     with shutdown.handle_signals():
         shutdown.on_shutdown(machine.request_preempt)
         machine.execute()
 
-The first SIGINT or SIGTERM requests the shutdown; the second SIGINT raises KeyboardInterrupt as
-Python does by default, a third ends the process at once; the second SIGTERM ends it at once.
+The first SIGINT or SIGTERM requests the shutdown. A second SIGINT raises KeyboardInterrupt, as by
+default in Python, and a third one ends the process at once; a second SIGTERM ends it at once.
 
 Tests use a `Shutdown` of their own (`use_shutdown`) and request it by hand.
 """
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock, Event
 
-EXIT_THREADS = 4  # timers, callbacks, and two for what a machine does when it is preempted
+EXIT_THREADS = 4  # for timers, callbacks, and two for a machine that is preempted
 
 
 class Stoppable(Protocol):
-    """What runs, and ends when it is asked to."""
+    """A run that ends on request."""
 
     @property
     def clock(self) -> Clock:
@@ -48,9 +48,9 @@ class Shutdown:
     """One shutdown, requested at most once until `clear`.
 
     Attributes:
-        runs: What runs just now, such as state machines; its `stop` is called when shutdown is
-            requested, in a thread of its clock. Whoever adds itself looks at `requested` then. A
-            set, as it costs a machine no lock.
+        runs: Present runs, such as those of state machines; their `stop` is called in a thread of
+            their clock when shutdown is requested. A run adds itself and then checks `requested`,
+            as the request may have come before. A plain set, so that it needs no lock.
 
     Threads: every method may be called from any thread; `note` from a signal handler too.
     """
@@ -71,13 +71,13 @@ class Shutdown:
         return self._reason
 
     def requested(self) -> bool:
-        """Tell whether the program is to end."""
+        """Return whether shutdown was requested."""
         return self._reason is not None
 
     def event(self, clock: Clock | None = None) -> Event:
-        """Return the event that is set by the request, to wait for on `clock`.
+        """Return the event of `clock` that is set by the request.
 
-        It is one event per clock; nobody but this object may set or clear it.
+        There is one event per clock; only this object may set or clear it.
         """
         clock = current_clock() if clock is None else clock
         with self._lock:
@@ -89,13 +89,13 @@ class Shutdown:
             return event
 
     def on_shutdown(self, callback: Callable[[], object]) -> Callable[[], None]:
-        """Call `callback` once when shutdown is requested; soon, when it was already.
+        """Call `callback` once when shutdown is requested; at once if it already was.
 
         Returns:
-            Forgets the callback.
+            A function that unregisters the callback.
 
         Threads: the callback runs in a thread of the current clock, never in a signal handler; it
-            may block. An exception is given to `threading.excepthook`.
+            may block. An exception is passed to `threading.excepthook`.
         """
         clock = current_clock()
         with self._lock:
@@ -117,11 +117,11 @@ class Shutdown:
         """Call `callback` when the interpreter exits, before the default node leaves the network.
 
         Returns:
-            Forgets the callback.
+            A function that unregisters the callback.
 
-        Threads: the callback runs in the main thread and may block; threads still run then, and
-            `EXIT_THREADS` wait for what the current clock spawns, as Python 3.12 starts none any
-            more. An exception is given to `threading.excepthook`.
+        Threads: the callback runs in the main thread and may block. Other threads still run, and
+            the current clock keeps `EXIT_THREADS` for new tasks, as Python 3.12 can no longer start
+            threads. An exception is passed to `threading.excepthook`.
         """
         clock = current_clock()
         if isinstance(clock, RealClock):
@@ -140,18 +140,18 @@ class Shutdown:
         return forget
 
     def leave(self) -> None:
-        """Call what `at_exit` was given, the newest first; each once."""
+        """Call the callbacks of `at_exit` once, the newest first."""
         with self._lock:
             callbacks = [self._at_exit[number] for number in sorted(self._at_exit, reverse=True)]
             self._at_exit.clear()
         for callback in callbacks:
             try:
                 callback()
-            except Exception:  # noqa: BLE001  a border: reported, the others are called too
+            except Exception:  # noqa: BLE001  user code: reported, the others are called too
                 report_thread_exception()
 
     def request(self, reason: str = "requested") -> bool:
-        """Ask the program to end.
+        """Request the shutdown.
 
         Returns:
             Whether this was the first request.
@@ -171,12 +171,12 @@ class Shutdown:
         return first
 
     def note(self, reason: str) -> None:
-        """Make `requested` true, without waking anybody yet; takes no lock."""
+        """Make `requested` true without waking any thread; takes no lock, for signal handlers."""
         if self._reason is None:
             self._reason = reason
 
     def clear(self) -> None:
-        """Forget the request, for a program that goes on after it."""
+        """Withdraw the request, for a program that continues."""
         with self._lock:
             self._reason = None
             self._delivered = False
@@ -187,8 +187,8 @@ class Shutdown:
 class _SignalHandler:
     """Turns signals into a request.
 
-    The handler itself takes no lock, as the code that it interrupts may hold any; a thread that
-    waits for it does the rest.
+    The handler itself takes no lock, since the interrupted code may hold it. A thread that waits
+    for the handler makes the request.
     """
 
     def __init__(self, shutdown: Shutdown) -> None:
@@ -215,7 +215,7 @@ class _SignalHandler:
             self._shutdown.request(self._shutdown.reason or "signal")
 
     def end(self) -> None:
-        """End the thread; a request that is under way is still delivered."""
+        """End the thread; a pending request is still made."""
         if not self._wake.is_set():
             self._over = True
             self._wake.set()
@@ -226,7 +226,7 @@ _current: ContextVar[Shutdown] = ContextVar("shutdown", default=_process)
 
 
 def current_shutdown() -> Shutdown:
-    """Return the shutdown in force here: that of `use_shutdown`, else the process's."""
+    """Return the current shutdown: that of `use_shutdown`, or else the process's."""
     return _current.get()
 
 
@@ -241,7 +241,7 @@ def use_shutdown(shutdown: Shutdown) -> Iterator[Shutdown]:
 
 
 def requested() -> bool:
-    """Tell whether the program is to end."""
+    """Return whether shutdown was requested."""
     return current_shutdown().requested()
 
 
@@ -251,7 +251,7 @@ def event(clock: Clock | None = None) -> Event:
 
 
 def request(reason: str = "requested") -> bool:
-    """Ask the program to end; see `Shutdown.request`."""
+    """Request the shutdown; see `Shutdown.request`."""
     return current_shutdown().request(reason)
 
 

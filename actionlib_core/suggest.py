@@ -1,4 +1,4 @@
-"""The hint of an error text that names what may have been meant."""
+"""The "Did you mean ...?" of error texts."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ if TYPE_CHECKING:
 
 
 def did_you_mean(word: object, known: Iterable[object], most: int = 1) -> str:
-    """Return " Did you mean 'x' or 'y'?" for the nearest of `known`, "" when nothing is near.
+    """Return " Did you mean 'x' or 'y'?" with the most similar of `known`; "" if none is similar.
 
     Args:
-        word: What was given.
-        known: What could have been.
-        most: How many of them are shown.
+        word: The unknown word.
+        known: The known words.
+        most: Largest number of suggestions.
     """
     shown = nearest(word, known, most)
     return f" Did you mean {' or '.join(map(repr, shown))}?" if shown else ""
 
 
 def nearest(word: object, known: Iterable[object], most: int = 1) -> list[str]:
-    """Return those of `known` that are most like `word`, at most `most`, the nearest first."""
-    import difflib  # errors are rare, imports are not
+    """Return the words of `known` that are most similar to `word`, at most `most` of them."""
+    import difflib  # here, as only errors need it
 
     names, text = [str(name) for name in known], str(word)
     near = [name for name in names if name.lower() == text.lower()]

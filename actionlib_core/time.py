@@ -1,7 +1,8 @@
-"""ROS time: `Time` is a point in time, `Duration` a span, both whole nanoseconds.
+"""ROS time: `Time` is a point in time, `Duration` a span, both in whole nanoseconds.
 
-They behave as `rospy.Time` and `rospy.Duration` do, and also mix with plain numbers, which are
-seconds: ``Time.now() + 0.5``, ``Duration(2) < 2.5``, ``float(Duration(1, 500_000_000)) == 1.5``.
+They behave like `rospy.Time` and `rospy.Duration`, and can also be combined with plain numbers,
+which are seconds: ``Time.now() + 0.5``, ``Duration(2) < 2.5``,
+``float(Duration(1, 500_000_000)) == 1.5``.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ _INT32 = 0x7FFF_FFFF
 
 
 class TimeValue:
-    """What `Time` and `Duration` share: whole seconds and the nanoseconds past them.
+    """Base class of `Time` and `Duration`: whole seconds and the nanoseconds past them.
 
     Args:
-        secs: Seconds. A float carries its own fraction and excludes `nsecs`.
-        nsecs: Nanoseconds; any size, carried over into `secs` so that 0 <= nsecs < 1e9.
+        secs: Seconds. A float has its own fraction and excludes `nsecs`.
+        nsecs: Nanoseconds of any size; they are carried over to `secs` so that 0 <= nsecs < 1e9.
 
     Attributes:
         secs: Whole seconds, rounded towards minus infinity.
@@ -76,7 +77,7 @@ class TimeValue:
         return cls(0, nanoseconds)
 
     def to_sec(self) -> float:
-        """Return float seconds (a double holds about 0.2 us of today's date)."""
+        """Return float seconds (for present dates, a double is accurate to about 0.2 us)."""
         return self.secs + self.nsecs / 1e9
 
     def to_nsec(self) -> int:
@@ -84,7 +85,7 @@ class TimeValue:
         return self.secs * _NS + self.nsecs
 
     def is_zero(self) -> bool:
-        """Tell whether this is 0 s."""
+        """Return whether this is 0 s."""
         return not self
 
     def __float__(self) -> float:
@@ -215,7 +216,7 @@ class Time(TimeValue):
 
     @classmethod
     def now(cls) -> Self:
-        """Return the time of the clock in force (`actionlib_core.clock.current_clock`)."""
+        """Return the time of the current clock (`actionlib_core.clock.current_clock`)."""
         return cls(0, current_clock().time_ns())
 
     def to_time(self) -> float:
@@ -252,7 +253,7 @@ def to_seconds(duration: _Seconds | None) -> float | None:
     """Return the float seconds of a duration given as a number or a `Duration`.
 
     Args:
-        duration: Seconds, a `Duration` (or anything with its `to_sec()`), or None for "none given".
+        duration: Seconds, a `Duration` or another object with `to_sec()`, or None.
 
     Raises:
         TypeError: `duration` is none of these.

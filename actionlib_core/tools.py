@@ -1,4 +1,4 @@
-"""Messages from and to YAML, the classes of an action by its name: `actionlib_tools.library`."""
+"""Messages from and to YAML, and action classes by name, as ROS 1's `actionlib_tools.library`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def to_yaml(obj: Any) -> str:
     if hasattr(obj, "to_yaml"):
         text: str = obj.to_yaml()
         return text
-    import io  # as ruamel.yaml: only for those who need it
+    import io  # here, as few programs need this and ruamel.yaml
 
     from ruamel.yaml import YAML
 
@@ -35,15 +35,15 @@ def to_yaml(obj: Any) -> str:
 
 
 def yaml_msg_str(type_: type[M], yaml_str: str, filename: str | None = None) -> M:
-    """Read one message from a YAML mapping; fields that are left out keep their default values.
+    """Read one message from a YAML mapping; missing fields have their default values.
 
     Args:
         type_: The message class.
-        yaml_str: The text; an empty one is a message with default values.
-        filename: Where the text is from, for errors.
+        yaml_str: The text; "" is a message with default values.
+        filename: The text's origin, for errors.
 
     Raises:
-        FieldError: it is no YAML, or no mapping, or a field of it does not fit.
+        FieldError: it is not YAML, not a mapping, or a field of it does not fit.
     """
     with _From(filename):
         return type_.from_yaml(yaml_str)
@@ -79,7 +79,7 @@ def _mapping(entry: object) -> dict[str, Any]:
 
 
 class _From:
-    """Puts a file's name in front of the errors that come from its text."""
+    """Adds a file's name to the errors of its text."""
 
     def __init__(self, filename: str | None) -> None:
         self._filename = filename
@@ -93,7 +93,7 @@ class _From:
 
 
 class DynamicAction:
-    """The classes of an action that is known by name only.
+    """The classes of an action, found by its name.
 
     Args:
         name: "pkg/XAction" or "pkg/X".

@@ -1,4 +1,4 @@
-"""YAML from people's files and command lines: read as plain data, or refused with one reason."""
+"""YAML from files and command lines: parsed to plain data, or refused with a reason."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import re
 from typing import Final, Literal
 
 MOST_PARTS: Final = 100_000
-"""A text with aliases stands for at most so many values: a few lines can stand for billions."""
+"""Most values in a text with aliases, of which a few lines can produce billions."""
 
 
 DEEPEST: Final = 200
-"""Levels of brackets in each other; with more the parser takes seconds and runs out of stack."""
+"""Most levels of brackets; with more, the parser takes seconds and runs out of stack."""
 
 
 class YamlTextError(ValueError):
-    """A text is no YAML, or cannot be read.
+    """A text is not YAML, or is refused.
 
     Attributes:
-        line: Where, from 1; 0 when nobody knows.
-        reason: Why, on one line.
+        line: Number of the line, from 1; 0: unknown.
+        reason: The reason, on one line.
     """
 
     def __init__(self, reason: str, line: int = 0) -> None:
@@ -28,15 +28,15 @@ class YamlTextError(ValueError):
 
 
 def load_yaml(text: str, kind: Literal["safe", "rt"] = "safe") -> object:
-    """Return what a YAML text says.
+    """Return the data in a YAML text.
 
     Args:
         text: One document.
-        kind: "safe" gives plain data; "rt" gives ruamel.yaml's own, whose parts know their lines.
+        kind: "safe": plain data; "rt": ruamel.yaml's containers, which know their lines.
 
     Raises:
-        YamlTextError: it is no YAML, one of its values is none of its kind (`!!int x`), it is
-            nested too deeply, or stands for too much.
+        YamlTextError: it is not YAML, a value does not fit its tag (`!!int x`), or it is nested too
+            deeply or has too many values.
     """
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError
@@ -54,7 +54,7 @@ def load_yaml(text: str, kind: Literal["safe", "rt"] = "safe") -> object:
         raise YamlTextError(str(error.problem or error.context), line) from error
     except RecursionError as error:
         raise YamlTextError("it is nested too deeply") from error
-    except Exception as error:  # a tag whose value is none lets any exception out
+    except Exception as error:  # ruamel.yaml: any exception, for a value that does not fit its tag
         raise YamlTextError(str(error) or type(error).__name__) from error
     return data
 
