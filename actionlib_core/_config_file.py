@@ -35,6 +35,7 @@ def read_config_file(path: Path) -> Config:
         where = f"line {error.line}: " if error.line else ""
         raise ConfigError(str(path), f"{where}not YAML: {error.reason}.") from error
     reader = _Reader(path.parent)
+    # Before the record is read, whose class has no field `wire`.
     names = reader.take_wire(data) if isinstance(data, MutableMapping) else ()
     config = Config() if data is None else reader.read_record(Config, data, "")
     if isinstance(config, Config) and names:

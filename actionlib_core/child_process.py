@@ -153,7 +153,7 @@ class ChildProcess:
             for line in stderr:
                 self._said.append(line)
         self._process.wait()
-        listened(LAST_GRACE_S)
+        listened(LAST_GRACE_S)  # so that its last lines are reported before its end
         self._ended.set()
         self._changed.set()
         self.on_end()

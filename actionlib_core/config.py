@@ -258,6 +258,7 @@ class Config:
         return replace(
             self,
             mode=network.mode,
+            # This session gets no endpoints, discovery or names of our own network.
             connect=(network.router,),
             listen=(),
             discovery="off",
@@ -384,6 +385,7 @@ def _check_access(config: Config) -> str:
 
 
 def _check_ros2(config: Config) -> str:
+    # With several networks, a name must be on one of them at most.
     alike = [network for network in config.ros2 if not (network.robot or network.names)]
     if len(config.ros2) > 1 and len(alike) > 1:
         return (

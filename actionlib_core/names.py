@@ -44,6 +44,7 @@ def check_name(name: str, kind: str = "name") -> str:
 def _find_problem(name: str) -> tuple[str, int] | None:
     if not name:
         return "it is empty", 0
+    # All problems are found, and that of the first position is reported.
     problems = [
         (match.start(), f"{match.group()!r} is not allowed; expected letters, digits, '_' or '/'")
         for match in [_FORBIDDEN.search(name)]

@@ -91,6 +91,7 @@ class Node:
         if transport is None and not isinstance(self.clock, RealClock):
             raise NodeError(_NO_ZENOH.format(what=f"node {self.full_name}"))
         self.owns_transport = transport is None
+        # The environment's configuration is not applied to a session of the caller's.
         if config is None:
             config = load_config() if transport is None else Config()
         self.config = config

@@ -70,6 +70,7 @@ def run_program(name: str, run: Callable[[], int], *, draws: bool = False) -> in
     if sys.stdout is None:
         tell(name, "standard output: it is closed; expected an open one. Try: > /dev/null")
         return EXIT_OUTPUT
+    # A stream that a test or the caller has put there is left alone.
     real = sys.stdout is sys.__stdout__ and isinstance(sys.stdout, io.TextIOWrapper)
     before = sys.stdout
     file = _replace_output(io.TextIOWrapper if draws else _Escaping) if real else None

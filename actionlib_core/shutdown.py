@@ -157,6 +157,7 @@ class Shutdown:
             Whether this was the first request.
         """
         with self._lock:
+            # Decided by `_delivered`: a signal handler has already set the reason (`note`).
             first = not self._delivered
             self.note(reason)
             self._delivered = True
@@ -164,6 +165,7 @@ class Shutdown:
             callbacks = list(self._callbacks.values()) if first else []
             callbacks += [(run.clock, run.stop) for run in self.runs.copy()] if first else []
             self._callbacks.clear()
+        # Without the lock, which callbacks may need.
         for event in events:
             event.set()
         for clock, callback in callbacks:

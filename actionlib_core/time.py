@@ -287,7 +287,7 @@ def _nanoseconds(value: object, kind: type[TimeValue]) -> int | None:
         return value.to_nsec()
     if isinstance(value, int):
         return value * _NS
-    if isinstance(value, float):
+    if isinstance(value, float):  # not `round(value * 1e9)`, which loses digits of large times
         seconds, rest = _split(value)
         return seconds * _NS + rest
     return None

@@ -44,6 +44,7 @@ def load_yaml(text: str, kind: Literal["safe", "rt"] = "safe") -> object:
     _check_depth(text)
     try:
         data: object = YAML(typ=kind, pure=True).load(text)
+        # Only a text with anchors and aliases can have more values than its length allows.
         if "*" in text and "&" in text:
             _check_size(data)
     except YamlTextError:

@@ -841,6 +841,7 @@ class GoalManager:
             goal, now = handle.goal, self.clock.now()
             if goal.over:
                 return
+            # The usual case, many times a second, without the rest of `hear`.
             if entry.status == goal.status and session == goal.server and goal.acknowledged:
                 goal.on_sign_of_life(now)
             else:
@@ -942,6 +943,7 @@ class GoalManager:
         handle.ended_at = now
         if self._dropped and not self._goals:
             self.let_go()
+        # Without callbacks, the goal is settled at once, without a thread.
         if handle.on_state is None and handle.on_feedback is None:
             handle.settle()
             return

@@ -141,7 +141,7 @@ class _Runner(SimpleActionServer):
         except Abort as end:
             context.accept()
             self._end("raise Abort", "abort", end.result, end.text)
-        except Exception:
+        except Exception:  # the base class aborts the goal, for which it must be accepted
             context.accept()
             raise
         else:

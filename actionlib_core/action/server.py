@@ -654,6 +654,7 @@ class GoalKeeper:
             past = None if known is not None else self.goals.past_status(goal_id)
         unkept = None
         file = self._file
+        # Before the goal is delivered: a goal that has started must not be lost by a restart.
         if file is not None and arrival in {Arrival.NEW, Arrival.RECALLED}:
             unkept = file.add(record, content)
         if arrival is Arrival.NEW:
@@ -663,6 +664,7 @@ class GoalKeeper:
                 return True
             self._deliver_goal(handle)
             return True
+        # A repetition, or a goal that was recalled: send what its client has missed.
         if known is None:
             self.port.send_status([_past_entry(goal_id, past or Status.LOST)])
         elif isinstance(known.result, bytes):
@@ -856,6 +858,7 @@ class ActionServer:
             if self._started:
                 return
             self._started = True
+        # Without the lock, as opening waits for the network.
         self._forget = self.node.on_close(self.stop)  # raises when the node is closed
         try:
             self.initialize()

@@ -200,7 +200,7 @@ class SimpleActionServer:
             waiting = self._policy.on_stop()
             if self._idle:
                 self._come.set()
-        self._preempted.set()
+        self._preempted.set()  # also wakes code that waits for a preempt without a running goal
         for handle in waiting:
             self._keeper.give_up(handle, TEXT_STOPPED)
 
@@ -412,6 +412,7 @@ class SimpleActionServer:
                 self._come.set()
             elif decision.announce and self.execute_callback is not None and self._task is None:
                 self._task = self._start()
+        # Without the lock, as this sends results. The usual decision needs nothing more.
         if decision is not ANNOUNCE or self.goal_callback is not None:
             self._carry_out(decision, TEXT_NEWER)
 
@@ -493,6 +494,7 @@ class SimpleActionServer:
         handle = self._take_next()
         if handle is None:
             return
+        # As in ROS: accepted before the call. (`@server` accepts later.)
         if self._accepts:
             self._keeper.step(handle, "accept", "set_accepted()", text=TEXT_ACCEPTED)
         text = TEXT_NO_STATUS

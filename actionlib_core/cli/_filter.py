@@ -206,6 +206,7 @@ class Filter:
         raise self._error(node, f"{name!r} is not there; there are {there}.")
 
     def _arithmetic(self, node: ast.BinOp, left: Any, right: Any) -> Any:
+        # Not all that Python allows: "text" * 10**9, for example, is refused.
         numbers = isinstance(left, int | float) and isinstance(right, int | float)
         if not numbers and not (isinstance(node.op, ast.Add) and type(left) is type(right)):
             raise self._error(node, f"got {left!r:.40} and {right!r:.40}; expected two numbers.")

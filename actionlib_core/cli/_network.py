@@ -113,6 +113,7 @@ def find_by_name(
     found = there()
     if found:
         return found
+    # Not found at once: a program that has just joined may not have discovered all others.
     watch = node.transport.watch_alive(token_pattern(None, full), on_presence)
     try:
         with watching(node, on_end):
@@ -303,6 +304,7 @@ def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = 
         on_done=done.set,
     )
     done.wait(ASK_S + 1.0)
+    # An answer of one server counts more than the error of another.
     for reply in sorted(replies, key=lambda reply: reply.error):
         if reply.error:
             raise UsageError(reply.payload.decode(errors="replace"))

@@ -255,6 +255,7 @@ def _ros2_status(node: Node, server: Endpoint, goal_id: str) -> tuple[StatusEntr
     action, uuid = RemoteAction(node, server), goal_uuid(goal_id)
     known = {state.uuid: state for state in action.states()}
     state = known.get(uuid)
+    # A goal that the server no longer lists may still have its result.
     if state is not None and _entry(state).status not in TERMINAL:
         # Not asking for the result: the server would answer only when the goal has ended.
         return _entry(state)._replace(id=goal_id), None

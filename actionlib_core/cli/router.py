@@ -42,6 +42,7 @@ def _run(args: argparse.Namespace) -> int:
     from actionlib_core.transport.zenoh import ZenohTransport
 
     config = _config(args)
+    # Before the session is opened, so that a Ctrl-C at any time closes it properly.
     with shutdown.handle_signals():
         transport = ZenohTransport(config)
         try:

@@ -120,6 +120,7 @@ def _drive(
             handle.wait(CANCEL_S)
             raise
         _print_end(handle, args)
+    # On standard error, as standard output may be read by a program.
     if timed_out:
         print(f"actionlib: send_goal: not over within {args.timeout:g} s", file=sys.stderr)
     if interrupted is not None:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
                 operator.obey(line)
         finally:
             server.stop()
-        server.wait(0.0)
+        server.wait(0.0)  # raises the error if the server has stopped by itself
     return 0
 
 

@@ -135,6 +135,7 @@ class ClientGoal:
             return path, Duty.NOTHING
         if not (self.offered or self.attached):
             return path + self.on_result(Status.RECALLED, TEXT_NEVER_SENT, None, now), Duty.NOTHING
+        # Until the server answers, `tick` repeats the cancel.
         self._cancelled = True
         self._pause = RESEND_FIRST_S
         self._due = now + self._pause
@@ -374,6 +375,7 @@ class KnownServers:
         self._choose()
         if error is not None:
             return Appearance(returned=False, replaced=[])
+        # Only one server can have the name, so the others that were away do not come back.
         returned = self.away.pop(server, None) is not None
         replaced = list(self.away)
         self.away.clear()

@@ -164,6 +164,7 @@ class ServerGoals:
             self.tracked[goal_id] = ServerGoal(
                 goal_id, 0, Status.RECALLING, arrived=False, listed_until=now + LISTED_S
             )
+        # Kept for goals that are still on the way: `on_goal` compares their stamps.
         until_ns = stamp_ns if stamp_ns <= now_ns + FUTURE_NS else now_ns
         self._last_cancel_ns = max(self._last_cancel_ns, until_ns)
         return asked
@@ -278,7 +279,7 @@ class ServerGoals:
     def expire(self, now: float) -> float | None:
         """Forget what is past its time; return when to call again [s, clock]; None: never."""
         soonest: float | None = None
-        for goal in list(self.tracked.values()):
+        for goal in list(self.tracked.values()):  # a copy, as `_expire` removes goals
             due = self._expire(goal, now)
             if due is not None and (soonest is None or due < soonest):
                 soonest = due

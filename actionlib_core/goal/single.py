@@ -126,11 +126,14 @@ class SingleGoal(Generic[G]):
             return ANNOUNCE
         # "preempt", by stamps rather than by arrival: the network may deliver goals out of order.
         newest = self.waiting[-1].stamp_ns if self.waiting else 0
+        # An old goal that comes late must not stop a newer one.
         if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
             return Decision(recall=(goal,))
         if not self.waiting and not self.running:
             self.waiting.append(_Waiting(goal, stamp_ns))
             return ANNOUNCE
+        # The new goal replaces the waiting one at once; the running one only when its code accepts
+        # the new goal, or ends.
         older = tuple(waiting.goal for waiting in self.waiting)
         self.waiting.clear()
         self.waiting.append(_Waiting(goal, stamp_ns))

@@ -78,6 +78,7 @@ class Source:
     def codec(self, kind: str, codes: str) -> str:
         """Return the name of the `pack` or `unpack_from` of a struct."""
         name = f"{kind}_{codes.replace('?', 'o')}"
+        # One `struct.Struct` per format and function, compiled when the function is made.
         if name not in self.scope:
             self.scope[name] = getattr(struct.Struct(f"{self.order}{codes}"), kind)
         return name
@@ -364,6 +365,7 @@ def _read_source(
     cursor.flush()
     end = cursor.position()
     source.add(f"if len(d) != {end}: raise Mismatch(f'it should end at byte {{{end}}}')")
+    # The object is made only after all bytes were read and their number was checked.
     for line in cursor.builds:
         source.add(line)
     source.add(f"return {result}")

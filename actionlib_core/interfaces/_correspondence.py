@@ -71,6 +71,7 @@ class _Pairs:
     def message(
         self, source: type[Message], target: type[Message], path: str, fields: dict[str, str]
     ) -> Convert:
+        # With fields of the user, which apply to one place only, nothing is reused.
         if not fields and (source, target) in self._made:
             return self._made[source, target]
         at = f"{source._type} -> {target._type}: {path}"
@@ -99,6 +100,7 @@ class _Pairs:
         mine = {field.name: field for field in whole._definition.fields}
         others = {field.name: field for field in other._definition.fields}
         found: dict[str, Field] = {}
+        # First the pairs that the user has given, ...
         for name, counterpart in fields.items():
             if name not in mine or counterpart not in {"", *others}:
                 wrong, known = (name, mine) if name not in mine else (counterpart, others)
@@ -110,11 +112,13 @@ class _Pairs:
                 found[name] = others[counterpart]
         without = {*fields, *_ONLY_ROS1.get(whole._type, ())}
         by_name = {name.lower(): field for name, field in others.items()}
+        # ... then those with the same name, ...
         for name in mine:
             if name not in without and name.lower() in by_name:
                 found[name] = by_name[name.lower()]
         taken = {field.name for field in found.values()}
         alone = [name for name in mine if name not in {*without, *found}]
+        # ... then those that are the only ones of their type on both sides.
         for name in alone:
             alike = [f for n, f in others.items() if n not in taken and _alike(mine[name], f)]
             rivals = [n for n in alone if _alike(mine[n], mine[name])]

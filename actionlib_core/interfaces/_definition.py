@@ -262,6 +262,7 @@ class _Reader:
             self._problem(at, at.column + len(words[0]), "no field name; expected `type name`")
             return
         column = code.index(words[1], at.column + len(words[0]))
+        # Only constants have "=": ROS 1 has no default values.
         if "=" in words[1]:
             self._constant(at, column, kind, words[1], comment)
         else:
@@ -317,7 +318,7 @@ class _Reader:
             return
         if not self._check_name(at, column, name, "constant"):
             return
-        # A string constant is the rest of the line, comment sign included.
+        # A string constant is the rest of the line, including any "#" (http://wiki.ros.org/msg).
         if kind.base == "string":
             raw, comment = at.text.split("=", 1)[1], ""
         else:

@@ -240,6 +240,7 @@ def make_class(
         },
     }
     namespace |= attributes
+    # Constants are class attributes, as in ROS 1.
     namespace |= {constant.attribute: constant.value for constant in definition.constants}
     namespace["__init__"] = _make_init(definition, resolve)
     cls: Any = type(definition.short_name, (base,), namespace)
@@ -253,6 +254,7 @@ def make_class(
         cls._read = staticmethod(read)
         return write, read
 
+    # These two replace themselves, on first use, by the compiled functions.
     def first_write(message: Any) -> bytes:
         return codecs()[0](message)
 

@@ -35,7 +35,7 @@ class _Section(types.ModuleType):
         self._registry = source
 
     def __getattr__(self, name: str) -> Any:
-        if name == "__all__":
+        if name == "__all__":  # for `from pkg.msg import *`
             return self._registry.names(self._kind, self._package)
         if name.startswith("_"):
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
@@ -46,7 +46,7 @@ class _Section(types.ModuleType):
                 + (did_you_mean(name, known) or f" It has {', '.join(known) or 'none'}.")
             )
         value = self._registry.attribute(self._package, self._kind, name)
-        setattr(self, name, value)
+        setattr(self, name, value)  # so that this method is not called for it again
         return value
 
     def __dir__(self) -> list[str]:

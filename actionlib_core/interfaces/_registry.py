@@ -117,6 +117,7 @@ class Registry:
         if given not in {None, kind}:
             raise InterfaceError(f"define: got {name!r}; expected {package}/{kind}/{short}")
         with self._lock:
+            # A class that was made stays, so its name cannot get another definition.
             before = self.sources.find(kind, package, short)
             if before is not None and before.text != text:
                 raise InterfaceError(
@@ -179,26 +180,30 @@ class Registry:
 
     def _make(self, package: str, short: str) -> type[Message]:
         full = f"{package}/{short}"
-        if full in self._building:
-            chain = " -> ".join([*self._building[self._building.index(full) :], full])
-            raise InterfaceError(f"{full}: the type contains itself: {chain}")
         section, found = "msg", self.sources.message_source(package, short)
         if found is None:
             section, found = "srv", self.sources.service_part(package, short)
         if found is None:
             raise UnknownTypeError(self._unknown("message", full), full)
         source, first_line = found
+        return self._build(full, source, first_line, module=f"{ROOT}.{package}.{section}")
+
+    def _build(self, full: str, source: Source, first_line: int, **options: Any) -> type[Message]:
+        """Make the class of a type from its definition; `options` are for `make_class`."""
+        if full in self._building:
+            chain = " -> ".join([*self._building[self._building.index(full) :], full])
+            raise InterfaceError(f"{full}: the type contains itself: {chain}")
         self._building.append(full)
         try:
             definition = parse(full, source.text, source=source.origin, first_line=first_line)
-            self._check_types(definition)
+            self._check_types(definition)  # makes the nested types, which the rest needs
             self._check_extent(definition)
             cls = make_class(
                 definition,
                 self.message,
-                module=f"{ROOT}.{package}.{section}",
-                _md5sum=self._md5(definition),
+                _md5sum=self._checksum(definition),
                 _full_text=self._full_text(definition),
+                **options,
             )
         finally:
             self._building.pop()
@@ -226,7 +231,7 @@ class Registry:
             raise InterfaceError(*dict.fromkeys(problems))
 
     def _check_extent(self, definition: Definition) -> None:
-        """Refuse a message that no computer could make, at the field that is most to blame."""
+        """Refuse a message that is too large, with the position of its largest field."""
         extents = {
             field: field_extent(field.type, self._extents.__getitem__)
             for field in definition.fields
@@ -241,6 +246,7 @@ class Registry:
     def _unknown(self, what: str, full: str) -> str:
         short = full.partition("/")[2]
         known = [f"{p}/{n}" for p in self.sources.packages() for n in self._names_of(what, p)]
+        # `String` in a definition: usually the built-in type is meant, or std_msgs/String.
         near = [n for n in BUILTINS if n == short.lower()] if what == "type" else []
         if near:
             near += [name for name in known if name.endswith(f"/{short}")]
@@ -279,7 +285,8 @@ class Registry:
         }
         return type(short, (ServiceType,), namespace)
 
-    def _md5(self, definition: Definition) -> str:
+    def _checksum(self, definition: Definition) -> Any:
+        """Return the class attribute `_md5sum`: a string, or an object that computes it."""
         return _md5(self._md5_text(definition))
 
     def _md5_text(self, definition: Definition) -> str:

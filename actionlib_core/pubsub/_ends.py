@@ -170,6 +170,7 @@ class NameWatch:
         changed = clock.event() if changed is None else changed
         with self._lock:
             self._waiters.append(changed)
+        # Also with a timeout: then the shutdown only lets the condition be checked once more.
         forget = current_shutdown().on_shutdown(changed.set)
         try:
             while not condition():
@@ -209,6 +210,7 @@ class NameWatch:
             else:
                 self._ends.pop(key, None)
                 self._mismatches.pop(end, None)
+        # Without the lock from here on: these call the log, threads that wait, and `on_new`.
         error = self._find_mismatch(end) if alive else None
         if error is not None:
             self.note(error, end)

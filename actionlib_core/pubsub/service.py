@@ -98,6 +98,8 @@ class Service(ServiceEnd):
         self._running = 0
         self._busy_logged = -math.inf  # when refused calls were last logged [s, clock]
         self._shown = False  # the token was declared
+        # Check for another server, then watch for later ones: both may miss a server that starts at
+        # the same time, so `_meet_servers` checks again once the token is declared.
         self._refuse_second()
         self._ends = self._watch()
         self._parts.append(self._ends)

@@ -251,7 +251,7 @@ class ServiceProxy(ServiceEnd):
             query.close()
         if replies:
             return replies[0]
-        # Only a call without a limit gets here: `MARGIN_S` lets others time out before.
+        # Only a call without a limit can end here: `MARGIN_S` lets others time out before.
         if done and self.node.clock.now() >= start + longest:
             raise ServiceTimeoutError(
                 self.resolved_name,
@@ -276,6 +276,7 @@ class ServiceProxy(ServiceEnd):
             return settled() or asked.isdisjoint(servers.ends())
 
         in_time = servers.wait(over, timeout, news)
+        # The servers are gone so soon after the call: give a new one's token until `STALE_S`.
         stale = start + STALE_S - now()
         if in_time and stale > 0:
             servers.wait(lambda: settled() or bool(servers.ends()), stale, news)

@@ -64,6 +64,7 @@ def find_permissions(rules: Iterable[AccessRule], user: str, certificate: str) -
         user: Its user name, or "".
         certificate: Common name of its certificate, or "".
     """
+    # The same selection as Zenoh's own, to which `_zenoh_config` gives the same rules.
     mine = [rule for rule in rules if _concerns(rule, user, certificate)]
     who = f"certificate {certificate!r}" if certificate else f"user {user!r}" if user else "anybody"
     return Permissions(

@@ -58,6 +58,7 @@ class RandomFaults:
         """Return the fate of the message `number` of `key`."""
         if not key_matches(self.pattern, key):
             return DELIVERED
+        # A new generator for each message, so that its fate does not depend on those of other keys.
         dice = random.Random(f"{self.seed} {key} {number}")  # noqa: S311  no secret
         if dice.random() < self.drop:
             return DROPPED

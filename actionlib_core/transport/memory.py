@@ -182,6 +182,7 @@ class MemoryTransport:
 
         Its threads, which a test cannot kill, go on in an empty network, without errors.
         """
+        # Without waiting for callbacks, as a killed process does not either.
         self.killed = True
         self._end(wait=False)
         self.network = MemoryNetwork(self.network.clock)

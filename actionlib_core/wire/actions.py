@@ -389,6 +389,7 @@ class ActionClientPort:
         except ValueError as error:
             self._report("a status", error)
             return
+        # A token as frame_id makes the list a farewell; only that server itself may send it.
         server = parse_token(frame) if frame else None
         if server is None:
             self._listener.on_statuses(entries, sample.source)
@@ -494,6 +495,7 @@ class ActionServerPort:
     def open(self, listener: ServerListener) -> None:
         self._listener = listener
         transport, keys = self._node.transport, self._keys
+        # The usual conflict is found here, before this server has sent or taken anything.
         there = list_endpoints(transport, kind=Kind.ACTION_SERVER, name=self._name)
         if there:
             raise self._conflict(there[0])

@@ -89,7 +89,7 @@ def watch_for_server(
             if presence.alive:
                 on_there()
 
-        looked_for.actions.add(name)
+        looked_for.actions.add(name)  # a bridge then looks for it on its robot
         pattern = token_pattern(Kind.ACTION_SERVER, name)
         return node.transport.watch_alive(pattern, on_presence)
     from actionlib_core.wire.ros2.mapping import action_on_ros2

@@ -257,7 +257,7 @@ class ZenohTransport:
             if self._closed:
                 return
             self._closed = True
-        self.gate.shut()
+        self.gate.shut()  # first: from now on no callback starts
         _leave(self.clock, self.session)
         self.gate.wait_idle(IDLE_S)
         # Not earlier: once the session is closed, dropping Zenoh's objects has no side effects.
