@@ -1,4 +1,4 @@
-"""Missions to run, read and copy from; README.md beside this file says in which order.
+"""Missions to run, read and copy from; README.md beside this file gives the reading order.
 
-`smachpy list` names them, `smachpy run NAME` runs one. Nothing imports this package.
+`smachpy list` lists them, `smachpy run NAME` runs one. Nothing else imports this package.
 """

@@ -1,10 +1,10 @@
-"""Lesson 2, two things at once: drive from waypoint to waypoint while the battery is watched.
+"""Lesson 2, two things at once: drive from waypoint to waypoint and watch the battery.
 
     PATROL
-      ROUND            both children at once; the first that ends preempts the other
+      ROUND            runs both children at once; the first to end preempts the other
         VISIT          NEXT -> DRIVE -> TICK_OFF -> NEXT ...
         WATCH_BATTERY  ends when the battery is low
-      RECHARGE         DRIVE_TO_DOCK -> CHARGE, then ROUND goes on with the interrupted waypoint
+      RECHARGE         DRIVE_TO_DOCK -> CHARGE; then ROUND continues at the interrupted waypoint
 
 Run it: `smachpy run patrol --start-robot`
 """
@@ -19,7 +19,7 @@ from smachpy.states import MissionError, drive_to, load_route
 
 @smachpy.state(["drive", "all_visited"], ["waypoints", "index"], ["waypoint"])
 def next_waypoint(userdata: UserData) -> str:
-    """Take the next waypoint, if there is one."""
+    """Store the next waypoint in userdata, if any is left."""
     if userdata.index >= len(userdata.waypoints):
         return "all_visited"
     userdata.waypoint = userdata.waypoints[userdata.index]
@@ -28,7 +28,7 @@ def next_waypoint(userdata: UserData) -> str:
 
 @smachpy.state(["done"], io_keys=["index"])
 def tick_off(userdata: UserData) -> str:
-    """Count a waypoint that was reached; one that was interrupted is driven to again."""
+    """Count the waypoint that was reached; an interrupted one is not counted."""
     userdata.index += 1
     return "done"
 
@@ -37,15 +37,15 @@ def patrol(waypoints: str = str(OFFICE_WAYPOINTS), rounds: int = 1) -> StateMach
     """Patrol the waypoints of a file; charge when the battery is low.
 
     Args:
-        waypoints: The YAML file that lists them.
-        rounds: How often to visit all of them.
+        waypoints: A YAML file with the list.
+        rounds: How often to visit them all.
     """
     if rounds < 1:
         raise MissionError(f"rounds: got {rounds}; expected 1 or more.")
     route = load_route(waypoints)
     sm = StateMachine(["succeeded", "aborted", "preempted"], name="PATROL")
     sm.userdata.waypoints = list(route.waypoints) * rounds
-    sm.register_start_cb(lambda userdata, _: userdata.update({"index": 0}))  # at each run
+    sm.register_start_cb(lambda userdata, _: userdata.update({"index": 0}))  # for every run
     visit = StateMachine(["all_visited", "aborted", "preempted"], ["waypoints", "index"], ["index"])
     visit.add("NEXT", next_waypoint, {"drive": "DRIVE"})
     visit.add("DRIVE", drive_to("waypoint"), {"succeeded": "TICK_OFF"})
@@ -57,7 +57,7 @@ def patrol(waypoints: str = str(OFFICE_WAYPOINTS), rounds: int = 1) -> StateMach
         input_keys=["waypoints", "index"],
         output_keys=["index"],
         outcome_map={"all_visited": {"VISIT": "all_visited"}, "battery_low": low},
-        child_termination_cb=lambda _outcomes: True,  # the first child that ends preempts the other
+        child_termination_cb=lambda _outcomes: True,  # the first child to end preempts the other
     )
     battery = MonitorState("battery", BatteryState, lambda _, m: m.percentage >= route.low_battery)
     watched.add("VISIT", visit)

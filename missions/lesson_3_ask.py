@@ -1,13 +1,13 @@
-"""Lesson 3, ask a person: when the robot cannot get there, try what usually helps, then ask.
+"""Lesson 3, recovery: if the robot finds no way, try two measures, then ask a person.
 
     GUIDED_RECOVERY
-      REMEMBER       where the robot stands now
-      DRIVE          to the goal
-      CHOOSE         the next measure: CLEAR, ROTATE, then ASK
-      CLEAR          forget obstacles that may have gone (a service), and drive again
-      ROTATE         look all around, and drive again
-      ASK            retry, home or give_up; when nobody answers: home
-      COME_BACK      to where it stood
+      REMEMBER       stores the robot's pose
+      DRIVE          drives to the goal
+      CHOOSE         picks the next measure: CLEAR, ROTATE, then ASK
+      CLEAR          clears obstacles that may be gone (a service), then DRIVE again
+      ROTATE         looks all around, then DRIVE again
+      ASK            answers: retry, home or give_up; without an answer: home
+      COME_BACK      drives to the stored pose
 
 Run it: `smachpy run guided_recovery --start-robot`, and open the door when it asks
 """
@@ -18,12 +18,12 @@ from smachpy import Sequence, ServiceState, StateMachine, UserData
 from smachpy.sim.maps import OFFICE_DOORS
 from smachpy.states import AskOperator, Pose2D, drive_back, drive_to, locate, turn
 
-MEASURES = ("clear", "rotate", "ask")  # in this order
+MEASURES = ("clear", "rotate", "ask")  # cheapest first: a person's time costs most
 
 
 @smachpy.state(MEASURES, io_keys=["tried"])
 def choose(userdata: UserData) -> str:
-    """Return the next measure; after a person was asked, all of them may help again."""
+    """Return the next measure; after a person has been asked, start again with the first."""
     measure = MEASURES[userdata.tried]
     userdata.tried = (userdata.tried + 1) % len(MEASURES)
     return measure
@@ -33,13 +33,13 @@ def choose(userdata: UserData) -> str:
 def guided_recovery(
     x: float = 17.9, y: float = 5.4, yaw: float = -1.5708, patience: float = 120.0
 ) -> StateMachine:
-    """Drive to a place; clear the costmap, look around, ask a person when there is no way.
+    """Drive to a place; if there is no way, clear the costmap, look around, ask a person.
 
     Args:
-        x: Of the goal [m], map frame.
-        y: Of the goal [m], map frame.
-        yaw: Of the goal [rad].
-        patience: How long to wait for the person [s].
+        x: The goal's x [m], map frame.
+        y: The goal's y [m], map frame.
+        yaw: The goal's heading [rad].
+        patience: How long to wait for an answer [s].
     """
     clear = ServiceState("move_base/clear_costmaps", Empty, timeout=5.0)
     rotate = Sequence(["succeeded", "aborted", "preempted"], connector_outcome="succeeded")
@@ -52,7 +52,7 @@ def guided_recovery(
     )
     answers = {"retry": "CLEAR", "home": "COME_BACK", "no_answer": "COME_BACK"}
     sm = StateMachine(["succeeded", "returned", "aborted", "preempted"], name="GUIDED_RECOVERY")
-    sm.register_start_cb(lambda userdata, _: userdata.update({"tried": 0}))  # at each run
+    sm.register_start_cb(lambda userdata, _: userdata.update({"tried": 0}))  # for every run
     with sm:
         sm.add("REMEMBER", locate("home"), {"valid": "DRIVE", "invalid": "aborted"})
         sm.add("DRIVE", drive_to(Pose2D(x, y, yaw)), {"aborted": "CHOOSE"})

@@ -1,10 +1,10 @@
-"""Lesson 4, services, retries and timeouts: have a door opened, and drive through it.
+"""Lesson 4, services, retries and timeouts: ask for a door to be opened, then drive through it.
 
     THROUGH_THE_DOOR
-      APPROACH   drive to the place before the door
-      OPEN       call the door's service, three times at most
-      WAIT       until the door says that it is open
-      ENTER      drive to the place behind it
+      APPROACH   drives to a place in front of the door
+      OPEN       calls the door's service, at most three times
+      WAIT       waits until the door reports that it is open
+      ENTER      drives to a place behind the door
 
 Run it: `smachpy run door --start-robot`
 """
@@ -21,7 +21,7 @@ BEFORE, BEHIND = Pose2D(18.0, 7.7, SOUTH), Pose2D(17.9, 5.4, SOUTH)
 
 
 def obeyed(_userdata: UserData, response: SetBoolResponse) -> str:
-    """Return the outcome of a call that was answered."""
+    """Return the outcome: an answer arrived, but the door may have refused."""
     return "succeeded" if response.success else "aborted"
 
 
@@ -30,7 +30,7 @@ def door(name: str = "lab", patience: float = 20.0) -> StateMachine:
     """Drive into the lab through its door.
 
     Args:
-        name: Of the door.
+        name: The door's name.
         patience: How long the door may take to open [s].
     """
     open_it = ServiceState(
@@ -38,8 +38,8 @@ def door(name: str = "lab", patience: float = 20.0) -> StateMachine:
         SetBool,
         SetBoolRequest(data=True),
         response_cb=obeyed,
-        timeout=5.0,  # of one attempt [s]
-        retry=(3, 2.0, ["aborted"]),  # attempts, the first pause between them [s], after these
+        timeout=5.0,  # for one attempt [s]
+        retry=(3, 2.0, ["aborted"]),  # attempts, first pause [s], outcomes that are retried
     )
     is_open = AwaitMessage(f"/doors/{name}/open", Bool, lambda msg: msg.data, timeout=patience)
     sm = StateMachine(["succeeded", "closed", "aborted", "preempted"], name="THROUGH_THE_DOOR")

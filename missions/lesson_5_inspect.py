@@ -1,9 +1,9 @@
-"""Lesson 5, an Iterator: drive to every waypoint, measure how much room there is, report it.
+"""Lesson 5, an Iterator: drive to every waypoint, measure the free space there, report it.
 
     INSPECT
-      WAYPOINTS    once for each waypoint; one out of reach is left out
+      WAYPOINTS    runs LOOK for each waypoint; skips waypoints out of reach
         LOOK       DRIVE -> SCAN
-      REPORT       all waypoints seen: succeeded; some left out: incomplete
+      REPORT       succeeded if every waypoint was measured, else incomplete
 
 Run it: `smachpy run inspect --start-robot`
 """
@@ -16,19 +16,19 @@ from smachpy.states import SIGNAL_TIMEOUT, drive_to, load_route
 
 
 def note_room(userdata: UserData, scan: LaserScan) -> bool:
-    """Keep the distance to the nearest obstacle [m], by the waypoint's name."""
+    """Store the distance to the nearest obstacle [m] under the waypoint's name."""
     userdata.room = {**userdata.room, userdata.waypoint.name: round(min(scan.ranges), 2)}
     return True
 
 
 def inspect(waypoints: str = str(OFFICE_WAYPOINTS)) -> StateMachine:
-    """Measure the room around each waypoint of a file; the userdata key `room` has the report.
+    """Measure the free space around each waypoint of a file; the userdata key `room` holds it.
 
     Args:
-        waypoints: The YAML file that lists them.
+        waypoints: A YAML file with the list.
 
     Raises:
-        InputFileError: the file is wrong; with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
     """
     places = load_route(waypoints).waypoints
     look = StateMachine(["succeeded", "aborted", "preempted"], ["waypoint", "room"], ["room"])
@@ -60,7 +60,7 @@ def inspect(waypoints: str = str(OFFICE_WAYPOINTS)) -> StateMachine:
     sm = StateMachine(
         ["succeeded", "incomplete", "preempted"], output_keys=["room"], name="INSPECT"
     )
-    sm.register_start_cb(lambda userdata, _: userdata.update({"room": {}}))  # at each run
+    sm.register_start_cb(lambda userdata, _: userdata.update({"room": {}}))  # for every run
     with sm:
         sm.add("WAYPOINTS", each, {"all_tried": "REPORT"})
         sm.add("REPORT", report)

@@ -1,10 +1,10 @@
-"""Lesson 6, a machine as an action server: others send goals, the machine does them.
+"""Lesson 6, a machine as an action server: other programs send goals, the machine runs them.
 
     LOOK_AT_SERVER      runs for each goal of the action `look_at`
-      DRIVE             to the goal's pose; a cancel preempts it
-      TURN, TURN_BACK   all the way round, to see everything
+      DRIVE             drives to the goal's pose; a cancel preempts it
+      TURN, TURN_BACK   turn by 360 degrees in total, to see everything
 
-    LOOK_AT             the mission: brings the server along and sends it one goal
+    LOOK_AT             the mission: starts the server and sends it one goal
       SEND
 
 Run it: `smachpy run look_at --start-robot`. The server alone: `smachpy run look_at.server`
@@ -20,12 +20,12 @@ ENDS = ["succeeded", "aborted", "preempted"]
 
 
 def tell_where(userdata: UserData, feedback: MoveBaseFeedback) -> None:
-    """Pass the robot's pose on to the client of `look_at`."""
+    """Forward the robot's pose to the client of `look_at`."""
     userdata.feedback = feedback
 
 
 def go_and_look() -> StateMachine:
-    """Drive to the pose in the key `place`, and look all around."""
+    """Drive to the pose in the userdata key `place` and look all around."""
     sm = StateMachine(ENDS, ["place", "feedback"], ["feedback"], name="LOOK_AT_SERVER")
     drive = drive_to("place", feedback_cb=tell_where, output_keys=["feedback"])
     with sm:
@@ -36,7 +36,7 @@ def go_and_look() -> StateMachine:
 
 
 def offer() -> ActionServerWrapper:
-    """Put the action `look_at` on the network."""
+    """Offer the action `look_at` on the network."""
     server = ActionServerWrapper(
         NAME,
         MoveBaseAction,
@@ -51,19 +51,19 @@ def offer() -> ActionServerWrapper:
 
 @smachpy.mission(serves=[NAME])
 def look_at(x: float = 11.5, y: float = 8.0) -> StateMachine:
-    """Offer the action look_at, and look at a place by it.
+    """Offer the action look_at and send it one goal.
 
     Args:
-        x: Of the place [m], map frame.
-        y: Of the place [m], map frame.
+        x: The goal's x [m], map frame.
+        y: The goal's y [m], map frame.
     """
     send = SimpleActionState(NAME, MoveBaseAction, goal_at(Pose2D(x, y, 0.0)), exec_timeout=900.0)
     sm = StateMachine(ENDS, name="LOOK_AT")
     sm.add("SEND", send)
-    serve_during(sm, offer)  # from the start of each run to its end
+    serve_during(sm, offer)  # starts the server with each run and stops it at the run's end
     return sm
 
 
 def server() -> StateMachine:
-    """Offer the action look_at until Ctrl-C."""
+    """Offer the action look_at until Ctrl-C, without a client."""
     return serving_machine("LOOK_AT_SERVER", offer)

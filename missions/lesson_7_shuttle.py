@@ -1,8 +1,8 @@
-"""Lesson 7, async states and typed userdata: drive to and fro, and add up the way.
+"""Lesson 7, async states and typed userdata: drive back and forth, and add up the distance.
 
     SHUTTLE
-      DRIVE   an `async` state: follows the feedback of its goal; a preempt cancels the goal
-      COUNT   drives again until enough trips are done
+      DRIVE   an `async` state: reads its goal's feedback; a preempt cancels the goal
+      COUNT   counts the trips, and repeats DRIVE until there are enough
 
 Run it: `smachpy run shuttle --start-robot`
 """
@@ -21,21 +21,21 @@ STOPS = (Pose2D(11.5, 8.0, 0.0), Pose2D(4.6, 8.0, 3.1416))
 
 @dataclass
 class Shuttle:
-    """The mission's userdata: each write is checked against these types.
+    """The mission's userdata; each write is checked against these types.
 
     Attributes:
-        trips: Trips that are done.
-        metres: How far the robot has driven [m].
+        trips: Number of finished trips.
+        metres: Distance driven so far [m].
     """
 
     trips: int = 0
     metres: float = 0.0
 
 
-# No server, an aborted goal and a timeout raise; here that is an outcome.
+# A missing server, an aborted goal and a timeout raise ActionlibError: here they are an outcome.
 @smachpy.state(DRIVEN, ["trips"], io_keys=["metres"], on_exception={ActionlibError: "failed"})
 async def drive(userdata: Shuttle) -> str:
-    """Drive to the next stop; leaving the `async with` early cancels the goal."""
+    """Drive to the next stop; an exit from `async with` before the goal ends cancels it."""
     client = ActionClient("move_base", MoveBaseAction)
     before = None
     async with client.send(goal_at(STOPS[userdata.trips % 2]), timeout=DRIVE_TIMEOUT) as goal:
@@ -48,10 +48,10 @@ async def drive(userdata: Shuttle) -> str:
 
 
 def shuttle(trips: int = 2) -> StateMachine:
-    """Drive to and fro between two places.
+    """Drive back and forth between two places.
 
     Args:
-        trips: How many drives.
+        trips: The number of drives.
     """
     if trips < 1:
         raise MissionError(f"trips: got {trips}; expected 1 or more.")

@@ -1,1 +1,1 @@
-"""The missions of a course: a countdown, an action, a service, and a robot by commands."""
+"""The exercises of a course: a countdown, an action, a service, and commands for a robot."""

@@ -48,11 +48,11 @@ SERVER_WAIT = 3.0  # [s] the programs `start` and `stop` wait for a server
 
 
 class CountdownServer:
-    """Counts down, one step a second.
+    """Counts down, one step per second.
 
     Args:
-        show: Called with each second.
-        node: Where it is on the network; None takes the node in force.
+        show: Called with the seconds left, once per second.
+        node: The server's node; None uses the current one.
     """
 
     def __init__(
@@ -73,6 +73,8 @@ class CountdownServer:
         self._server.stop()
 
     def _count(self, goal: CountdownGoal) -> None:
+        # Fixed due times instead of wait(1.0) in a row: the time spent on publishing does not
+        # add up, and a countdown of an hour ends on time.
         left, due = goal.seconds, self._clock.now() + 1.0
         while left > 0:
             if self._server.is_preempt_requested():
@@ -94,10 +96,10 @@ def countdown(seconds: int = 3) -> StateMachine:
     """Count down; start twice; start and stop.
 
     Args:
-        seconds: Where the first countdown begins.
+        seconds: Start value of the first countdown.
 
     Raises:
-        MissionError: nobody can count down from there.
+        MissionError: `seconds` does not fit the goal's field.
     """
     check_seconds(seconds)
     sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="COUNTDOWN")
@@ -111,12 +113,12 @@ def countdown(seconds: int = 3) -> StateMachine:
 
 
 def count_from(seconds: int, **options: Any) -> SimpleActionState:
-    """Start the countdown and wait for zero."""
+    """Return a state that starts the countdown and waits for zero."""
     return SimpleActionState(NAME, CountdownAction, CountdownGoal(seconds=seconds), **options)
 
 
 def check_seconds(seconds: int) -> None:
-    """Refuse a number that does not fit the goal's field.
+    """Check that a number fits the goal's field.
 
     Raises:
         MissionError: it is negative, or larger than a uint32.
@@ -126,7 +128,7 @@ def check_seconds(seconds: int) -> None:
 
 
 def start_twice() -> Concurrence:
-    """Start it; start it again two seconds later, which preempts the first."""
+    """Start a countdown and, two seconds later, another one, which preempts the first."""
     both = Concurrence(
         outcomes=["succeeded", "aborted", "preempted"],
         default_outcome="aborted",
@@ -141,7 +143,7 @@ def start_twice() -> Concurrence:
 
 
 def taken_over(_userdata: UserData, status: int, _result: CountdownResult) -> str | None:
-    """Name the end of a goal that somebody else's goal preempted."""
+    """Return the outcome for a goal that another client's goal preempted."""
     return "taken_over" if status == GoalStatus.PREEMPTED else None
 
 
@@ -159,7 +161,7 @@ def serve() -> int:
 
 
 def start(seconds: int) -> int:
-    """Start a countdown and show each second; Ctrl-C leaves it running."""
+    """Start a countdown and print each second; Ctrl-C ends this program, not the countdown."""
     check_seconds(seconds)
     client = connect()
     client.send_goal(
@@ -177,7 +179,7 @@ def stop() -> int:
 
 
 def connect() -> SimpleActionClient[CountdownAction]:
-    """Return a client that has found the server."""
+    """Return a client that is connected to the server."""
     client = SimpleActionClient(NAME, CountdownAction)
     if not client.wait_for_server(SERVER_WAIT):
         raise ActionlibError(
@@ -193,7 +195,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("program", choices=["server", "start", "stop"])
     parser.add_argument("seconds", type=int, nargs="?", default=10)
     try:
-        names = parse_arguments(sys.argv[1:] if argv is None else argv)  # the node takes them
+        # ROS's own arguments (`__ns:=...`, `a:=b`) first: the node reads them, argparse cannot.
+        names = parse_arguments(sys.argv[1:] if argv is None else argv)
         args = parser.parse_args(names.rest)
         if args.program == "server":
             return serve()

@@ -1,9 +1,9 @@
-"""Demo action: a server that counts to n, one step a second, made of two callbacks.
+"""Demo action: a server that counts to n, one step per second, written with two callbacks.
 
     DEMO_ACTION
       COUNT     counts to n and waits for the end
-      PREEMPT   counts to 10 and is preempted on the way
-      SEVERAL   counts to 1, 2 and 3 at once, on the server that runs any number of goals
+      PREEMPT   counts to 10 and is preempted before the end
+      SEVERAL   counts to 1, 2 and 3 at once, on a server that runs any number of goals
 
 Run all of it: `smachpy run demo_action`. As two programs:
 
@@ -38,24 +38,24 @@ if TYPE_CHECKING:
 NAME = "demo_action"
 SEVERAL = "demo_action_several"
 STEP = 1.0  # [s]
-MARGIN = 5.0  # [s] a count may take so much longer than it should
+MARGIN = 5.0  # [s] a count may take this much longer than its steps, before it is cancelled
 
 
 def count_steps(
     clock: Clock, number: int, stop: Event, show: Callable[[int], object]
 ) -> tuple[int, bool]:
-    """Count from 1 to `number`, one step a second.
+    """Count from 1 to `number`, one step per second.
 
     Args:
-        clock: Time.
-        number: Where to stop.
-        stop: Ends it early, at once.
+        clock: The clock to wait on.
+        number: The last number.
+        stop: Ends the count at once when set.
         show: Called with each number.
 
     Returns:
-        The last number, and whether it was stopped before it came to the end.
+        The last number that was shown, and whether `stop` ended the count.
 
-    Blocks: `number` seconds at most.
+    Blocks: for `number` seconds at most.
     """
     start = clock.now()
     for current in range(1, number + 1):
@@ -69,10 +69,10 @@ class DemoActionServer:
     """Counts for one client at a time: a newer goal preempts the older, as in ROS 1.
 
     Args:
-        node: Where it is on the network; None takes the node in force.
+        node: The server's node; None uses the current one.
 
-    Threads: the two callbacks run one at a time, in a thread of the server's; the count in
-        another, so that the callbacks are free to stop it.
+    Threads: the two callbacks run one at a time, in a thread of the action server; the count runs
+        in another one, so that a callback can stop it.
     """
 
     def __init__(self, *, node: Node | None = None) -> None:
@@ -89,7 +89,9 @@ class DemoActionServer:
     def on_goal(self) -> None:
         """The goal callback: accept the goal and begin to count."""
         waiting = self._server.next_goal
-        if waiting is None or self._closing:  # a still newer goal has taken its place
+        # An even newer goal may have replaced the one this callback was called for; it gets a
+        # callback of its own.
+        if waiting is None or self._closing:
             return
         trouble = _trouble(waiting.get_goal().count)
         if trouble:
@@ -98,21 +100,25 @@ class DemoActionServer:
         goal = self._server.accept_new_goal()
         self._stop.clear()
         self._last = 0
-        if self._server.is_preempt_requested():  # cancelled in the same moment
+        # A cancel that arrived before the goal was accepted calls no preempt callback: only this
+        # flag shows it.
+        if self._server.is_preempt_requested():
             self._server.set_preempted(Demo_actionResult(0), "stopped at 0")
             return
         self._counting = self._clock.spawn(lambda: self._count(goal.count), name=NAME)
 
     def on_preempt(self) -> None:
-        """The preempt callback: stop counting and say how far it got."""
+        """The preempt callback: stop counting and report the last number."""
         self._stop.set()
+        # Wait for the counting thread: `_last` is final only then, and so is the question whether
+        # the count reached its end (and its goal succeeded) just before the stop.
         if self._counting is not None:
             self._counting.join()
-        if self._server.is_active():  # it had not come to its end
+        if self._server.is_active():
             self._server.set_preempted(Demo_actionResult(self._last), f"stopped at {self._last}")
 
     def close(self) -> None:
-        """Leave the network; a count that runs is stopped."""
+        """Stop counting and leave the network."""
         self._closing = True
         self.on_preempt()
         self._server.stop()
@@ -127,10 +133,10 @@ class DemoActionServer:
 
 
 class SeveralServer:
-    """Counts for any number of goals at once: each has a handle and a thread of its own.
+    """Counts for any number of goals at once: each has its own handle and thread.
 
     Args:
-        node: Where it is on the network; None takes the node in force.
+        node: The server's node; None uses the current one.
     """
 
     def __init__(self, *, node: Node | None = None) -> None:
@@ -142,7 +148,7 @@ class SeveralServer:
         self._server.start()
 
     def on_goal(self, handle: ServerGoalHandle) -> None:
-        """Accept a goal and count for it in a thread of its own."""
+        """Accept a goal and count for it in a new thread."""
         number = handle.get_goal().count
         trouble = _trouble(number)
         if trouble:
@@ -160,8 +166,8 @@ class SeveralServer:
             stop.set()
 
     def close(self) -> None:
-        """Leave the network; all counts are stopped."""
-        for stop in tuple(self._stops.values()):
+        """Stop all counts and leave the network."""
+        for stop in tuple(self._stops.values()):  # a copy: counts that end remove themselves
             stop.set()
         self._server.stop()
 
@@ -189,8 +195,8 @@ def demo_action(count: int = 3, preempt_after: float = 2.5) -> StateMachine:
     """Count to n; be preempted; count for several goals at once.
 
     Args:
-        count: Where the first count ends.
-        preempt_after: When the second is preempted [s].
+        count: The last number of the first count.
+        preempt_after: When the second count is preempted [s].
     """
     sm = StateMachine(outcomes=["succeeded", "aborted", "preempted"], name="DEMO_ACTION")
     serve_during(sm, DemoActionServer, SeveralServer)
@@ -203,10 +209,10 @@ def demo_action(count: int = 3, preempt_after: float = 2.5) -> StateMachine:
 
 
 def count_to(count: int, preempt_after: float | None = None) -> SimpleActionState:
-    """Send one goal and wait for its end; with `preempt_after` [s], it is 'stopped' then.
+    """Send one goal and wait for its end; with `preempt_after` [s] it ends as 'stopped' then.
 
     Raises:
-        MissionError: nobody can count to that number, or preempt then.
+        MissionError: `count` or `preempt_after` is out of range.
     """
     check_count(count)
     if preempt_after is None:
@@ -225,7 +231,7 @@ def count_to(count: int, preempt_after: float | None = None) -> SimpleActionStat
 
 
 def several(counts: tuple[int, ...] = (1, 2, 3)) -> Concurrence:
-    """Send several goals at once; all of them run side by side."""
+    """Send several goals at once; the server runs them in parallel."""
     all_done = {f"TO_{count}": "succeeded" for count in counts}
     both = Concurrence(
         outcomes=["succeeded", "aborted", "preempted"],
@@ -243,7 +249,7 @@ def several(counts: tuple[int, ...] = (1, 2, 3)) -> Concurrence:
 
 
 def check_count(count: int) -> None:
-    """Refuse a number that no server would count to.
+    """Check that a number fits the goal's field.
 
     Raises:
         MissionError: it is negative, or larger than an int32.
@@ -261,11 +267,11 @@ def server() -> StateMachine:
 
 
 def client(count: int = 10, preempt_after: float = 0.0) -> StateMachine:
-    """Count to n at a server that runs.
+    """Send one goal to a running server.
 
     Args:
-        count: Where to stop.
-        preempt_after: When to preempt it [s]; 0: never.
+        count: The last number.
+        preempt_after: When to preempt the count [s]; 0: never.
     """
     sm = StateMachine(["succeeded", "aborted", "preempted"], name="DEMO_ACTION_CLIENT")
     stop = {"stopped": "succeeded"} if preempt_after else {}

@@ -1,10 +1,10 @@
 """Demo service: a custom message and a custom service, both at 10 Hz.
 
     DEMO_SERVICE
-      TALK_AND_LISTEN  both at once, until enough was heard
-        TALK           publishes a greeting and a number, ten times a second
-        LISTEN         hears them, and that none is missing
-      CALL             ASK -> REST -> ASK: asks the service, ten times a second
+      TALK_AND_LISTEN  runs both at once, until enough messages have arrived
+        TALK           publishes a greeting and a number, ten times per second
+        LISTEN         receives them and checks that none is missing
+      CALL             ASK -> REST -> ASK: calls the service, ten times per second
 
 Run all of it: `smachpy run demo_service`. As two programs:
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 NAME = "demo_service"
 TOPIC = "demo_msg"
 RATE = 10.0  # [Hz]
-TIMEOUT = 5.0  # [s] without a message or an answer
+TIMEOUT = 5.0  # [s] without a message or an answer the exercise fails
 
 
 def answer(request: DemoSrvRequest) -> DemoSrvResponse:
@@ -38,11 +38,11 @@ def answer(request: DemoSrvRequest) -> DemoSrvResponse:
 
 
 def demo_service(calls: int = 10, rate: float = RATE) -> StateMachine:
-    """Talk, listen and call a service, each ten times a second.
+    """Talk, listen and call a service, each ten times per second.
 
     Args:
-        calls: How many messages, and then how many calls.
-        rate: How many a second [Hz].
+        calls: The number of messages, and then of calls.
+        rate: Messages and calls per second [Hz].
     """
     check_numbers(calls, rate)
     sm = StateMachine(
@@ -56,7 +56,7 @@ def demo_service(calls: int = 10, rate: float = RATE) -> StateMachine:
 
 
 def server_maker() -> Callable[[], Service]:
-    """Return what makes the server, on the node in force then."""
+    """Return a function that makes the server, on the node that is current when it is called."""
     return lambda: Service(NAME, DemoSrv, answer)
 
 
@@ -64,7 +64,7 @@ def server_maker() -> Callable[[], Service]:
 
 
 def talk_and_listen(count: int, rate: float) -> Concurrence:
-    """Publish until the listener has heard `count` messages in a row."""
+    """Publish until the listener has received `count` messages without a gap."""
     both = Concurrence(
         outcomes=["heard", "aborted", "preempted"],
         default_outcome="aborted",
@@ -96,7 +96,7 @@ class Talk(State):
         self._pace = 1.0 / rate
 
     def execute(self, userdata: UserData) -> str:
-        """Publish; the n-th message is due n periods after the first, so no delay adds up."""
+        """Publish; message n is due n periods after the first one, so delays do not add up."""
         del userdata
         clock = self.clock()
         with Publisher(TOPIC, DemoMsg) as publisher:
@@ -108,7 +108,7 @@ class Talk(State):
 
 
 def in_a_row(userdata: UserData, message: DemoMsg) -> bool:
-    """Return whether this message follows the one before without a gap."""
+    """Return whether this message follows the previous one without a gap."""
     expected = userdata.next_number
     userdata.next_number = message.number + 1
     return expected in {None, message.number}
@@ -138,13 +138,13 @@ def calling(calls: int, rate: float) -> StateMachine:
 
 
 def note_answer(userdata: UserData, response: DemoSrvResponse) -> None:
-    """Count an answer and keep it."""
+    """Count the answer and store its text."""
     userdata.heard = response.out
     userdata.number += 1
 
 
 class Rest(State):
-    """Waits until the next call is due; one that is late is followed by the next at once."""
+    """Waits until the next call is due; after a late call the next one follows at once."""
 
     def __init__(self, calls: int, rate: float) -> None:
         super().__init__(["due", "enough", "preempted"], ["number", "due"], ["number", "due"])
@@ -152,24 +152,26 @@ class Rest(State):
         self._pace = 1.0 / rate
 
     def execute(self, userdata: UserData) -> str:
-        """Wait until then; after the last call not at all."""
+        """Wait until the next call is due; do not wait after the last call."""
         now = self.clock().now()
         due = now if userdata.due is None else userdata.due
-        userdata.due = max(due + self._pace, now)  # time that was lost is not hurried after
+        # Not before `now`: after a long delay the missed calls are dropped, not sent in a burst.
+        userdata.due = max(due + self._pace, now)
         if userdata.number >= self._calls:
             return "enough"
         return "preempted" if self.sleep(userdata.due - now) else "due"
 
 
 def check_numbers(calls: int, rate: float) -> None:
-    """Refuse what cannot be done.
+    """Check the arguments.
 
     Raises:
-        MissionError: with what was expected.
+        MissionError: one is out of range.
     """
     if calls < 1:
         raise MissionError(f"calls: got {calls}; expected 1 or more.")
-    if not 0.0 < rate <= 1000.0:  # noqa: PLR2004  faster than that, it is no longer a rate
+    # Above 1 kHz the operating system's timers, not the period, decide when a thread wakes up.
+    if not 0.0 < rate <= 1000.0:  # noqa: PLR2004
         raise MissionError(f"rate: got {rate:g}; expected more than 0, at most 1000 [Hz].")
 
 
@@ -182,11 +184,11 @@ def server() -> StateMachine:
 
 
 def client(calls: int = 10, rate: float = RATE) -> StateMachine:
-    """Call a service that runs, ten times a second.
+    """Call a running service, ten times per second.
 
     Args:
-        calls: How often.
-        rate: How many a second [Hz].
+        calls: The number of calls.
+        rate: Calls per second [Hz].
     """
     check_numbers(calls, rate)
     sm = StateMachine(

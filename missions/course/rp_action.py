@@ -2,13 +2,13 @@
 
     RP_ACTION
       GO           drives to a place
-      TURN_LEFT    turns by 90 degrees from where it looks then
-      FACE_EAST    turns to the heading 0, the shortest way
-      GO_AND_STOP  both at once: what somebody else stops ends as 'stopped'
+      TURN_LEFT    turns by 90 degrees, relative to the current heading
+      FACE_EAST    turns to the heading 0, the shorter way
+      GO_AND_STOP  runs both at once; the drive that is cancelled ends as 'stopped'
         GO_FAR     drives away
         STOP       WAIT -> CANCEL -> STAND
 
-Run all of it: `smachpy run rp_action --start-robot`. As commands, for a robot that runs:
+Run all of it: `smachpy run rp_action --start-robot`. As commands, for a running robot:
 
     smachpy run rp_action.gotopose -- robot_0 10 2 0
     smachpy run rp_action.stopmove -- robot_0
@@ -52,10 +52,10 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseResult
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
-SERVER_WAIT = 3.0  # [s] for a robot's action server
-BRAKING = 5.0  # [s] a robot that was stopped stands still within this time
-TURN_TIMEOUT = 120.0  # [s]
-STANDING = 0.01  # [m/s, rad/s] slower than this is standing
+SERVER_WAIT = 3.0  # [s] to find a robot's action server
+BRAKING = 5.0  # [s] after a stop, the robot stands still within this time
+TURN_TIMEOUT = 120.0  # [s] two full turns at 6 deg/s
+STANDING = 0.01  # [m/s, rad/s] below this the robot counts as standing: odometry has noise
 
 
 @smachpy.mission(serves=["turn"])
@@ -66,7 +66,7 @@ def rp_action(seconds: float = 2.0) -> StateMachine:
         seconds: When the last drive is stopped [s].
 
     Raises:
-        MissionError: that is no time.
+        MissionError: `seconds` is not a positive, finite duration.
     """
     if not 0.0 < seconds < math.inf:
         raise MissionError(f"seconds: got {seconds:g}; expected more than 0.")
@@ -87,14 +87,14 @@ def gotopose(robot: str, x: float, y: float, theta: float = 0.0) -> StateMachine
     """Drive a robot to a pose on the map.
 
     Args:
-        robot: Its name, which is in front of its actions and topics.
-        x: Of the goal [m].
-        y: Of the goal [m].
-        theta: Heading there [deg], anticlockwise from the x axis.
+        robot: Its name, which is the prefix of its actions and topics.
+        x: The goal's x [m].
+        y: The goal's y [m].
+        theta: The goal's heading [deg], anticlockwise from the x axis.
 
     Raises:
-        MissionError: a coordinate is no finite number.
-        InvalidNameError: the robot cannot be called that.
+        MissionError: a coordinate is not finite.
+        InvalidNameError: `robot` is not a valid name.
     """
     sm = StateMachine(OUTCOMES, name="GOTOPOSE")
     with sm:
@@ -103,13 +103,13 @@ def gotopose(robot: str, x: float, y: float, theta: float = 0.0) -> StateMachine
 
 
 def stopmove(robot: str) -> StateMachine:
-    """Stop a robot: cancel all that drives or turns it.
+    """Stop a robot: cancel all goals that drive or turn it.
 
     Args:
         robot: Its name.
 
     Raises:
-        InvalidNameError: the robot cannot be called that.
+        InvalidNameError: `robot` is not a valid name.
     """
     return stop(robot_prefix(robot), "STOPMOVE")
 
@@ -122,18 +122,18 @@ def turn(
     client: str = "",
     server: str = "",
 ) -> StateMachine:
-    """Turn a robot (-client NAME), or offer it (-server NAME).
+    """Turn a robot (-client NAME), or offer the action (-server NAME).
 
     Args:
-        angle: How far, or to which heading [deg], anticlockwise.
-        reference: REL: by this angle, from here; ABS: to this heading, the shortest way.
-        max_ang_vel: How fast at most [deg/s]; 0: as fast as the server allows.
+        angle: The angle or heading [deg], anticlockwise.
+        reference: REL: turn by this angle; ABS: turn to this heading, the shorter way.
+        max_ang_vel: The largest turn rate [deg/s]; 0: the server's own limit.
         client: The robot to turn.
-        server: The robot to offer it for, until Ctrl-C.
+        server: The robot to offer the action for, until Ctrl-C.
 
     Raises:
-        MissionError: neither or both are given, or the turn makes no sense.
-        InvalidNameError: the robot cannot be called that.
+        MissionError: neither or both robots are given, or the turn is out of range.
+        InvalidNameError: a robot's name is not valid.
     """
     if bool(client) == bool(server):
         given = f"-client {client} and -server {server}" if client else "neither"
@@ -152,10 +152,10 @@ def turn(
 
 
 def robot_prefix(robot: str) -> str:
-    """Return what stands in front of a robot's names.
+    """Return the prefix of a robot's actions and topics.
 
     Raises:
-        InvalidNameError: the robot cannot be called that.
+        InvalidNameError: `robot` is not a valid name.
     """
     return f"{check_name(robot, 'robot name')}/"
 
@@ -164,7 +164,7 @@ def robot_prefix(robot: str) -> str:
 
 
 def go(prefix: str, x: float, y: float, theta: float) -> SimpleActionState:
-    """Drive to a place [m] and a heading [deg]; 'stopped' outcomes are up to the caller."""
+    """Drive to a place [m] and a heading [deg]."""
     return drive_to(Pose2D(*checked_pose(x, y, theta)), action=f"{prefix}move_base")
 
 
@@ -172,7 +172,7 @@ def checked_pose(x: float, y: float, theta: float) -> tuple[float, float, float]
     """Return a pose with its heading in radians.
 
     Raises:
-        MissionError: a value is no finite number.
+        MissionError: a value is not finite.
     """
     for name, value in (("x", x), ("y", y), ("theta", theta)):
         if not math.isfinite(value):
@@ -186,7 +186,7 @@ def turn_by(
     """Turn by or to an angle [deg].
 
     Raises:
-        MissionError: no server would do that.
+        MissionError: the server would reject this goal.
     """
     goal = TurnGoal(angle, reference, max_ang_vel)
     trouble = goal_trouble(goal)
@@ -196,7 +196,7 @@ def turn_by(
 
 
 def stop(prefix: str, name: str | None = None) -> StateMachine:
-    """Cancel all goals of a robot, then wait until it stands."""
+    """Cancel all goals of a robot, then wait until it stands still."""
     sm = StateMachine(OUTCOMES, name=name)
     with sm:
         sm.add("CANCEL", CancelAll(prefix), {"asked": "STAND"})
@@ -206,15 +206,15 @@ def stop(prefix: str, name: str | None = None) -> StateMachine:
 
 
 def stands(odometry: Odometry) -> bool:
-    """Return whether a robot neither drives nor turns."""
+    """Return whether the robot neither drives nor turns."""
     twist = odometry.twist.twist
     return math.hypot(twist.linear.x, twist.linear.y) < STANDING > abs(twist.angular.z)
 
 
 class CancelAll(State):
-    """Asks the servers of a robot to end all goals, whoever sent them.
+    """Cancels all goals of a robot's servers, whichever client sent them.
 
-    A robot without a turn server is asked for its drives only.
+    A robot without a turn server has only its drives cancelled.
     """
 
     def __init__(self, prefix: str) -> None:
@@ -222,9 +222,9 @@ class CancelAll(State):
         self._prefix = prefix
 
     def execute(self, userdata: UserData) -> str:
-        """Ask them.
+        """Send both cancels.
 
-        Blocks: `SERVER_WAIT` at most.
+        Blocks: for `SERVER_WAIT` seconds at most.
         """
         del userdata
         drive = SimpleActionClient(f"{self._prefix}move_base", MoveBaseAction)
@@ -245,7 +245,7 @@ class CancelAll(State):
 
 
 def go_and_stop(seconds: float) -> Concurrence:
-    """Drive far, and let somebody else stop that after some seconds."""
+    """Drive far away, and stop the drive from a second branch after some seconds."""
     both = Concurrence(
         outcomes=OUTCOMES,
         default_outcome="aborted",
@@ -261,5 +261,5 @@ def go_and_stop(seconds: float) -> Concurrence:
 
 
 def name_the_stop(_userdata: UserData, status: int, _result: MoveBaseResult) -> str | None:
-    """Name the end of a goal that somebody else cancelled."""
+    """Return the outcome for a goal that another client cancelled."""
     return "stopped" if status == GoalStatus.PREEMPTED else None

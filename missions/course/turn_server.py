@@ -1,4 +1,4 @@
-"""The action `turn`: turn a robot on the spot through its topics `odom` and `cmd_vel`."""
+"""The action `turn`: turns a robot on the spot through its topics `odom` and `cmd_vel`."""
 
 from __future__ import annotations
 
@@ -21,24 +21,28 @@ if TYPE_CHECKING:
     from missions.interfaces import TurnGoal
 
 REFERENCES: Final = ("ABS", "REL")
-FASTEST: Final = 60.0  # [deg/s] when a goal does not say
-_TOLERANCE: Final = math.radians(0.5)
-_GAIN: Final = 2.0  # [1/s] turn rate per angle left; odometry is up to 0.15 s late
-_CREEP: Final = math.radians(3.0)  # [rad/s] slowest turn, so that it ends
-_STILL: Final = 0.02  # [rad/s] slower than this is standing
-_REPEAT: Final = 0.2  # [s] a command is repeated, as robots forget it after a while
-_SILENCE: Final = 3.0  # [s] without odometry, or without getting on: it gives up
-_GOT_ON: Final = math.radians(0.2)  # a smaller change is none
+FASTEST: Final = 60.0  # [deg/s] limit for goals that set none
+_TOLERANCE: Final = math.radians(0.5)  # [rad] the turn ends within this of its target
+# [1/s] commanded rate per remaining angle. Odometry is up to 0.15 s late; with a much larger gain
+# the robot would still turn at speed when it passes the target.
+_GAIN: Final = 2.0
+# [rad/s] slowest command: a rate proportional to the remaining angle alone would only approach the
+# target and never reach it.
+_CREEP: Final = math.radians(3.0)
+_STILL: Final = 0.02  # [rad/s] below this the robot counts as standing
+_REPEAT: Final = 0.2  # [s] commands are repeated: a robot's base drops a velocity that gets old
+_SILENCE: Final = 3.0  # [s] without odometry or progress the turn is aborted
+_PROGRESS: Final = math.radians(0.2)  # [rad] a smaller change does not count as progress
 _LARGEST: Final = 36000.0  # [deg] a hundred turns
 
 
 def goal_trouble(goal: TurnGoal) -> str:
-    """Return what is wrong with a goal, "" when it can be done."""
+    """Return what is wrong with a goal; "" if nothing."""
     angle, flag, fastest = goal.target_angle, goal.absolute_relative_flag, goal.max_ang_vel
     if flag not in REFERENCES:
         hint = did_you_mean(flag.upper(), REFERENCES)
         return f"reference: got {flag!r}; expected 'ABS' or 'REL'.{hint}"
-    if not abs(angle) <= _LARGEST:  # also when it is no number
+    if not abs(angle) <= _LARGEST:  # written so that NaN, which compares false, is refused too
         return f"angle: got {angle:g}; expected -{_LARGEST:g} to {_LARGEST:g} [deg]."
     if not 0.0 <= fastest < math.inf:
         return f"max_ang_vel: got {fastest:g}; expected 0 or more [deg/s]."
@@ -49,10 +53,10 @@ class TurnServer:
     """Offers `turn` for one robot.
 
     Args:
-        prefix: What stands in front of the robot's names, "robot_0/" for example.
-        node: Where it is on the network; None takes the node in force.
+        prefix: The prefix of the robot's names, for example "robot_0/".
+        node: The server's node; None uses the current one.
 
-    Threads: a goal runs in a thread of the action server's, odometry comes in another.
+    Threads: a goal runs in a thread of the action server; odometry arrives in another one.
     """
 
     def __init__(self, prefix: str = "", *, node: Node | None = None) -> None:
@@ -60,8 +64,10 @@ class TurnServer:
         self._clock = node.clock
         self._lock = threading.Lock()
         self._news = self._clock.event("odometry")
-        self._yaw: float | None = None  # [rad], as the last message has it
-        self._total = 0.0  # [rad] turned since this server began
+        self._yaw: float | None = None  # [rad] heading in the last message
+        # [rad] turned since this server started. It is the sum of wrapped differences, so goals of
+        # more than one revolution can be measured, which a heading alone cannot.
+        self._total = 0.0
         self._rate = 0.0  # [rad/s]
         self._velocity = Publisher(f"{prefix}cmd_vel", Twist, node=node)
         self._odometry = Subscriber(f"{prefix}odom", Odometry, self._on_odometry, node=node)
@@ -71,12 +77,12 @@ class TurnServer:
         self._server.register_preempt_callback(self._news.set)
         try:
             self._server.start()
-        except BaseException:
+        except BaseException:  # a second server of this name, for example: leave no subscriber
             self.close()
             raise
 
     def close(self) -> None:
-        """Leave the network; a turn is stopped."""
+        """Stop turning and leave the network."""
         self._server.stop()
         self._odometry.unregister()
         self._velocity.unregister()
@@ -115,20 +121,21 @@ class TurnServer:
             self._server.set_preempted(self._result(text, start), text)
 
     def _turn(self, goal: TurnGoal, start: float) -> bool:
-        """Turn until the goal's angle is reached; False when it is to stop before.
+        """Turn until the goal's angle is reached; return False after a preempt.
 
         Raises:
-            NavigationError: the robot is not heard, or does not turn.
+            NavigationError: there is no odometry, or the robot does not turn.
         """
         aim = start + self._way(goal)
         fastest = math.radians(goal.max_ang_vel or FASTEST)
-        got_on, best = self._clock.now(), math.inf
+        # When the remaining angle last shrank to a new minimum: without that the robot is stuck.
+        progressed, best = self._clock.now(), math.inf
         while abs(left := aim - self._total) > _TOLERANCE:
             if self._server.is_preempt_requested():
                 return False
-            if abs(left) < best - _GOT_ON:
-                got_on, best = self._clock.now(), abs(left)
-            if self._clock.now() - got_on > _SILENCE:
+            if abs(left) < best - _PROGRESS:
+                progressed, best = self._clock.now(), abs(left)
+            if self._clock.now() - progressed > _SILENCE:
                 raise NavigationError(f"the robot does not turn: nothing for {_SILENCE:g} s")
             self._command(math.copysign(min(fastest, max(_CREEP, _GAIN * abs(left))), left))
             self._tell(start, left)
@@ -140,7 +147,7 @@ class TurnServer:
         """Return how far to turn [rad].
 
         Raises:
-            NavigationError: an absolute heading needs odometry, and there is none.
+            NavigationError: there is no odometry.
         """
         deadline = self._clock.now() + _SILENCE
         while self._yaw is None:
@@ -153,10 +160,10 @@ class TurnServer:
         return angle if goal.absolute_relative_flag == "REL" else wrap_angle(angle - self._yaw)
 
     def _stand(self) -> None:
-        """Stop, and wait until the robot stands.
+        """Stop, and wait until the robot stands still.
 
         Raises:
-            NavigationError: it goes on turning.
+            NavigationError: it does not stop turning.
         """
         deadline = self._clock.now() + _SILENCE
         self._command(0.0)

@@ -1,1 +1,1 @@
-"""A delivery: through a door, to a person, and back whatever happens."""
+"""A delivery: through a door, to a person, and back even if something fails."""

@@ -1,11 +1,11 @@
-"""Delivery: bring something to a place behind a door; whatever fails on the way, come back.
+"""Delivery: bring something to a place behind a door; if anything fails on the way, come back.
 
     DELIVERY
-      GO            APPROACH the door, OPEN it (the service, then wait until it is), ENTER
-      CONFIRM       may it be handed over? yes, no, or nobody answers
-      HAND_OVER     TURN the tray to the person, RELEASE what is on it
-      NOTE          it is delivered
-      COME_BACK     OPEN the door once more, DRIVE_HOME, CLOSE it; asks for HELP when it is stuck
+      GO            APPROACH the door, OPEN it (call the service, then wait until it is), ENTER
+      CONFIRM       asks a person whether to hand over: yes, no, or no answer
+      HAND_OVER     TURN the tray to the person, RELEASE the parcel
+      NOTE          records that the parcel is delivered
+      COME_BACK     OPEN the door again, DRIVE_HOME, CLOSE it; asks for HELP if the robot is stuck
       REPORT        succeeded, or brought_back
 
 Run it: `smachpy run delivery --start-robot`, and answer when it asks
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from missions.delivery.places import Place, Places
     from smachpy.states import Waypoint
 
-CALL_TIMEOUT = 5.0  # [s] for the door's service to be there and to answer
+CALL_TIMEOUT = 5.0  # [s] to find the door's service and get its answer
 OPEN_TIMEOUT = 20.0  # [s] for the door to open
-RELEASE_TIME = 3.0  # [s] the tray needs
+RELEASE_TIME = 3.0  # [s] the tray needs to release the parcel
 ENDS = ("succeeded", "aborted", "preempted")
 
 
@@ -44,18 +44,19 @@ def delivery(
 
     Args:
         to: The name of the place.
-        places: The YAML file that lists the places.
+        places: A YAML file with the places.
         patience: How long to wait for an answer [s].
 
     Raises:
-        InputFileError: the file is wrong; with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
         MissionError: there is no such place.
     """
     known = load_places(Path(places))
     place = find(known, to)
     sm = StateMachine(["succeeded", "brought_back", "aborted", "preempted"], name="DELIVERY")
-    sm.register_start_cb(lambda userdata, _: userdata.update({"delivered": False}))  # at each run
+    sm.register_start_cb(lambda userdata, _: userdata.update({"delivered": False}))  # every run
     with sm:
+        # Every failure leads to COME_BACK: the robot must not stay where it blocks a door.
         sm.add("GO", go(place), {"succeeded": "CONFIRM", "aborted": "COME_BACK"})
         sm.add(
             "CONFIRM",
@@ -82,7 +83,7 @@ def find(known: Places, name: str) -> Place:
 
 
 def go(place: Place) -> StateMachine:
-    """Drive to the place; if there is a door, wait before it until it is open."""
+    """Drive to the place; if there is a door, wait in front of it until it is open."""
     sm = StateMachine(ENDS)
     with sm:
         if place.wait is not None:
@@ -93,7 +94,10 @@ def go(place: Place) -> StateMachine:
 
 
 def open_door(door: str) -> StateMachine:
-    """Ask for a door to be opened, and wait until it is."""
+    """Ask for a door to be opened, and wait until it is.
+
+    The service's answer only says that the door has begun to open; its topic says when it is open.
+    """
     sm = StateMachine(ENDS)
     with sm:
         sm.add("CALL", set_door(door, is_open=True), {"succeeded": "WAIT"})
@@ -105,7 +109,7 @@ def open_door(door: str) -> StateMachine:
 
 
 def set_door(door: str, *, is_open: bool) -> ServiceState:
-    """Ask for a door to be opened or closed, three times at most."""
+    """Ask for a door to be opened or closed, with at most three attempts."""
     return ServiceState(
         f"/doors/{door}/set",
         SetBool,
@@ -117,12 +121,12 @@ def set_door(door: str, *, is_open: bool) -> ServiceState:
 
 
 def verdict(_userdata: UserData, response: SetBoolResponse) -> str:
-    """Name the outcome of a call: did the door do what it was told?"""
+    """Return the outcome of a call that was answered: the door may refuse."""
     return "succeeded" if response.success else "aborted"
 
 
 def hand_over() -> StateMachine:
-    """Turn the tray to the person and release what is on it."""
+    """Turn the tray to the person and release the parcel."""
     sm = StateMachine(ENDS)
     with sm:
         sm.add("TURN", turn(180.0), {"succeeded": "RELEASE"})
@@ -132,13 +136,13 @@ def hand_over() -> StateMachine:
 
 @smachpy.state(["done"], output_keys=["delivered"])
 def note(userdata: UserData) -> str:
-    """It is delivered, whatever happens now."""
+    """Record that the parcel is delivered, even if the way home fails."""
     userdata.delivered = True
     return "done"
 
 
 def come_back(place: Place, home: Waypoint, patience: float) -> StateMachine:
-    """Drive home; a door that does not answer may be open all the same."""
+    """Drive home; try to drive even if the door's service does not answer: it may be open."""
     sm = StateMachine(ENDS)
     with sm:
         if place.door:
@@ -167,5 +171,5 @@ def come_back(place: Place, home: Waypoint, patience: float) -> StateMachine:
 
 @smachpy.state(["succeeded", "brought_back"], input_keys=["delivered"])
 def report(userdata: UserData) -> str:
-    """Name the end: was it delivered?"""
+    """Return the mission's outcome: delivered or not."""
     return "succeeded" if userdata.delivered else "brought_back"

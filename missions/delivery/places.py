@@ -1,4 +1,4 @@
-"""Where deliveries go: places, with the doors that lead there."""
+"""The places that deliveries go to, with their doors."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a delivery goes.
+    """A place that a delivery can go to.
 
     Attributes:
         goal: The place itself.
-        door: The name of the door that leads there; "" when there is none.
-        wait: Where to stand until the door is open; None when there is none.
+        door: The name of the door in front of it; "" if there is none.
+        wait: Where to wait until the door is open; None if there is no door.
     """
 
     goal: Waypoint
@@ -30,11 +30,11 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where deliveries go.
+    """The contents of a places file.
 
     Attributes:
-        home: Where the robot waits for orders and comes back to.
-        places: The others, by name.
+        home: Where the robot starts and returns to.
+        places: The destinations, by name.
     """
 
     home: Waypoint
@@ -42,10 +42,10 @@ class Places:
 
 
 def load_places(path: Path) -> Places:
-    """Read the places that deliveries go to: `home`, and the list `places`.
+    """Read a places file: `home`, and the list `places`.
 
     Raises:
-        InputFileError: with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
     """
     file = PlaceFile(path)
     home = file.place(file.top.section("home"), "home")
@@ -60,7 +60,7 @@ def load_places(path: Path) -> Places:
 
 
 def _behind_door(file: PlaceFile, row: Section) -> Place:
-    """Read a place with the door that leads there."""
+    """Read a place and its door."""
     door = network_name(row, "door")
     before = row.section("wait")
     wait = file.place(before, "before the door") if "wait" in row or door else None

@@ -1,15 +1,15 @@
 """Explore: look at everything that can be reached, draw a map of it, come back.
 
     EXPLORE
-      REMEMBER      where the robot stands now
-      LOOK_AROUND   the first scan
-      SEARCH        all children at once; the first that ends calls the others off
-        LOOK        one frontier after the other: where the seen ends, until there is none
-          GO        there
-        MAP         adds every scan to what has been seen; ends when the scanner is silent
-        BATTERY     ends when it is low
-      SAVE          the map, in the form of ROS map_server
-      COME_BACK     to where the robot stood
+      REMEMBER      stores the robot's pose
+      LOOK_AROUND   takes the first scan
+      SEARCH        runs all children at once; the first to end preempts the others
+        LOOK        one frontier after the other (the edge of the seen area), until none is left
+          GO        drives there
+        MAP         adds every scan to the map; ends if the scanner sends nothing
+        BATTERY     ends when the battery is low
+      SAVE          writes the map in the format of ROS map_server
+      COME_BACK     drives to the stored pose
       REPORT        succeeded, or incomplete
 
 Run it: `smachpy run explore --start-robot`
@@ -52,9 +52,9 @@ if TYPE_CHECKING:
 
     from missions.explore.seen_map import Frontier
 
-IN_VAIN = 8  # this many places in a row out of reach: something is wrong with the robot
-POSES_KEPT = 50  # of which a scan takes the one with the nearest stamp
-LONGEST_STEP = 0.2  # [s] for which a twist is taken to hold
+IN_VAIN = 8  # after this many unreachable places in a row something is wrong with the robot
+POSES_KEPT = 50  # a scan takes the pose with the nearest stamp: scans and odometry arrive unsorted
+LONGEST_STEP = 0.2  # [s] a pose is extrapolated over at most this time
 
 
 @smachpy.mission(world=OFFICE_EXPLORER)
@@ -64,16 +64,16 @@ def explore(
     smallest: float = 1.0,
     low_battery: float = 0.2,
 ) -> StateMachine:
-    """Look at all that can be reached, save a map of it, come back.
+    """Look at everything that can be reached, save a map of it, come back.
 
     Args:
-        map_file: The map to write, with an image beside it.
+        map_file: The map to write; the image beside it has the same name.
         most: Look at this many frontiers at most; 0: at all of them.
-        smallest: Borders between seen and unseen that are shorter are not worth a look [m].
+        smallest: Ignore edges of the seen area that are shorter than this [m].
         low_battery: Come back below this charge, 0 to 1.
 
     Raises:
-        MissionError: an argument makes no sense.
+        MissionError: an argument is out of range.
     """
     path = Path(map_file)
     if path.suffix not in {".yaml", ".yml"}:
@@ -111,7 +111,7 @@ def explore(
 
 
 def look_and_map(search: Search, low_battery: float) -> Concurrence:
-    """Drive to frontiers; keep the map and watch the battery meanwhile."""
+    """Drive to frontiers while another branch maps and a third one watches the battery."""
     both = Concurrence(
         outcomes=["all_seen", "blind", "battery_low", "preempted"],
         default_outcome="blind",
@@ -144,14 +144,17 @@ def look_and_map(search: Search, low_battery: float) -> Concurrence:
 
 
 class Search:
-    """What has been seen, and where to look next.
+    """The state of the search: what has been seen, and where to look next.
+
+    An object instead of userdata, because the map is large and changes with every scan: userdata
+    would have to be written, checked and recorded each time.
 
     Args:
-        path: Of the map to write.
-        most: So many frontiers; 0: all.
-        smallest: Shorter borders are not worth a look [m].
+        path: The map file to write.
+        most: The largest number of frontiers; 0: no limit.
+        smallest: Shorter edges are ignored [m].
 
-    Threads: `add` runs in the mapper's thread, everything else in the one that drives.
+    Threads: `add` runs in the mapper's thread, everything else in the thread that drives.
     """
 
     def __init__(self, path: Path, most: int, smallest: float) -> None:
@@ -161,7 +164,8 @@ class Search:
         self.begin()
 
     def begin(self) -> None:
-        """Forget everything."""
+        """Start a new run with an empty map."""
+        # Imported here: `smachpy list` imports this module, and numpy and scipy are slow to import.
         from missions.explore.seen_map import SeenMap
 
         self.seen = SeenMap(smallest=self.smallest)
@@ -170,17 +174,17 @@ class Search:
         self.looks = 0
 
     def add(self, scan: LaserScan, pose: Pose2D) -> None:
-        """Take in a scan made at `pose`."""
+        """Add a scan made at `pose`."""
         self.seen.add(scan, pose)
         self.here = pose
 
     def first_look(self, userdata: UserData, scan: LaserScan) -> bool:
-        """Take in the first scan; false when it shows nothing at all."""
+        """Add the first scan; False if it shows no free floor at all."""
         self.add(scan, userdata.here)
         return self.seen.area() > 0.0
 
     def frontiers(self) -> Items[Frontier]:
-        """Yield the nearest frontier, as long as there is one; each after the last was tried."""
+        """Yield the best frontier until none is left; the next one after the drive has ended."""
         in_vain = 0
         while in_vain < IN_VAIN and not 0 < self.most <= self.looks:
             frontier = None if self.here is None else self.seen.best_frontier(self.here)
@@ -194,7 +198,7 @@ class Search:
         self.finished = in_vain < IN_VAIN
 
     def note(self, userdata: UserData, outcome: str) -> None:
-        """Remember whether the frontier was reached; say how much has been seen."""
+        """Store whether the frontier was reached; report how much has been seen."""
         self.reached = outcome == "succeeded"
         text = f"{self.looks + 1} looks, {self.seen.area():.0f} m² seen"
         userdata.progress = Progress(None, None, text)
@@ -212,15 +216,15 @@ class Search:
         return "saved"
 
     def report(self, _userdata: UserData) -> str:
-        """Name the end: was everything seen and saved?"""
+        """Return the outcome: was everything seen, and the map saved?"""
         return "succeeded" if self.saved and self.finished else "incomplete"
 
 
 class Mapper(State):
-    """Adds every scan to what has been seen. Outcomes: 'blind', 'preempted'.
+    """Adds every scan to the map. Outcomes: 'blind', 'preempted'.
 
     Args:
-        search: Takes the scans.
+        search: Holds the map.
     """
 
     def __init__(self, search: Search) -> None:
@@ -228,14 +232,16 @@ class Mapper(State):
         self._search = search
 
     def execute(self, userdata: UserData) -> str:
-        """Add scans until a preempt; 'blind' when none came for five seconds.
+        """Add scans until a preempt; return 'blind' if none came for five seconds.
 
-        Blocks: until then.
+        Blocks: until one of the two.
         """
         del userdata
         wake = self.clock().event("a scan")
         poses: deque[Odometry] = deque(maxlen=POSES_KEPT)
-        scans: deque[LaserScan] = deque(maxlen=1)
+        scans: deque[LaserScan] = deque(
+            maxlen=1
+        )  # mapping may be slower than the scanner: newest wins
 
         def on_scan(scan: LaserScan) -> None:
             scans.append(scan)
@@ -255,11 +261,14 @@ class Mapper(State):
 
 
 def pose_at(poses: deque[Odometry], scan: LaserScan) -> Pose2D:
-    """Return the pose at the scan's stamp: the one nearest to it, moved on as its twist says."""
+    """Return the pose at the scan's stamp: the nearest pose, extrapolated with its twist."""
     stamp = scan.header.stamp.to_sec()
+    # A copy: odometry is appended in another thread meanwhile.
     nearest = min(tuple(poses), key=lambda pose: abs(pose.header.stamp.to_sec() - stamp))
     late = min(max(stamp - nearest.header.stamp.to_sec(), -LONGEST_STEP), LONGEST_STEP)
     twist = nearest.twist.twist
+    # Half of the turn before the step and half after it: on an arc, a single turn before or after
+    # would put the end of the step beside the arc.
     turn = twist.angular.z * late / 2
     here = pose_of(nearest.pose.pose).then(Pose2D(0.0, 0.0, turn))
     return here.then(Pose2D(twist.linear.x * late, 0.0, turn))

@@ -1,4 +1,4 @@
-"""Maps written in the form of ROS `map_server`: a YAML file beside a PNG image."""
+"""Writes maps in the format of ROS `map_server`: a YAML file beside a PNG image."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from PIL import Image
 from smachpy.sim.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyMap
 from smachpy.states import Pose2D
 
-_SHADES: Final = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}  # those that map_saver writes
+_SHADES: Final = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}  # as ROS's map_saver writes them
 
 
 def write_map(path: Path, grid: OccupancyMap) -> None:
@@ -26,13 +26,15 @@ def write_map(path: Path, grid: OccupancyMap) -> None:
         grid: The map.
 
     Raises:
-        OSError: a file cannot be written; the image is written first.
+        OSError: a file cannot be written. The image is written first, so that the YAML file never
+            names an image that is not there.
     """
     grid = _trimmed(grid)
     shades = np.full(grid.cells.shape, _SHADES[UNKNOWN], dtype=np.uint8)
     shades[grid.cells == FREE] = _SHADES[FREE]
     shades[grid.cells == OCCUPIED] = _SHADES[OCCUPIED]
     buffer = io.BytesIO()
+    # Row 0 of a map is its lower edge, row 0 of an image its upper one.
     Image.fromarray(shades[::-1]).save(buffer, format="PNG")
     image, origin = path.with_suffix(".png"), grid.origin
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -47,7 +49,7 @@ def write_map(path: Path, grid: OccupancyMap) -> None:
 
 
 def _trimmed(grid: OccupancyMap) -> OccupancyMap:
-    """Return the map without rows and columns at its edges of which nothing is known."""
+    """Return the map without the rows and columns at its edges that are all unknown."""
     known = grid.cells != UNKNOWN
     rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
     if not rows.size:
@@ -61,18 +63,18 @@ def _trimmed(grid: OccupancyMap) -> OccupancyMap:
 
 
 def write_atomically(path: Path, data: str | bytes) -> None:
-    """Write a file so that others see the old text or the new one, never a part.
+    """Write a file so that readers see either the old contents or the new ones, never a part.
 
     Raises:
-        OSError: it cannot be written; the old file is as it was.
+        OSError: the file cannot be written; the old one is unchanged.
     """
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            os.fchmod(handle, 0o644)
+            os.fchmod(handle, 0o644)  # mkstemp makes files that only their owner can read
             file.write(data.encode() if isinstance(data, str) else data)
             file.flush()
-            os.fsync(file.fileno())
+            os.fsync(file.fileno())  # before the rename: a power failure must not leave it empty
         Path(name).replace(path)
     except BaseException:
         Path(name).unlink(missing_ok=True)

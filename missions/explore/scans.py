@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:
-    """The rays of one scan that say something, from a place of the map frame.
+    """The valid rays of one scan, in the map frame.
 
     Attributes:
-        x: Where they begin [m].
-        y: Likewise [m].
-        angles: Their directions [rad], in the map frame.
-        ranges: How far they are free [m].
-        hits: bool: whether there is something solid at their end.
+        x: Origin of the rays [m].
+        y: Origin of the rays [m].
+        angles: Their directions [rad].
+        ranges: Their free lengths [m].
+        hits: Whether each ray ends at an obstacle.
     """
 
     x: float
@@ -35,7 +35,7 @@ class Rays:
     hits: NDArray[np.bool_]
 
     def ends(self, longest: float) -> tuple[Floats, Floats]:
-        """Return where the rays end, x [m] and y [m], none farther than `longest` [m]."""
+        """Return the end points of the rays, x [m] and y [m], at most `longest` [m] away."""
         ranges = np.minimum(self.ranges, longest)
         return self.x + ranges * np.cos(self.angles), self.y + ranges * np.sin(self.angles)
 
@@ -43,8 +43,8 @@ class Rays:
 def rays_of(scan: LaserScan, pose: Pose2D) -> Rays:
     """Return the rays of a scan made at `pose`.
 
-    A range that is infinite, or longer than the scanner reaches, is a ray that met nothing; one
-    that is too short or no number says nothing and is left out.
+    A range that is infinite, or beyond the scanner's maximum, is a ray without an obstacle; ranges
+    that are too short or NaN are invalid and left out.
     """
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     angles = pose.yaw + scan.angle_min + scan.angle_increment * np.arange(len(ranges), dtype=float)

@@ -1,4 +1,4 @@
-"""A map of what a robot's scanner has seen so far, and where the unseen begins."""
+"""A map of what a robot's scanner has seen so far, and the frontiers to the unseen area."""
 
 from __future__ import annotations
 
@@ -23,24 +23,28 @@ if TYPE_CHECKING:
     Cells = NDArray[np.bool_]
 
 RESOLUTION: Final = 0.1  # [m]
-_CHUNK: Final = 64  # cells by which the map grows at least
-_HIT_WEIGHT: Final = 3  # a hit counts as much as this many misses
-_NEAR: Final = 10  # cells between a border and a place to look at it from
-_DETOUR: Final = 1.0  # [m] added to a way, so that a small gap next to the robot can wait
-_LOOKED_AT: Final = 8  # cells around the border's nearest point that are not looked at twice
-_SPARE: Final = 0.1  # [m] of room besides, where the robot is to stop and turn
+# Cells by which the grid grows at least: growing copies it, so it must not happen with each scan.
+_CHUNK: Final = 64
+# A hit counts as much as this many misses: rays that graze a wall pass through cells of the wall
+# more often than they end in them.
+_HIT_WEIGHT: Final = 3
+_NEAR: Final = 10  # cells: the largest distance between a frontier and the place to look from
+# [m] added to each way. Without it the smallest gap next to the robot would always come first.
+_DETOUR: Final = 1.0
+_LOOKED_AT: Final = 8  # cells around a frontier's nearest point that are not offered again
+_SPARE: Final = 0.1  # [m] additional space where the robot stops and turns
 _EIGHT: Final = np.ones((3, 3), dtype=np.bool_)  # neighbours, corners included
 
 
 @register_type
 @dataclass(frozen=True, slots=True)
 class Frontier:
-    """A place from which something unseen can be looked at.
+    """A place from which the robot can see a part of the unseen area.
 
     Attributes:
-        pose: Where to stand, looking there.
-        border: The nearest point of the border to the unseen, x and y [m].
-        size: How long that border is [m].
+        pose: Where to stand, facing the border.
+        border: The nearest point of the border to the unseen area, x and y [m].
+        size: The border's length [m].
     """
 
     pose: Pose2D
@@ -49,11 +53,11 @@ class Frontier:
 
 
 class SeenMap:
-    """A grid of what scans showed; it grows as needed.
+    """A grid of what scans have shown; it grows as needed.
 
     Args:
-        robot_radius: Room that the robot needs around its centre on its way [m].
-        smallest: Borders shorter than this are no frontiers: gaps between rays, say [m].
+        robot_radius: Free space that the robot's centre needs on its way [m].
+        smallest: Shorter borders are no frontiers but, for example, gaps between rays [m].
 
     Threads: every method may be called from any thread.
     """
@@ -64,15 +68,18 @@ class SeenMap:
         self._lock = threading.Lock()
         self._hits = np.zeros((0, 0), dtype=np.int32)
         self._misses = np.zeros((0, 0), dtype=np.int32)
-        self._left = np.zeros((0, 0), dtype=np.bool_)  # borders that were looked at
-        self._refused = np.zeros((0, 0), dtype=np.bool_)  # places that could not be got to
-        self._x0 = self._y0 = 0  # cell numbers of the lower left cell
+        self._left = np.zeros((0, 0), dtype=np.bool_)  # borders that have been looked at
+        self._refused = np.zeros((0, 0), dtype=np.bool_)  # places that could not be reached
+        # Cell numbers of the lower left cell, in a grid whose cell (0, 0) is at the map's origin:
+        # they change when the grid grows to the left or below, the cells' positions do not.
+        self._x0 = self._y0 = 0
 
     def add(self, scan: LaserScan, pose: Pose2D) -> None:
-        """Take in a scan made at `pose` (map frame)."""
+        """Add a scan made at `pose` (map frame)."""
         rays = rays_of(scan, pose)
         if not rays.ranges.size:
             return
+        # Points every half cell along each ray, so that no cell on the way is jumped over.
         steps = np.arange(0.0, rays.ranges.max(), RESOLUTION / 2.0)
         distances, angles = np.meshgrid(steps, rays.angles)
         passed = distances < rays.ranges[:, None]
@@ -81,13 +88,13 @@ class SeenMap:
         ends_x, ends_y = rays.ends(math.inf)
         hit = rays.hits
         with self._lock:
-            # The grid grows before any cell is numbered.
+            # First, for its effect: the grid grows here. Indices from before would be wrong after.
             self._cells(np.append(ends_x, pose.x), np.append(ends_y, pose.y))
             solid = self._cells(ends_x[hit], ends_y[hit])
             free = self._cells(np.append(xs, pose.x), np.append(ys, pose.y))
             passed_by = np.zeros(self._hits.shape, dtype=np.bool_)
             passed_by[free] = True
-            passed_by[solid] = False  # the cell that a ray ends in is not one that it passed
+            passed_by[solid] = False  # the cell in which a ray ends is not free
             self._misses += passed_by
             self._hits[solid] += 1
 
@@ -97,7 +104,7 @@ class SeenMap:
             return float(self._free().sum()) * RESOLUTION * RESOLUTION
 
     def occupancy(self) -> OccupancyMap:
-        """Return what is known as a map."""
+        """Return the map of everything seen so far."""
         with self._lock:
             cells = np.full(self._hits.shape, UNKNOWN, dtype=np.int8)
             cells[self._free()] = FREE
@@ -106,15 +113,15 @@ class SeenMap:
         return OccupancyMap(cells, RESOLUTION, origin)
 
     def best_frontier(self, here: Pose2D) -> Frontier | None:
-        """Return the frontier that shows most for its way from `here`; None: none can be got to.
+        """Return the frontier with the most border per way from `here`; None if none is reachable.
 
-        What was left is not offered again.
+        Frontiers passed to `leave` are not offered again.
         """
         with self._lock:
             border, lengths = self._border()
             if not border.any():
                 return None
-            # Near the border, and not just on the other side of a wall.
+            # Dilate within the free cells only: a place on the other side of a wall is not near.
             near = ndimage.binary_dilation(
                 border > 0, structure=_EIGHT, iterations=_NEAR, mask=self._free()
             )
@@ -133,7 +140,7 @@ class SeenMap:
             return Frontier(pose, self._centre(*at), float(lengths[label]) * RESOLUTION)
 
     def leave(self, frontier: Frontier, *, reached: bool) -> None:
-        """Do not offer this again: a border that was looked at, or a place out of reach."""
+        """Do not offer this again: the border was looked at, or the place is out of reach."""
         (x, y), reach = frontier.border, _LOOKED_AT
         if not reached:
             x, y, _ = frontier.pose
@@ -150,7 +157,7 @@ class SeenMap:
     def _cells(
         self, xs: NDArray[np.float64], ys: NDArray[np.float64]
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the cells of points, each cell once; the grid grows to hold them."""
+        """Return the cells of points, each cell once; grow the grid to hold them."""
         columns = np.floor(xs / RESOLUTION).astype(np.intp)
         rows = np.floor(ys / RESOLUTION).astype(np.intp)
         if not rows.size:
@@ -186,7 +193,7 @@ class SeenMap:
         return (self._misses > 0) & ~self._solid()
 
     def _room(self, radius: float) -> Cells:
-        """Return the free cells with so much room [m] around them, as far as is known."""
+        """Return the free cells that are farther than `radius` [m] from any known obstacle."""
         free, solid = self._free(), self._solid()
         if not solid.any():
             return free
@@ -194,7 +201,7 @@ class SeenMap:
         return free & clear
 
     def _border(self) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
-        """Return the seen cells beside unseen ones, numbered by frontier, and their lengths."""
+        """Return the free cells next to unseen ones, numbered by frontier, and their lengths."""
         free = self._free()
         unseen = ~free & ~self._solid()
         beside = ndimage.binary_dilation(np.pad(unseen, 1, constant_values=True))[1:-1, 1:-1]
@@ -206,17 +213,24 @@ class SeenMap:
     def _reach(
         self, room: Cells, labels: NDArray[np.int32], here: Pose2D
     ) -> dict[int, tuple[float, int, int]]:
-        """Return for each label the nearest cell through `room`: distance [m], row, column."""
+        """Return for each label the nearest cell that can be reached: distance [m], row, column.
+
+        A breadth-first wave over 8 neighbours. A diagonal step counts as one cell: the distance
+        only ranks frontiers, it plans no way.
+        """
         column, row = math.floor(here.x / RESOLUTION), math.floor(here.y / RESOLUTION)
         row, column = row - self._y0, column - self._x0
-        reach = math.ceil(2.0 * self._radius / RESOLUTION)  # it may stand where there is no room
+        # Start from every free cell around the robot: where it stands there may be too little
+        # space.
+        reach = math.ceil(2.0 * self._radius / RESOLUTION)
         around = np.s_[
             max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1
         ]
         start = np.zeros(room.shape, dtype=np.bool_)
         start[around] = room[around]
         width = room.shape[1] + 2
-        free, wanted = np.pad(room, 1).ravel(), np.pad(labels, 1).ravel()  # no way over the edge
+        # The margin of blocked cells keeps index arithmetic from leading over the grid's edges.
+        free, wanted = np.pad(room, 1).ravel(), np.pad(labels, 1).ravel()
         steps = np.array([dr * width + dc for dr in (-1, 0, 1) for dc in (-1, 0, 1)])
         found: dict[int, tuple[float, int, int]] = {}
         wave, distance = np.flatnonzero(np.pad(start, 1)), 0.0

@@ -1,15 +1,15 @@
-"""Fleet: robots that deliver parcels, a coordinator that hands the orders out, docks they share.
+"""Fleet: robots deliver parcels, a coordinator assigns the orders, and the robots share docks.
 
-    FLEET           a robot's line each, all at once
+    FLEET           one branch per robot, all at once
       ROBOT_0
-        NEXT        waits for what it is to do
+        NEXT        waits for the robot's next task
         DELIVER     -> NEXT: its action robot_0/deliver
         RECHARGE    -> NEXT: its action robot_0/recharge
-        PARK        -> NEXT: drives home when there is nothing to do
+        PARK        -> NEXT: drives home if there is nothing to do
       ROBOT_1 ...
 
-This is the coordinator. Each robot has a mission of its own, `missions.fleet.robot`; what happens
-to an order whose robot dies is in `missions.fleet.order_book`.
+This is the coordinator. Each robot runs a mission of its own, `missions.fleet.robot`;
+`missions.fleet.order_book` says what happens to an order if its robot dies.
 
 Run it, with eight robots as processes: `smachpy run fleet -- --robots 8`
 """
@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     from smachpy.states import Pose2D, Waypoint
 
 MOST = 100  # robots in one fleet
-ACTIONS = ("deliver", "recharge", "move_base")  # of each
-ORDER_LIMIT = 900.0  # [s] an order that takes longer is called off
-DOCK_LIMIT = 1800.0  # [s] likewise a charge
-WAY_LIMIT = 300.0  # [s] likewise a way home
-START_LIMIT = 60.0  # [s] a robot that does not take its goal within this is lost
+ACTIONS = ("deliver", "recharge", "move_base")  # of each robot
+ORDER_LIMIT = 900.0  # [s] an order that takes longer is cancelled
+DOCK_LIMIT = 1800.0  # [s] a charge that takes longer is cancelled
+WAY_LIMIT = 300.0  # [s] a drive home that takes longer is cancelled
+START_LIMIT = 60.0  # [s] a robot whose server does not appear within this is lost
 
 
 @smachpy.mission(
@@ -66,27 +66,27 @@ def fleet(
     """Deliver parcels with several robots that share docks.
 
     Args:
-        robots: How many, called robot_0, robot_1 and so on.
-        orders: How many parcels, between places that the seed picks.
-        lose: So many robots are killed while they have a parcel aboard.
+        robots: The number of robots, called robot_0, robot_1 and so on.
+        orders: The number of parcels; the seed picks their places.
+        lose: Kill this many robots while they carry a parcel.
         seed: Picks the places.
-        site: The YAML file that lists docks, homes and places.
-        together: The bodies of all robots are on one floor, and see each other.
-        start: Start the robots, simulated, as processes; else they must run already.
+        site: A YAML file with docks, homes and places.
+        together: Simulate all robots on one floor, where they see each other.
+        start: Start the robots, simulated, as processes; otherwise they must be running already.
 
     Raises:
         MissionError: the numbers do not fit the site.
-        InputFileError: the file is wrong; with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
     """
     place = load_site(Path(site))
     check_numbers(robots, orders, lose, place)
     if together and lose:
         raise MissionError(
             f"lose: got {lose} with together; expected 0: the body of a robot whose mission is "
-            "killed stays on their floor, where it drives on to its last goal."
+            "killed stays on the shared floor, where it continues to its last goal."
         )
     if together and place.map is None:
-        raise MissionError(f"{site}: map: got none; expected one for the floor they share.")
+        raise MissionError(f"{site}: map: got none; expected one for the shared floor.")
     team = [Robot(f"robot_{n}", place.homes[n].pose) for n in range(robots)]
     processes = RobotProcesses(
         team if start else [], place, Path(site), lose=lose, together=together
@@ -104,10 +104,10 @@ def fleet(
 
 
 def check_numbers(robots: int, orders: int, lose: int, site: Site) -> None:
-    """Refuse a fleet that does not fit its site.
+    """Check that the numbers fit the site.
 
     Raises:
-        MissionError: with what was expected.
+        MissionError: one does not.
     """
     most = min(len(site.homes), MOST)
     if not 1 <= robots <= most:
@@ -121,8 +121,8 @@ def check_numbers(robots: int, orders: int, lose: int, site: Site) -> None:
 
 
 def make_orders(places: Sequence[Waypoint], count: int, seed: int) -> list[Order]:
-    """Return orders between places; the same seed gives the same ones."""
-    pick = random.Random(seed)  # noqa: S311  no secret
+    """Return orders between random places; the same seed gives the same orders."""
+    pick = random.Random(seed)  # noqa: S311  not for security
     pairs = [pick.sample(list(places), 2) for _ in range(count)]
     return [Order(f"order {n}", a, b) for n, (a, b) in enumerate(pairs, 1)]
 
@@ -131,10 +131,10 @@ def make_orders(places: Sequence[Waypoint], count: int, seed: int) -> list[Order
 
 
 def coordinator(dispatcher: Dispatcher, charge_until: float) -> Concurrence:
-    """Let every robot work until no order is open.
+    """Return the machine that keeps all robots working until no order is open.
 
     Args:
-        dispatcher: Decides who does what.
+        dispatcher: Decides which robot does what.
         charge_until: A robot leaves its dock at this charge, 0 to 1.
     """
     sm = Concurrence(
@@ -150,23 +150,23 @@ def coordinator(dispatcher: Dispatcher, charge_until: float) -> Concurrence:
     )
     with sm:
         for robot in dispatcher.robots:
-            sm.add(robot.name.upper(), line_of(robot, dispatcher, charge_until))
+            sm.add(robot.name.upper(), branch_of(robot, dispatcher, charge_until))
     return sm
 
 
 def verdict(dispatcher: Dispatcher, outcomes: dict[str, str | None]) -> str:
-    """Return how the fleet's work ended."""
+    """Return the fleet's outcome."""
     if "preempted" in outcomes.values():
         return "preempted"
     done = all(entry.stage is Stage.DELIVERED for entry in dispatcher.book.entries.values())
     return "succeeded" if done else "undelivered"
 
 
-def line_of(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> StateMachine:
-    """Let one robot do what the dispatcher says, until nothing is left for it."""
+def branch_of(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> StateMachine:
+    """Return one robot's branch: it runs the tasks of the dispatcher until there are none left."""
     sm = StateMachine(outcomes=["done", "out", "lost", "preempted"])
     with sm:
-        # Without a timeout: the last orders may come back from a robot that dies hours later.
+        # No timeout: an order of a robot that dies hours later may still come back to this one.
         tasks = {"deliver": "DELIVER", "recharge": "RECHARGE", "park": "PARK"}
         sm.add("NEXT", Next(dispatcher, robot.name), tasks)
         again = {"succeeded": "NEXT", "aborted": "NEXT"}
@@ -177,7 +177,7 @@ def line_of(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> StateM
 
 
 class Next(State):
-    """Waits until the dispatcher has something for a robot."""
+    """Waits until the dispatcher has a task for the robot."""
 
     def __init__(self, dispatcher: Dispatcher, robot: str) -> None:
         outcomes = ["deliver", "recharge", "park", "done", "out", "preempted"]
@@ -186,9 +186,9 @@ class Next(State):
         self._robot = robot
 
     def execute(self, userdata: UserData) -> str:
-        """Wait for it.
+        """Wait for the next task.
 
-        Blocks: until an order, a dock or the end has come.
+        Blocks: until there is an order or a dock, or the work is over.
         """
         forget = self.on_preempt(lambda: self._dispatcher.wake(self._robot))
         try:
@@ -197,9 +197,9 @@ class Next(State):
                 if task is not None:
                     what, userdata.task = task
                     return what
-                if (
-                    not self.preempt_requested()
-                ):  # a preempt before `next_task`: its wake is cleared
+                # A preempt just before `next_task` has already woken this thread in vain, since
+                # that call clears the wake-up; so look at the flag once more before waiting.
+                if not self.preempt_requested():
                     self._dispatcher.wait(self._robot)
         finally:
             forget()
@@ -207,7 +207,7 @@ class Next(State):
 
 
 def delivering(robot: str, dispatcher: Dispatcher) -> SimpleActionState:
-    """Hand an order to a robot and wait for what becomes of it."""
+    """Send an order to the robot's action and report its end to the dispatcher."""
 
     def goal(userdata: UserData, _goal: DeliverGoal) -> DeliverGoal:
         task = userdata.task
@@ -245,7 +245,7 @@ def delivering(robot: str, dispatcher: Dispatcher) -> SimpleActionState:
 
 
 def recharging(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> SimpleActionState:
-    """Send a robot to its dock, and home again."""
+    """Send the robot to its dock, and home again."""
 
     def goal(userdata: UserData, _goal: RechargeGoal) -> RechargeGoal:
         return RechargeGoal(
@@ -260,7 +260,7 @@ def recharging(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> Sim
             return "lost"
         dispatcher.charged(robot.name, result.charge)
         left = dispatcher.left_dock(robot.name, userdata.task, left=result.left)
-        if status != GoalStatus.SUCCEEDED:  # it cannot charge, so it can do nothing else
+        if status != GoalStatus.SUCCEEDED:  # a robot that cannot charge cannot work either
             dispatcher.out_of_duty(robot.name)
         return None if left and status == GoalStatus.SUCCEEDED else "out"
 
@@ -278,7 +278,7 @@ def recharging(robot: Robot, dispatcher: Dispatcher, charge_until: float) -> Sim
 
 
 def parking(robot: Robot, dispatcher: Dispatcher) -> SimpleActionState:
-    """Drive a robot home, so that it stands in nobody's way."""
+    """Drive the robot home, where it blocks no other robot."""
 
     def note(_userdata: UserData, status: int, _result: object) -> str | None:
         if status == GoalStatus.SUCCEEDED:
@@ -298,11 +298,11 @@ def parking(robot: Robot, dispatcher: Dispatcher) -> SimpleActionState:
 
 
 def note_place(robot: str, dispatcher: Dispatcher, _userdata: UserData, feedback: Any) -> None:
-    """Tell the dispatcher where a robot is."""
+    """Report the robot's pose to the dispatcher."""
     dispatcher.seen(robot, pose_of(feedback.base_position.pose))
 
 
 def pose_message(pose: Pose2D) -> Pose:
-    """Return a pose as goals have it."""
+    """Return a pose as the message in a goal."""
     message: Pose = goal_at(pose).target_pose.pose
     return message

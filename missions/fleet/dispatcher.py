@@ -1,4 +1,4 @@
-"""The dispatcher: who does what next, by the books of `missions.fleet.order_book`."""
+"""Decides which robot does what next, using the books in `missions.fleet.order_book`."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ SERVICE: Final = "/fleet/permit"
 @register_type
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """An order as it is handed out to one robot, this once.
+    """One assignment of an order to a robot.
 
     Attributes:
-        order: Its name.
-        attempt: How often it was handed out, this time included.
+        order: The order's name.
+        attempt: How often the order has been assigned, this time included.
         pickup: Where to fetch the parcel, in the map frame.
-        dropoff: Where to take it.
+        dropoff: Where to bring it.
     """
 
     order: str
@@ -48,7 +48,7 @@ class Robot:
     """A robot of the fleet.
 
     Attributes:
-        name: What stands in front of its names, robot_0 for example.
+        name: The prefix of its names, for example robot_0.
         home: Where it waits, in the map frame.
     """
 
@@ -58,7 +58,7 @@ class Robot:
 
 @dataclass(slots=True)
 class _RobotState:
-    """What the dispatcher knows of one robot."""
+    """What the dispatcher knows about one robot."""
 
     news: Event
     seen: Pose2D | None = None
@@ -67,13 +67,13 @@ class _RobotState:
 
 
 class Dispatcher:
-    """Decides what each robot does next, and answers the robots' questions.
+    """Assigns tasks to the robots, and answers their requests for permission.
 
     Args:
-        robots: All of them.
-        orders: What is to be delivered.
-        docks: Where they charge.
-        low: A robot whose battery is below this charges before its next order, 0 to 1.
+        robots: All robots.
+        orders: The orders to deliver.
+        docks: The docks.
+        low: A robot with less charge than this, 0 to 1, charges before its next order.
         on_permit: Called with (robot, step) after a step was granted.
 
     Threads: every method may be called from any thread.
@@ -96,7 +96,7 @@ class Dispatcher:
         self.open()
 
     def open(self) -> None:
-        """Begin anew: all orders wait, all docks are free."""
+        """Start a new run: all orders wait, all docks are free."""
         clock = current_clock()
         self.book = OrderBook(self._orders)
         self.docks = DockBook(self._all_docks)
@@ -104,37 +104,39 @@ class Dispatcher:
         self._on_duty = {robot.name for robot in self.robots}
 
     def serve(self) -> Dispatcher:
-        """Answer the robots on the node in force, until `close`."""
+        """Answer the robots' requests, on the current node, until `close`."""
         self.open()
         self._service = Service(SERVICE, Permit, self.permit)
         return self
 
     def close(self) -> None:
-        """Answer no longer."""
+        """Stop answering."""
         if self._service is not None:
             self._service.close()
 
     def finish(self) -> str:
-        """End every order that is still open, and return what became of all of them."""
+        """Close all open orders, and return a report about all of them."""
         with self._lock:
             self.book.close("the fleet has ended")
             blocked = sorted(self.docks.blocked.items())
-            docks = [f"  {dock}: somebody has to look, {robot} had it" for dock, robot in blocked]
+            docks = [f"  {dock}: needs to be checked, {robot} had it" for dock, robot in blocked]
             report = "\n".join([self.book.report(), *docks])
             done = all(e.stage is Stage.DELIVERED for e in self.book.entries.values())
         (loginfo if done else logwarn)(report)
         return report
 
-    # -- what a robot does next ----------------------------------------------------------------
+    # -- the next task of a robot --------------------------------------------------------------
 
     def next_task(self, robot: str) -> Task | None:
-        """Return what `robot` is to do and with what, None when it has to wait for news.
+        """Return the robot's next task and its data; None if it has to wait.
 
-        'deliver' and 'recharge' are taken by that; 'park' is to drive home; 'done' that nothing is
-        left to do; 'out' that it can do nothing any more.
+        'deliver' and 'recharge' reserve the order or dock at once; 'park' is the drive home; 'done'
+        means that nothing is left to do, 'out' that this robot can do nothing more.
         """
         with self._lock:
             state = self._duties[robot]
+            # Cleared before looking, under the lock: news that comes later sets it again, so none
+            # is lost between this look and `wait`.
             state.news.clear()
             if state.charge is not None and state.charge < self._low and not self._is_over(state):
                 return self._dock(robot, state)
@@ -150,7 +152,7 @@ class Dispatcher:
             return None if state.at_home else ("park", None)
 
     def _is_over(self, state: _RobotState) -> bool:
-        """Return whether the work is done, for a robot that has come home."""
+        """Return whether all work is done and the robot is at home."""
         return state.at_home and not self.book.open
 
     def _dock(self, robot: str, state: _RobotState) -> Task | None:
@@ -164,21 +166,21 @@ class Dispatcher:
         return None if state.at_home else ("park", None)
 
     def wait(self, robot: str) -> None:
-        """Wait until something has changed that `next_task` has not seen, or `wake`."""
+        """Wait until something has changed since `next_task`, or until `wake`."""
         self._duties[robot].news.wait()
 
     def wake(self, robot: str) -> None:
-        """End the wait of a robot."""
+        """End a robot's `wait`."""
         self._duties[robot].news.set()
 
-    def _tell_all(self) -> None:
+    def _wake_all(self) -> None:
         for state in self._duties.values():
             state.news.set()
 
-    # -- what became of it ---------------------------------------------------------------------
+    # -- reports from the robots' branches -----------------------------------------------------
 
     def permit(self, request: PermitRequest) -> PermitResponse:
-        """Answer whether a robot may take its next step."""
+        """Answer a robot's request for its next step."""
         with self._lock:
             why_not = self.book.permit(request)
         if why_not:
@@ -195,7 +197,7 @@ class Dispatcher:
         self._duties[robot].at_home = True
 
     def charged(self, robot: str, charge: float) -> None:
-        """Note how full a robot's battery is; 0: it does not know."""
+        """Note a robot's charge; 0 means unknown."""
         if charge > 0.0:
             self._duties[robot].charge = charge
 
@@ -205,10 +207,10 @@ class Dispatcher:
             entry = self._entry(robot, task)
             if entry is not None:
                 self.book.delivered(entry)
-            self._tell_all()
+            self._wake_all()
 
     def failed(self, robot: str, task: Delivery, why: str, *, aboard: bool) -> bool:
-        """Note that a robot has given an order up; tell whether it can take another."""
+        """Note that a robot gave up an order; return whether it can take another one."""
         with self._lock:
             entry = self._entry(robot, task)
             if entry is not None:
@@ -216,11 +218,11 @@ class Dispatcher:
             if aboard:
                 self._on_duty.discard(robot)
             self.book.give_up(sorted(self._on_duty))
-            self._tell_all()
+            self._wake_all()
         return not aboard
 
     def lost(self, robot: str, task: Delivery) -> None:
-        """Note that a robot is dead or cut off, with an order."""
+        """Note that a robot with an order is dead or disconnected."""
         with self._lock:
             entry = self._entry(robot, task)
             if entry is not None:
@@ -229,14 +231,14 @@ class Dispatcher:
             self._leave_duty(robot)
 
     def lost_at(self, robot: str, dock: Waypoint) -> None:
-        """Note that a robot is dead or cut off, on the way to its dock or there."""
+        """Note that a robot is dead or disconnected while it had a dock."""
         with self._lock:
             logwarn(f"{robot}: lost with {dock.name}")
             self.docks.block(dock, robot)
             self._leave_duty(robot)
 
     def left_dock(self, robot: str, dock: Waypoint, *, left: bool) -> bool:
-        """Note whether a robot has left its dock and is home; tell whether it can go on."""
+        """Note whether a robot has left its dock and is home; return whether it can go on."""
         with self._lock:
             if left:
                 self.docks.leave(dock, robot)
@@ -244,20 +246,20 @@ class Dispatcher:
             else:
                 self.docks.block(dock, robot)
                 self._leave_duty(robot)
-            self._tell_all()
+            self._wake_all()
         return left
 
     def out_of_duty(self, robot: str) -> None:
-        """Note that a robot takes no orders any more."""
+        """Note that a robot takes no more orders."""
         with self._lock:
             self._leave_duty(robot)
 
     def _entry(self, robot: str, task: Delivery) -> Entry | None:
-        """Return the order's line; None when it is no longer this robot's."""
+        """Return the order's entry; None if the order is no longer this robot's."""
         entry = self.book.entries[task.order]
         return entry if entry.is_at(robot, task.attempt) else None
 
     def _leave_duty(self, robot: str) -> None:
         self._on_duty.discard(robot)
         self.book.give_up(sorted(self._on_duty))
-        self._tell_all()
+        self._wake_all()

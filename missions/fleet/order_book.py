@@ -1,22 +1,22 @@
-"""What a fleet's coordinator knows: which order is where, and who has which dock.
+"""The books of a fleet's coordinator: the state of each order, and the robot at each dock.
 
-An order moves along one line, and every step that cannot be taken back is written down before it is
-taken: a robot asks for it (`permit`) and waits for the answer.
+An order moves along one line. A robot asks (`permit`) before every step that cannot be undone, and
+the step is written down before the robot gets its answer.
 
     WAITING -> HANDED_OUT -> PICKING_UP -> ABOARD -> HANDING_OVER -> DELIVERED
        ^           |             |            |            |
        +-----------+-------------+------------+            +-> IN_DOUBT
          the robot died or gave up                             the robot died
 
-So when a robot dies, what is written down says what may have happened since:
+So when a robot dies, the book shows what may have happened since:
 
-- before PICKING_UP it has not touched the parcel: the order is given to another robot;
+- before PICKING_UP it has not touched the parcel: another robot gets the order;
 - at PICKING_UP the parcel is at the pickup place, on the shelf or on the robot that stands there;
-- at ABOARD it is on the robot, where that was heard of last: another robot takes it from there;
-- at HANDING_OVER nobody can know whether the parcel was handed over. The order is IN_DOUBT, and is
-  never given to anybody again: that is what "delivered at most once" costs.
+- at ABOARD it is on the robot, at its last known pose: another robot fetches it there;
+- at HANDING_OVER nobody can know whether the parcel was handed over. The order is IN_DOUBT and is
+  never assigned again: that is the price of "delivered at most once".
 
-Pure decisions: no threads, time or network. `missions.fleet.dispatcher` keeps the callers apart.
+Pure decisions: no threads, time or network. `missions.fleet.dispatcher` holds the lock.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     from smachpy.states import Pose2D, Waypoint
 
 MAX_ATTEMPTS: Final = 4
-"""An order is not tried again after this many robots have failed to deliver it."""
+"""After this many failed attempts an order is not assigned again."""
 
 
 class Stage(StrEnum):
-    """Where an order stands."""
+    """The stage of an order."""
 
     WAITING = "waiting"
     HANDED_OUT = "handed out"
@@ -53,8 +53,8 @@ class Stage(StrEnum):
 FINAL: Final = frozenset({Stage.DELIVERED, Stage.UNDELIVERED, Stage.IN_DOUBT})
 _UNTOUCHED: Final = frozenset({Stage.HANDED_OUT, Stage.PICKING_UP})
 
-# Step -> the stages in which it may be asked for, and the one that follows. Asked again, because
-# the answer was lost, it is granted again.
+# Step -> the stages in which it may be requested, and the stage that follows. A step that was
+# granted is granted again: the robot repeats its request if the answer was lost.
 _STEPS: Final = {
     PermitRequest.PICK_UP: ({Stage.HANDED_OUT, Stage.PICKING_UP}, Stage.PICKING_UP),
     PermitRequest.DRIVE_OFF: ({Stage.PICKING_UP, Stage.ABOARD}, Stage.ABOARD),
@@ -67,9 +67,9 @@ class Order:
     """A parcel to fetch and to hand over.
 
     Attributes:
-        name: One of its kind.
-        pickup: Where it lies.
-        dropoff: Where it is to go.
+        name: A unique name.
+        pickup: Where the parcel is.
+        dropoff: Where it goes.
     """
 
     name: str
@@ -79,14 +79,14 @@ class Order:
 
 @dataclass(slots=True)
 class Entry:
-    """What is known of one order.
+    """The state of one order.
 
     Attributes:
         order: The order.
-        pickup: Where the parcel is to be fetched now, in the map frame.
-        stage: Where it stands.
-        robot: Who has it; "" for nobody.
-        attempt: How often it was handed out.
+        pickup: Where to fetch the parcel now, in the map frame; it moves with a lost robot.
+        stage: The stage.
+        robot: The robot that has it; "" for none.
+        attempt: How often it has been assigned.
         reason: Why it is not delivered.
         failed: The robots that had it before.
     """
@@ -100,7 +100,10 @@ class Entry:
     failed: list[str] = field(default_factory=list)
 
     def is_at(self, robot: str, attempt: int) -> bool:
-        """Return whether this robot has the order, in this attempt."""
+        """Return whether this robot has the order, in this attempt.
+
+        The attempt number tells an old assignment of a robot that was disconnected from a new one.
+        """
         return bool(robot) and (self.robot, self.attempt) == (robot, attempt)
 
 
@@ -108,7 +111,7 @@ class OrderBook:
     """All orders of a fleet.
 
     Args:
-        orders: In the order in which they are handed out.
+        orders: In the order in which they are assigned.
 
     Attributes:
         entries: By the order's name.
@@ -119,7 +122,7 @@ class OrderBook:
 
     @property
     def open(self) -> bool:
-        """Whether any order has not come to its end."""
+        """Whether any order is not finished."""
         return any(entry.stage not in FINAL for entry in self.entries.values())
 
     def at(self, stage: Stage) -> list[Entry]:
@@ -127,7 +130,7 @@ class OrderBook:
         return [entry for entry in self.entries.values() if entry.stage is stage]
 
     def hand_out(self, robot: str) -> Entry | None:
-        """Give `robot` the first order that waits and that it has not failed before."""
+        """Assign to `robot` the first waiting order that it has not failed before."""
         for entry in self.entries.values():
             if entry.stage is Stage.WAITING and robot not in entry.failed:
                 entry.stage, entry.robot = Stage.HANDED_OUT, robot
@@ -139,7 +142,7 @@ class OrderBook:
         """Write down a step that a robot is about to take.
 
         Returns:
-            Why it must not take it; "" when it may.
+            Why the step is refused; "" if it is granted.
         """
         entry = self.entries.get(request.order)
         if entry is None:
@@ -155,15 +158,15 @@ class OrderBook:
         return ""
 
     def delivered(self, entry: Entry) -> None:
-        """Note that the robot that has the order says it is done."""
+        """Note that the robot reports the order as delivered."""
         entry.stage, entry.reason = Stage.DELIVERED, ""
 
     def failed(self, entry: Entry, why: str, *, aboard: bool) -> None:
-        """Note that the robot that has the order gave up; it lives, so its word counts.
+        """Note that the robot gave up. It is alive, so its report is trusted.
 
         Args:
             entry: The order.
-            why: In words.
+            why: The reason, in words.
             aboard: Whether the parcel is on the robot.
         """
         if aboard:
@@ -174,11 +177,11 @@ class OrderBook:
             self._end(entry, Stage.IN_DOUBT, f"{entry.robot} has no parcel: {why}")
 
     def lost(self, entry: Entry, seen: Pose2D | None) -> None:
-        """Note that the robot that has the order is dead or cut off; see the module's text.
+        """Note that the robot is dead or disconnected; the module's text lists the cases.
 
         Args:
             entry: The order.
-            seen: Where the robot was heard of last; None when it never was.
+            seen: The robot's last known pose, if any.
         """
         why = f"{entry.robot} was lost while it was {entry.stage}"
         if entry.stage in _UNTOUCHED:
@@ -192,13 +195,13 @@ class OrderBook:
             self._end(entry, Stage.IN_DOUBT, why)
 
     def give_up(self, robots: Sequence[str]) -> None:
-        """End the orders that wait although none of `robots`, all that are left, may take them."""
+        """Close the waiting orders that none of `robots`, all that are left, may take."""
         for entry in self.at(Stage.WAITING):
             if set(robots) <= set(entry.failed):
                 self._end(entry, Stage.UNDELIVERED, _both(entry.reason, "no other robot is left"))
 
     def close(self, why: str) -> None:
-        """End every order that is still open: nobody works on them any more."""
+        """Close every open order: nobody works on them any more."""
         for entry in self.entries.values():
             if entry.stage is Stage.HANDING_OVER:
                 self._end(entry, Stage.IN_DOUBT, f"{why} while {entry.robot} handed it over")
@@ -208,7 +211,7 @@ class OrderBook:
                 self._end(entry, Stage.UNDELIVERED, _both(entry.reason, why))
 
     def report(self) -> str:
-        """Return what became of the orders, a line for each that was not delivered."""
+        """Return a report: counts, and a line for each order that was not delivered."""
         counts = [(stage, len(self.at(stage))) for stage in sorted(FINAL)]
         lines = [", ".join(f"{count} {stage}" for stage, count in counts)]
         lines += [
@@ -233,10 +236,10 @@ def _both(before: str, now: str) -> str:
 
 
 class DockBook:
-    """Who has which dock; never two robots one dock.
+    """Which robot has which dock; no dock is given to two robots.
 
-    A dock is taken before its robot sets out, and free again when that says that it has left it.
-    The dock of a robot that was lost stays taken: somebody has to look.
+    A dock is reserved before its robot sets out, and is free again when the robot reports that it
+    has left. The dock of a lost robot stays reserved until a person has checked it.
 
     Args:
         docks: The docks.
@@ -248,7 +251,7 @@ class DockBook:
         self.blocked: dict[str, str] = {}
 
     def take(self, robot: str, seen: Pose2D | None) -> Waypoint | None:
-        """Give `robot` the free dock that is nearest to it, if there is one."""
+        """Reserve for `robot` the nearest free dock, if any."""
         free = [dock for name, dock in self._docks.items() if name not in self.holders]
         if not free:
             return None
@@ -262,11 +265,11 @@ class DockBook:
             del self.holders[dock.name]
 
     def block(self, dock: Waypoint, robot: str) -> None:
-        """Note that nobody knows whether `robot` stands on its dock."""
+        """Note that `robot` may still stand on its dock."""
         if self.holders.get(dock.name) == robot:
             self.blocked[dock.name] = robot
 
     @property
     def hopeless(self) -> bool:
-        """Whether no dock will ever be free again by itself."""
+        """Whether every dock is blocked, so that waiting is useless."""
         return len(self.blocked) == len(self._docks)

@@ -1,7 +1,7 @@
-"""The robots of a fleet as processes of this machine, and how some of them die.
+"""Runs the robots of a fleet as processes on this machine, and kills some of them.
 
-Each is a process with its mission and a simulated body on a floor of its own; or all bodies are in
-one process, on one floor, where they see each other.
+Each process runs one robot's mission and simulates its body on a floor of its own; or one more
+process simulates all bodies on one floor, where they see each other.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from missions.fleet.site import Site
     from smachpy.states import Pose2D
 
-_DIES_AFTER: Final = 2.0  # [s] on the way, with the parcel aboard
+_DIES_AFTER: Final = 2.0  # [s] after it left with a parcel a robot is killed: it is on its way then
 
 
 class RobotProcesses:
-    """Starts a process for each robot; a server in the sense of `smachpy.states.serve_during`.
+    """Starts one process per robot; a server for `smachpy.states.serve_during`.
 
     Args:
-        robots: Whom to start.
-        site: Their floor.
-        site_file: The file that says it.
-        lose: So many of them are killed, each on the way with its first parcel.
-        together: All of them are on one floor.
+        robots: The robots to start.
+        site: Where they work.
+        site_file: The file that describes the site.
+        lose: Kill this many robots, each on the way with its first parcel.
+        together: Simulate all of them on one floor.
 
     Threads: `on_permit` may be called from any thread.
     """
@@ -64,7 +64,7 @@ class RobotProcesses:
         self._stack = ExitStack()
 
     def start(self) -> RobotProcesses:
-        """Start them all; they take goals as soon as they are ready.
+        """Start all processes; the robots accept goals as soon as they are ready.
 
         Raises:
             OSError: a file cannot be written, or a process cannot be started.
@@ -87,17 +87,18 @@ class RobotProcesses:
         self._processes[name] = self._stack.enter_context(process)
 
     def close(self) -> None:
-        """End them all.
+        """End all processes.
 
-        Blocks: until they have ended, 4 s at most.
+        Blocks: until they have ended, for 4 s at most.
         """
+        # First ask all of them, then wait: they end side by side and not one after the other.
         for process in self._processes.values():
             process.let_go()
         self._stack.close()
         self._processes.clear()
 
     def on_permit(self, robot: str, step: int) -> None:
-        """Note a robot's step; one that is to be lost dies soon after it has left with a parcel."""
+        """Note a granted step; schedule the death of a robot that leaves with a parcel."""
         with self._lock:
             if step != PermitRequest.DRIVE_OFF or len(self._doomed) >= self._lose:
                 return
@@ -112,7 +113,7 @@ class RobotProcesses:
             os.kill(process.pid, signal.SIGKILL)
 
     def _end(self, robot: str, process: RobotProcess) -> None:
-        """Say what a robot died of, unless that was meant."""
+        """Log why a robot's process ended, unless it was killed on purpose."""
         try:
             process.check()
         except MissionError as error:
@@ -121,7 +122,7 @@ class RobotProcesses:
 
 
 def world_text(site: Site, robots: Sequence[Robot]) -> str:
-    """Return the world file of a floor with these robots at home, and the site's docks."""
+    """Return a world file with these robots at home and with the site's docks."""
     assert site.map is not None
     lines = [f"map: {json.dumps(str(site.map.resolve()))}"]
     if site.robot is not None:

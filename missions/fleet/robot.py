@@ -75,16 +75,16 @@ if TYPE_CHECKING:
 OUTCOMES = ["succeeded", "aborted", "preempted"]
 EXIT_BAD_INPUT = 2
 KEYS = ["action_goal", "action_feedback", "action_result"]
-ANSWER = 3.0  # [s] for the coordinator's answer, each time
-ASKED = Retry(3, 0.5)  # so often; then the robot does not do it
-GRIP = 2.0  # [s] to take or to hand over a parcel
+ANSWER = 3.0  # [s] for the coordinator's answer, per attempt
+ASKED = Retry(3, 0.5)  # attempts and first pause [s]; after that the robot does not take the step
+GRIP = 2.0  # [s] to take a parcel or to hand it over
 
 
 class Hands(Protocol):
-    """What takes the parcels. `GentleHands` only lets time pass; a test's may drop them."""
+    """The gripper. `GentleHands` only lets time pass; a test's hands may drop parcels."""
 
     def take(self, order: str) -> bool:
-        """Take the parcel; False when there is none here."""
+        """Take the parcel; return False if there is none."""
         ...
 
     def put_back(self, order: str) -> None:
@@ -97,10 +97,10 @@ class Hands(Protocol):
 
 
 class GentleHands:
-    """Hands that never fail."""
+    """Hands that never fail; the simulation has no parcels."""
 
     def take(self, order: str) -> bool:
-        """Take the parcel, which is there."""
+        """Take the parcel."""
         del order
         return True
 
@@ -115,11 +115,11 @@ class FleetRobot:
     """Offers `deliver` and `recharge` for one robot.
 
     Args:
-        name: As the coordinator calls it.
-        hands: What takes the parcels.
-        node: Where the robot is on the network; in its name space.
+        name: The robot's name for the coordinator.
+        hands: The gripper.
+        node: The robot's node, in its namespace.
 
-    Threads: one goal of each action runs at a time, in a thread of its server's.
+        Threads: one goal of each action runs at a time, in a thread of its server.
     """
 
     def __init__(self, name: str, hands: Hands, *, node: Node) -> None:
@@ -136,11 +136,11 @@ class FleetRobot:
             server.run_server()
 
     def charge(self) -> float:
-        """Return how full the battery is, 0 to 1; 0: it has not said so yet."""
+        """Return the battery's charge, 0 to 1; 0 before the first message."""
         return self._charge
 
     def close(self) -> None:
-        """Leave the network; what runs is stopped."""
+        """Stop running goals and leave the network."""
         for server in self._servers:
             server.stop()
         self._battery.unregister()
@@ -155,13 +155,13 @@ class FleetRobot:
 def deliver(
     name: str, hands: Hands, charge: Callable[[], float], node: Node | None = None
 ) -> StateMachine:
-    """Fetch a parcel and hand it over; every step that cannot be undone is asked for first.
+    """Fetch a parcel and hand it over; ask before every step that cannot be undone.
 
     Args:
-        name: The robot's.
-        hands: What takes the parcel.
-        charge: Returns how full the battery is.
-        node: Where the robot is; None takes the node in force.
+        name: The robot's name.
+        hands: The gripper.
+        charge: Returns the battery's charge.
+        node: The robot's node; None uses the current one.
     """
 
     def note(text: str, *, aboard: bool) -> Note:
@@ -183,47 +183,46 @@ def deliver(
     coming = note("driving to the pickup", aboard=False)
     leaving = note("driving to the dropoff", aboard=True)
     sm = StateMachine(OUTCOMES, ["action_goal"], KEYS[1:], name="DELIVER")
-    add = sm.add
     with sm:
-        add(
+        sm.add(
             "TO_PICKUP",
             drive("pickup", "to the pickup", coming, DeliverFeedback, node),
             {"succeeded": "ASK_TO_TAKE"},
         )
-        add(
+        sm.add(
             "ASK_TO_TAKE",
             ask(name, PermitRequest.PICK_UP, node),
             {"succeeded": "TAKE", "refused": "aborted"},
         )
-        add("TAKE", Hand(take, note("took it", aboard=True)), {"done": "ASK_TO_LEAVE"})
-        add(
+        sm.add("TAKE", Hand(take, note("took it", aboard=True)), {"done": "ASK_TO_LEAVE"})
+        sm.add(
             "ASK_TO_LEAVE",
             ask(name, PermitRequest.DRIVE_OFF, node),
             {"succeeded": "TO_DROPOFF", "refused": "PUT_BACK", "aborted": "PUT_BACK"},
         )
-        add("PUT_BACK", Hand(put_back, note("put it back", aboard=False)), {"done": "aborted"})
-        add(
+        sm.add("PUT_BACK", Hand(put_back, note("put it back", aboard=False)), {"done": "aborted"})
+        sm.add(
             "TO_DROPOFF",
             drive("dropoff", "to the dropoff", leaving, DeliverFeedback, node),
             {"succeeded": "ASK_TO_GIVE"},
         )
-        add(
+        sm.add(
             "ASK_TO_GIVE",
             ask(name, PermitRequest.HAND_OVER, node),
             {"succeeded": "GIVE", "refused": "aborted"},
         )
-        add("GIVE", Hand(give, note("handed over", aboard=False)), {"done": "succeeded"})
+        sm.add("GIVE", Hand(give, note("handed over", aboard=False)), {"done": "succeeded"})
     return sm
 
 
 class Hand(State):
-    """Takes a parcel, puts it back or hands it over: first the time that takes, then the deed.
+    """Takes a parcel, puts it back or hands it over: first the time it takes, then the deed.
 
-    A preempt in that time leaves the parcel where it was; after the deed it comes too late.
+    A preempt during that time leaves the parcel where it was; after the deed it is too late.
 
     Args:
-        do: Does it; False when there is no parcel.
-        note: Writes down that it is done.
+        do: The deed; returns False if there is no parcel.
+        note: Writes the result to userdata.
     """
 
     def __init__(self, do: Callable[[UserData], bool], note: Note) -> None:
@@ -232,7 +231,7 @@ class Hand(State):
         self._note = note
 
     def execute(self, userdata: UserData) -> str:
-        """Do it."""
+        """Wait for the gripper, then do the deed."""
         if self.sleep(GRIP):
             return "preempted"
         if not self._do(userdata):
@@ -242,7 +241,7 @@ class Hand(State):
 
 
 def ask(name: str, step: int, node: Node | None) -> ServiceState:
-    """Ask the coordinator whether a step may be taken; 'aborted' when not, or without an answer."""
+    """Ask the coordinator for permission; 'refused' if it says no, 'aborted' without an answer."""
 
     def request(userdata: UserData, _request: PermitRequest) -> PermitRequest:
         goal = userdata.action_goal
@@ -274,8 +273,8 @@ def recharge(charge: Callable[[], float], node: Node | None = None) -> StateMach
     """Drive to a dock, charge there, and leave it.
 
     Args:
-        charge: Returns how full the battery is.
-        node: Where the robot is; None takes the node in force.
+        charge: Returns the battery's charge.
+        node: The robot's node; None uses the current one.
     """
 
     def note(text: str, *, left: bool) -> Note:
@@ -287,22 +286,22 @@ def recharge(charge: Callable[[], float], node: Node | None = None) -> StateMach
     leaving = note("leaving the dock", left=False)
     away = note("left the dock", left=True)
     sm = StateMachine(OUTCOMES, ["action_goal"], KEYS[1:], name="RECHARGE")
-    add = sm.add
     with sm:
-        add(
+        sm.add(
             "TO_DOCK",
             drive("dock", "to the dock", coming, RechargeFeedback, node),
             {"succeeded": "CHARGE"},
         )
-        add("CHARGE", charging(node), {"succeeded": "LEAVE", "aborted": "LEAVE_EMPTY"})
-        add("LEAVE", drive("outside", "home", leaving, RechargeFeedback, node, away))
+        sm.add("CHARGE", charging(node), {"succeeded": "LEAVE", "aborted": "LEAVE_EMPTY"})
+        sm.add("LEAVE", drive("outside", "home", leaving, RechargeFeedback, node, away))
+        # A robot that cannot charge leaves all the same: it must not block the dock for the others.
         empty = drive("outside", "home", leaving, RechargeFeedback, node, away)
-        add("LEAVE_EMPTY", empty, {"succeeded": "aborted"})
+        sm.add("LEAVE_EMPTY", empty, {"succeeded": "aborted"})
     return sm
 
 
 def charging(node: Node | None) -> SimpleActionState:
-    """Charge as far as the goal says."""
+    """Charge up to the goal's `until`."""
     return SimpleActionState(
         "charge",
         ChargeAction,
@@ -323,15 +322,15 @@ def drive(
     node: Node | None,
     there: Note | None = None,
 ) -> SimpleActionState:
-    """Drive to a pose of the goal, and tell where the robot is.
+    """Drive to a pose in the goal, and send the robot's pose as feedback.
 
     Args:
-        slot: The goal's field that holds the pose.
-        doing: What it does, in words.
-        coming: Writes down what it does.
-        feedback: Class of the feedback.
-        node: Where the robot is.
-        there: Writes down that it has arrived.
+        slot: The goal's field with the pose.
+        doing: What the robot does, in words.
+        coming: Writes a result to userdata at the start, for a goal that ends on the way.
+        feedback: The feedback class.
+        node: The robot's node.
+        there: Writes a result to userdata on arrival.
     """
 
     def goal(userdata: UserData, goal: MoveBaseGoal) -> MoveBaseGoal:
@@ -364,7 +363,7 @@ def drive(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Be one robot, body and all, until SIGINT or SIGTERM; returns the exit code.
+    """Run one robot until SIGINT or SIGTERM; return the exit code.
 
     Blocks: until then.
     """
@@ -383,12 +382,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def serve(args: argparse.Namespace) -> int:
-    """Put the robot on the floor, and its mission on the network.
+    """Simulate the robot's body if asked to, and offer its actions.
 
     Raises:
-        InputFileError: the site, the map or the robot's file is wrong.
-        NavigationError: it cannot stand where it should start.
-        ServerConflictError: there is a robot of that name already.
+        InputFileError: the site, the map or the robot's file has problems.
+        NavigationError: the robot cannot stand at its start pose.
+        ServerConflictError: a robot of that name is already there.
     """
     with shutdown.handle_signals() as ending, contextlib.ExitStack() as stack:
         if args.child:
@@ -412,11 +411,11 @@ def serve(args: argparse.Namespace) -> int:
 
 
 def make_body(site_file: Path, pose: Pose2D | None) -> Robot:
-    """Return a simulated robot on a floor of its own, which has the site's docks.
+    """Return a simulated robot on a floor of its own, with the site's docks.
 
     Raises:
-        InputFileError: the site, the map or the robot's file is wrong.
-        NavigationError: it cannot stand there.
+        InputFileError: the site, the map or the robot's file has problems.
+        NavigationError: the robot cannot stand at its start pose.
     """
     from smachpy.sim.occupancy import load_map
     from smachpy.sim.world import Robot, World

@@ -1,4 +1,4 @@
-"""Where a fleet works: docks, homes, and places that parcels come from and go to."""
+"""The site of a fleet: docks, homes, and the places of parcels."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Where a fleet works.
+    """The site of a fleet.
 
     Attributes:
         docks: Where robots charge.
-        homes: Where they wait, one each.
-        places: Where parcels come from and go to.
-        low_battery: A robot below this charges before its next order, 0 to 1.
-        charge_until: It leaves the dock at this charge, 0 to 1.
-        map: The file of the floor; None when the file names none.
-        robot: The file of the robots' parameters, likewise.
+        homes: Where robots wait, one for each.
+        places: Where parcels are fetched and delivered.
+        low_battery: A robot with less charge than this, 0 to 1, charges before its next order.
+        charge_until: A robot leaves the dock at this charge, 0 to 1.
+        map: The map file; None if the site names none.
+        robot: The file with the robots' parameters; None if the site names none.
     """
 
     docks: tuple[Waypoint, ...]
@@ -35,10 +35,10 @@ class Site:
 
 
 def load_site(path: Path) -> Site:
-    """Read where a fleet works: the lists `docks`, `homes` and `places`.
+    """Read a site file: the lists `docks`, `homes` and `places`.
 
     Raises:
-        InputFileError: with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
     """
     file = PlaceFile(path)
     low, until = file.charges()

@@ -1,9 +1,7 @@
 """The messages and actions of the course's missions and of the fleet.
 
-They are made from the files in ROS layout beside this module.
-
-Own definitions are added in the same way: a folder in ROS layout and `add_path`. The services are
-in `missions.interfaces.srv`.
+They are made from the definition files beside this module. Your own definitions work in the same
+way: a folder in ROS layout and `add_path`. The services are in `missions.interfaces.srv`.
 """
 
 from __future__ import annotations
@@ -14,7 +12,8 @@ from actionlib_core.interfaces import add_path
 
 add_path(Path(__file__).parent)
 
-from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402  found since the line above
+# Below `add_path`: the module `mission_msgs` exists only after that call.
+from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402
     CountdownAction,
     CountdownFeedback,
     CountdownGoal,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import missions.interfaces  # noqa: F401  names the folder of the definitions
+import missions.interfaces  # noqa: F401  registers the folder with the definitions
 from actionlib_core.interfaces.mission_msgs.srv import (
     DemoSrv,
     DemoSrvRequest,

@@ -1,4 +1,4 @@
-"""What the plans of this folder do beside driving."""
+"""Actions of this folder's plans, apart from driving."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 
 def say(userdata: UserData, *words: str, robot: str = "") -> None:
-    """Say something, in the log."""
+    """Write a line to the log."""
     del userdata
     log.loginfo(f"{robot or 'robot'}: {' '.join(words)}")
 
 
 def _look(userdata: UserData) -> str:
-    """Look for a cup; the simulated robot sees what the userdata says."""
+    """Look for a cup; the simulated robot has no camera, so userdata says whether one is there."""
     return "cup" if "cup" in userdata and userdata.cup else "nothing"
 
 

@@ -1,4 +1,4 @@
-"""A picture of what the laser scanner sees from where the robot stands, on the map around it."""
+"""A picture of what the laser scanner sees around the robot, on the map."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ Colour = tuple[int, int, int]
 
 SIDE: Final = 720  # [pixels]
 REACH: Final = 5.0  # [m] from the robot to the edges of the picture
-_TITLE: Final = 36  # [pixels] the line below
-_SMOOTH: Final = 2  # drawn this many times larger, then scaled down
-_METRE: Final = SIDE * _SMOOTH / (2.0 * REACH)
+_TITLE: Final = 36  # [pixels] height of the line below the picture
+_SMOOTH: Final = 2  # drawn larger by this factor, then scaled down: Pillow's lines are jagged
+_METRE: Final = SIDE * _SMOOTH / (2.0 * REACH)  # [pixels] per metre, before scaling down
 _FLOOR: Final[Colour] = (226, 228, 232)
 _WALL: Final[Colour] = (120, 126, 138)
 _SEEN: Final[Colour] = (255, 249, 219)
@@ -42,11 +42,11 @@ def save_photo(
     """Write the picture: north (the y axis of the map) is up, the robot is in the middle.
 
     Args:
-        path: The PNG file; its folder is made.
-        scan: What the scanner saw.
-        pose: Where the robot was then, in the map frame.
-        grid: The map, drawn below; None draws none.
-        title: A line below the picture.
+        path: The PNG file; missing folders are created.
+        scan: The scan.
+        pose: Where the scan was made, in the map frame.
+        grid: The map, drawn below the scan; None: no map.
+        title: The line below the picture.
 
     Raises:
         OSError: the file cannot be written.
@@ -90,7 +90,7 @@ def _background(grid: OccupancyMap | None, pose: Pose2D) -> Image.Image:
 
 
 def _pixel(dx: float, dy: float) -> tuple[float, float]:
-    """Return the place in the picture of a point (dx, dy) [m] beside the robot."""
+    """Return the pixel of a point (dx, dy) [m] relative to the robot."""
     middle = SIDE * _SMOOTH / 2.0
     return middle + dx * _METRE, middle - dy * _METRE
 

@@ -1,4 +1,4 @@
-"""How far a trip through waypoints is, and how long the rest will take."""
+"""The progress of a trip through waypoints, and an estimate of the remaining time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from missions.tour.tour_file import Stop
     from smachpy.states import Pose2D
 
-_GUESS: Final = (3.0, 5.0)  # [m, s] the pace to begin with; after some metres it counts no more
+# [m, s] The pace before anything was measured. It is added to the measured totals, so that it
+# dominates the first leg and is negligible after some metres.
+_GUESS: Final = (3.0, 5.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +27,8 @@ class Trip:
 
     Attributes:
         waypoints: The list.
-        loop: How often; 0: without an end.
-        first: Index of the waypoint that it begins with.
+        loop: The number of rounds; 0: without end.
+        first: Index of the waypoint to begin with.
     """
 
     waypoints: tuple[Stop, ...]
@@ -35,7 +37,7 @@ class Trip:
 
     @property
     def total(self) -> int | None:
-        """How many visits there are; None: no end."""
+        """The number of visits; None: no end."""
         return len(self.waypoints) * self.loop or None
 
     def waypoint(self, number: int) -> Stop:
@@ -43,7 +45,7 @@ class Trip:
         return self.waypoints[(self.first + number) % len(self.waypoints)]
 
     def begun_at(self, first: int) -> Trip:
-        """Return the trip that begins with another waypoint."""
+        """Return the same trip with another first waypoint."""
         return dataclasses.replace(self, first=first)
 
     def nearest(self, here: Pose2D) -> int:
@@ -53,11 +55,11 @@ class Trip:
 
 
 class TripWatch:
-    """Estimates how long a trip will take, from how long its legs took so far.
+    """Estimates the remaining time of a trip from the pace so far.
 
-    Legs are measured in a straight line: ways around walls make the pace slower.
+    Legs are measured as straight lines: detours around walls make the pace slower.
 
-    Threads: all methods belong to the thread that runs the mission.
+    Threads: all methods are called in the thread that runs the mission.
     """
 
     def __init__(self) -> None:
@@ -68,7 +70,7 @@ class TripWatch:
         self._share = 0.0
 
     def end_leg(self, *, arrived: bool) -> None:
-        """A drive has ended; one that arrived counts for the pace."""
+        """Note the end of a drive; only one that arrived counts for the pace."""
         leg, self._leg = self._leg, None
         if arrived and leg is not None:
             metres, since = leg
@@ -76,14 +78,14 @@ class TripWatch:
             self._seconds += self._clock.now() - since
 
     def set_out(self, trip: Trip, number: int) -> Progress:
-        """Describe the trip when visit `number` (from 0) is next."""
+        """Return the progress before the drive to visit `number` (from 0)."""
         total, name = trip.total, trip.waypoint(number).name
         if total is None:
             return Progress(None, None, f"{number + 1} {name}")
         return Progress(self._forwards(number / total), None, f"{number + 1}/{total} {name}")
 
     def look(self, trip: Trip, number: int, here: Pose2D) -> Progress:
-        """Describe it while the robot, now at `here`, drives there."""
+        """Return the progress while the robot, now at `here`, drives there."""
         progress, now = self.set_out(trip, number), self._clock.now()
         metres = here.distance(trip.waypoint(number).pose)
         if self._leg is None:
@@ -98,7 +100,7 @@ class TripWatch:
         return Progress(self._forwards(share), float(round(left)), progress.text)
 
     def _forwards(self, share: float) -> float:
-        """Return the share for a bar that never goes back, in hundredths."""
+        """Return the share in hundredths, for a bar that never goes back."""
         self._share = max(self._share, round(share, 2))
         return self._share
 

@@ -1,4 +1,4 @@
-"""A file that says how far a mission got, so that it can go on after the program has ended."""
+"""A file with a mission's progress, so that it can continue after the program has ended."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ResumeFile:
-    """Keeps a dict of JSON values for one task.
+    """Stores a dict of JSON values for one task.
 
-    The file is replaced as a whole: whatever ends the program, it holds the old or the new values.
+    The file is replaced as a whole: after a crash it holds the old or the new values.
 
     Attributes:
         path: The file.
-        task: Names what the values belong to; values of another task are refused.
-        like: Values of the keys and types that are kept.
+        task: Identifies the task; the file of another task is refused.
+        like: Values with the expected keys and types.
     """
 
     path: Path
@@ -32,7 +32,7 @@ class ResumeFile:
     like: Mapping[str, object]
 
     def load(self) -> dict[str, Any] | None:
-        """Return what was saved last; None when there is nothing.
+        """Return the saved values; None if there is no file.
 
         Raises:
             MissionError: the file cannot be read, or belongs to another task.
@@ -56,7 +56,7 @@ class ResumeFile:
         return data
 
     def save(self, values: Mapping[str, object]) -> None:
-        """Replace what was saved.
+        """Replace the saved values.
 
         Raises:
             MissionError: the file cannot be written.
@@ -69,7 +69,7 @@ class ResumeFile:
             raise MissionError(f"{self.path}: got '{why}'; expected a writable file.") from error
 
     def forget(self) -> None:
-        """Remove the file; nothing happens when it is not there."""
+        """Delete the file, if it exists."""
         self.path.unlink(missing_ok=True)
 
     def _types(self) -> dict[str, type]:
@@ -78,10 +78,10 @@ class ResumeFile:
     def _unusable(self, got: str) -> MissionError:
         return MissionError(
             f"{self.path}: got {got}; expected what this mission wrote when it was interrupted. "
-            "Try deleting the file, which begins anew."
+            "Try deleting the file to start from the beginning."
         )
 
 
 def fingerprint(*parts: object) -> str:
-    """Return a short text that is another one when any of `parts` is another."""
+    """Return a short hash of `parts`, which changes with any of them."""
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]

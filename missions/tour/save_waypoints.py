@@ -1,9 +1,9 @@
-"""Save waypoints by driving: press Enter wherever the robot should come back to.
+"""Save waypoints while driving: press Enter wherever the robot should come back to.
 
     python -m missions.tour.save_waypoints my_waypoints.yaml
 
-Drive the robot by `cmd_vel` (or by hand, or by goals) meanwhile. Enter saves where it is now; what
-was typed before is the name. A text on the topic `save_waypoint` does the same from elsewhere.
+Drive the robot by `cmd_vel` (or by hand, or with goals). Enter saves its current pose; text typed
+before Enter is the name. A text on the topic `save_waypoint` does the same from another program.
 """
 
 from __future__ import annotations
@@ -37,33 +37,34 @@ if TYPE_CHECKING:
     from smachpy.states import Pose2D
 
 TOPIC: Final = "save_waypoint"
-FIRST_POSE: Final = 5.0  # [s] a robot that is there says within this where it is
+FIRST_POSE: Final = 5.0  # [s] to receive the first odometry message
 _FORMATS: Final = (".yaml", ".yml", ".csv")
+# Names that need no quotes in a CSV file.
 _PLAIN: Final = re.compile(r"[\w()/.:-]([\w()/.: -]*[\w()/.:-])?", re.ASCII)
 
 
 class WaypointSaver:
-    """Writes down where a robot is, when told to.
+    """Appends the robot's current pose to a waypoint file on request.
 
     The file is complete after each waypoint: it is replaced as a whole.
 
     Args:
-        path: The file to write: YAML or CSV, by its name.
-        node: Where the robot is.
-        told: Called with a line about each waypoint, and about each that could not be saved.
-        map_file: Named in a YAML file, so that missions check the waypoints against it.
+        path: The file to write; its suffix selects YAML or CSV.
+        node: The node in the robot's namespace.
+        report: Called with one line per waypoint that was saved, or could not be.
+        map_file: Written to a YAML file, so that missions check the waypoints against this map.
 
     Raises:
-        MissionError: the file is there already, or its name says nothing about its form.
+        MissionError: the file exists already, or its suffix is unknown.
 
-    Threads: `save` may be called from any thread; `told` is called from the caller's.
+    Threads: `save` may be called from any thread; `report` is called in the thread of `save`.
     """
 
     def __init__(
         self,
         path: Path,
         node: Node,
-        told: Callable[[str], object],
+        report: Callable[[str], object],
         map_file: Path | None = None,
     ) -> None:
         if path.suffix.lower() not in _FORMATS:
@@ -72,7 +73,7 @@ class WaypointSaver:
             raise MissionError(f"{path}: got a file that exists; expected the name of a new one.")
         self.waypoints: list[Waypoint] = []
         self._path = path
-        self._told = told
+        self._report = report
         self._map_file = map_file
         self._lock = threading.Lock()
         self._here: Pose2D | None = None
@@ -83,10 +84,10 @@ class WaypointSaver:
         )
 
     def wait_for_robot(self) -> None:
-        """Wait until the robot has said where it is.
+        """Wait for the robot's first pose.
 
         Raises:
-            WaitTimeoutError: it did not within 5 s.
+            WaitTimeoutError: none came within 5 s.
 
         Blocks: until then.
         """
@@ -97,10 +98,10 @@ class WaypointSaver:
             )
 
     def save(self, name: str = "") -> None:
-        """Save where the robot is now; without a name it gets a number."""
+        """Save the current pose; without a name it gets a number."""
         with self._lock:
             if self._here is None:
-                self._told("not saved: the robot has not said yet where it is")
+                self._report("not saved: no odometry has arrived yet")
                 return
             number = len(self.waypoints) + 1
             waypoint = Waypoint(name.strip() or f"waypoint {number}", self._here)
@@ -108,11 +109,11 @@ class WaypointSaver:
             try:
                 write_atomically(self._path, waypoints_text(self._path, rows, self._map_file))
             except OSError as error:
-                self._told(f"not saved: {self._path}: {error.strerror or error}")
+                self._report(f"not saved: {self._path}: {error.strerror or error}")
                 return
             self.waypoints = rows
             x, y, yaw = waypoint.pose
-            self._told(f"{number} {waypoint.name}: x {x:.2f} m, y {y:.2f} m, yaw {yaw:.2f} rad")
+            self._report(f"{number} {waypoint.name}: x {x:.2f} m, y {y:.2f} m, yaw {yaw:.2f} rad")
 
     def close(self) -> None:
         """Leave the network."""
@@ -125,7 +126,7 @@ class WaypointSaver:
 
 
 def waypoints_text(path: Path, waypoints: Sequence[Waypoint], map_file: Path | None) -> str:
-    """Return the text of a waypoint file, in the form that its name says."""
+    """Return the text of a waypoint file, as CSV or YAML depending on the path's suffix."""
     rows = [(w.name, *(f"{value:.3f}" for value in w.pose)) for w in waypoints]
     if path.suffix.lower() == ".csv":
         return "".join(f"{','.join(row)}\n" for row in [("name", "x", "y", "yaw"), *_cells(rows)])
@@ -138,7 +139,7 @@ def waypoints_text(path: Path, waypoints: Sequence[Waypoint], map_file: Path | N
 
 
 def _cells(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Return the rows of a CSV file, with quotes around names that would not be read back."""
+    """Return the rows of a CSV file; names with special characters are quoted."""
     return [
         (name if _PLAIN.fullmatch(name) else '"' + name.replace('"', '""') + '"', *numbers)
         for name, *numbers in rows
@@ -146,7 +147,7 @@ def _cells(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as YAML, on one line."""
+    """Return a text as a YAML scalar on one line."""
     if text.isprintable():
         return "'" + text.replace("'", "''") + "'"
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
@@ -157,7 +158,9 @@ def _quoted(text: str) -> str:
 def _read_lines(saver: WaypointSaver, end: Callable[[], object]) -> None:
     """Save a waypoint for each line typed; the end of the input ends the program."""
     rest = b""
-    while piece := os.read(sys.stdin.fileno(), 4096):  # not through the buffer, which has a lock
+    # os.read, not sys.stdin: at exit, the interpreter would wait for the lock of the buffer that a
+    # blocked readline holds.
+    while piece := os.read(sys.stdin.fileno(), 4096):
         *lines, rest = (rest + piece).split(b"\n")
         for line in lines:
             saver.save(line.decode(errors="replace"))

@@ -1,4 +1,4 @@
-"""What can be done at a waypoint: a photo, a turn, waiting for a service."""
+"""The tasks at a waypoint: a photo, a turn, waiting for a service."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from missions.tour.tour_file import Stop, Task
     from smachpy.sim.occupancy import OccupancyMap
 
-SERVICE_TIMEOUT = 60.0  # [s] for a service at a waypoint to appear and to answer
+SERVICE_TIMEOUT = 60.0  # [s] to find a waypoint's service and get its answer
 
 
 def choose_task(userdata: UserData) -> str:
-    """Name the state that does the waypoint's task."""
+    """Return the label of the state for the waypoint's task, as an outcome."""
     return task_label(userdata.waypoint.task)
 
 
 def task_label(task: Task | None) -> str:
-    """Return the label of the state that does a task: 'PHOTO', 'TURN', 'WAIT_FOR_LOADED'."""
+    """Return the label of a task's state: 'PHOTO', 'TURN', 'WAIT_FOR_LOADED'."""
     if task is None:
         return "nothing"
     service = re.sub(r"\W", "_", task.service)
@@ -40,7 +40,7 @@ def task_label(task: Task | None) -> str:
 def task_states(
     waypoints: Iterable[Stop], photos: Path, grid: OccupancyMap | None
 ) -> dict[str, State]:
-    """Return the states for all the tasks at some waypoints, by label."""
+    """Return one state for each different task of the waypoints, by label."""
     states: dict[str, State] = {}
     for waypoint in waypoints:
         task, label = waypoint.task, task_label(waypoint.task)
@@ -101,7 +101,7 @@ def turn() -> SimpleActionState:
 
 
 def wait_for_service(service: str) -> ServiceState:
-    """Wait until a service is there, and until it says that all is well."""
+    """Call a service at the waypoint; succeed if its answer says success."""
 
     def verdict(_userdata: UserData, response: TriggerResponse) -> str:
         return "succeeded" if response.success else "aborted"

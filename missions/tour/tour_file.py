@@ -1,4 +1,4 @@
-"""The waypoints of a tour, with what to do at each: read from YAML or CSV."""
+"""Reads the waypoints of a tour and their tasks from YAML or CSV."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _TURN: Final = Limits(low=-180.0, high=180.0)
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What to do at a waypoint.
+    """A task at a waypoint.
 
     Attributes:
         kind: One of `TASKS`.
-        angle: By how much to turn [deg], anticlockwise.
-        service: The service to wait for.
+        angle: Angle of the task 'turn' [deg], anticlockwise.
+        service: Name of the service for the task 'wait_for_service'.
     """
 
     kind: str
@@ -38,11 +38,11 @@ class Task:
 @register_type
 @dataclass(frozen=True, slots=True)
 class Stop(Waypoint):
-    """A waypoint with what to do there.
+    """A waypoint with a task.
 
     Attributes:
         dwell: How long to stay there [s].
-        task: What to do there after that.
+        task: The task after that, if any.
     """
 
     dwell: float = 0.0
@@ -54,8 +54,8 @@ class Tour:
     """A list of stops.
 
     Attributes:
-        waypoints: Where to go, in this order.
-        map: The floor, if the file names one.
+        waypoints: The stops, in this order.
+        map: The map, if the file names one.
     """
 
     waypoints: tuple[Stop, ...]
@@ -67,10 +67,10 @@ def load_tour(path: Path, map_file: Path | None = None) -> Tour:
 
     Args:
         path: The file.
-        map_file: The floor to check the waypoints against when the file has no field `map`.
+        map_file: The map to check the waypoints against if the file has no field `map`.
 
     Raises:
-        InputFileError: with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
     """
     file = PlaceFile(path, map_file, csv_rows="waypoints", csv_texts=("name", "task", "service"))
     rows = file.top.rows("waypoints")
@@ -89,6 +89,7 @@ def _stop(file: PlaceFile, row: Section, default_name: str) -> Stop:
 def _task(row: Section) -> Task | None:
     angle = row.number("angle", 90.0, _TURN, "deg")
     service = network_name(row, "service")
+    # A task that could not be read has its own problem: do not add one about its angle or service.
     found = row.problem_count
     kind = row.text("task", TASKS[0], TASKS)
     if row.problem_count > found:

@@ -1,15 +1,15 @@
-"""Waypoints: follow a list from a file, with something to do at each; skip, loop, resume.
+"""Waypoints: visit the waypoints of a file, with a task at each; skip, loop, resume.
 
     WAYPOINTS
-      BEGIN         at the first waypoint, or at the one that was interrupted
-      LOCATE        with start=nearest: where is the robot?
-      NEAREST       and begins there
-      NEXT          takes the next waypoint, until all are behind
-      DRIVE         there; tries a few times
+      BEGIN         starts at the first waypoint, or where the last run was interrupted
+      LOCATE        with start=nearest: gets the robot's pose
+      NEAREST       and starts at the nearest waypoint
+      NEXT          takes the next waypoint, until none is left
+      DRIVE         drives there, with several attempts
       DWELL         stays there for a while
-      CHOOSE        the waypoint's task: PHOTO, TURN, or a state for each service to wait for
-      TICK_OFF      it is done
-      SKIP          it cannot be reached, or its task failed: goes on with the next
+      CHOOSE        picks the task: PHOTO, TURN, or a state for each service to wait for
+      TICK_OFF      counts the waypoint as done
+      SKIP          it was not reached, or its task failed: continues with the next one
 
 Run it: `smachpy run waypoints --start-robot`
 """
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseFeedback
     from smachpy import SimpleActionState
 
-BETWEEN_TRIES = 2.0  # [s] it doubles each time
-# How far the mission got, in userdata and in the file: the index of the waypoint it began with,
-# visits that are behind it, names of those that were skipped, how many of them in a row.
+BETWEEN_TRIES = 2.0  # [s] first pause between attempts; it doubles each time
+# The mission's progress, in userdata and in the resume file: the index of the first waypoint, the
+# number of finished visits, the names of skipped waypoints, and how many in a row were skipped.
 BEGINNING = {"first": 0, "done": 0, "skipped": [], "in_vain": 0}
 
 
@@ -48,20 +48,20 @@ def waypoints(
     photos: str | Path = "photos",
     floor: str | Path | None = None,
 ) -> StateMachine:
-    """Follow the waypoints of a file; at each, do what the file says.
+    """Visit the waypoints of a file and run the task at each.
 
     Args:
         file: The list, YAML or CSV.
-        loop: How often to follow it; 0: until the mission is stopped.
-        tries: How often to try to get to a waypoint.
-        on_failure: After that, go on with the next waypoint, or stop.
-        start: Begin at the first waypoint, or at the nearest and come to the first after the last.
-        resume: Keep in this file how far it got, and go on from there the next time.
+        loop: How often to visit all of them; 0: until the mission is stopped.
+        tries: Attempts to reach a waypoint.
+        on_failure: After that: continue with the next waypoint, or stop.
+        start: Start at the first waypoint, or at the nearest one (and visit those before it last).
+        resume: Store the progress in this file, and continue from it in the next run.
         photos: The folder for photos.
-        floor: The map to check the waypoints against when the file names none.
+        floor: The map to check the waypoints against if the file names none.
 
     Raises:
-        InputFileError: the file is wrong; with the line and field of every problem.
+        InputFileError: the file has problems; each is listed with its line and field.
         MissionError: `loop` or `tries` is too small, or `resume` belongs to another list.
     """
     for name, value, least in (("loop", loop, 0), ("tries", tries, 1)):
@@ -123,11 +123,11 @@ def waypoints(
 
 
 class Guide:
-    """Knows the trip, and keeps how far it got.
+    """Follows the trip and stores the progress.
 
     Args:
-        trip: Where to go.
-        kept: The file to keep it in, if any.
+        trip: The waypoints to visit.
+        kept: The file for the progress, if any.
 
     Raises:
         MissionError: the file belongs to another trip.
@@ -138,22 +138,22 @@ class Guide:
         self.kept = kept
         self.watch = TripWatch()
         if kept is not None:
-            kept.load()  # refused now, before anything moves
+            kept.load()  # a file of another trip is refused here, before the robot moves
 
     def begin(self, userdata: UserData) -> str:
-        """Set out, or go on."""
+        """Start at the beginning, or continue from the stored progress."""
         self.watch = TripWatch()
         saved = None if self.kept is None else self.kept.load()
         userdata.update({**(saved or BEGINNING), "in_vain": 0})
         return "again" if saved else "anew"
 
     def begin_at_nearest(self, userdata: UserData) -> str:
-        """Begin with the waypoint that is nearest."""
+        """Start with the nearest waypoint."""
         userdata.first = self.trip.nearest(userdata.here)
         return "done"
 
     def take_next(self, userdata: UserData) -> str:
-        """Take the next waypoint, if there is one."""
+        """Store the next waypoint in userdata, or return how the trip ended."""
         total = self.trip.total
         if userdata.done == total and self.kept is not None:
             self.kept.forget()
@@ -169,23 +169,23 @@ class Guide:
         return "drive"
 
     def show_progress(self, userdata: UserData, feedback: MoveBaseFeedback) -> None:
-        """Say how far the trip is, whenever that is something new."""
+        """Update the progress in userdata, if it has changed."""
         here = pose_of(feedback.base_position.pose)
         progress = self.watch.look(self.trip.begun_at(userdata.first), userdata.done, here)
         if progress != userdata.progress:
             userdata.progress = progress
 
     def note_pace(self, _userdata: UserData, status: int, _result: object) -> None:
-        """Remember how long a drive took that came to its end."""
+        """Add a finished drive to the measured pace."""
         self.watch.end_leg(arrived=status == GoalStatus.SUCCEEDED)
 
     def tick_off(self, userdata: UserData) -> str:
-        """The waypoint is done: the next one is due."""
+        """Count the waypoint as done."""
         userdata.in_vain = 0
         return self._go_on(userdata)
 
     def skip(self, userdata: UserData) -> str:
-        """The waypoint could not be done: the next one is due all the same."""
+        """Count the waypoint as skipped; the next one is due."""
         userdata.skipped = [*userdata.skipped, userdata.waypoint.name]
         userdata.in_vain += 1
         return self._go_on(userdata)
@@ -198,7 +198,7 @@ class Guide:
 
 
 def drive(guide: Guide, tries: int) -> SimpleActionState:
-    """Drive to the waypoint, trying several times."""
+    """Return the state that drives to the waypoint, with several attempts."""
     return drive_to(
         "waypoint",
         feedback_cb=guide.show_progress,

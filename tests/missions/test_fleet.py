@@ -420,7 +420,7 @@ def test_the_dock_of_a_robot_that_died_there_stays_taken(floor_of):
     floor.check()
     ((dock, robot),) = floor.dispatcher.docks.blocked.items()
     assert dock == "dock 0"
-    assert f"dock 0: somebody has to look, {robot} had it" in floor.machine.userdata.report
+    assert f"dock 0: needs to be checked, {robot} had it" in floor.machine.userdata.report
 
 
 def test_a_robot_that_cannot_charge_leaves_the_dock_and_its_duty(floor_of):

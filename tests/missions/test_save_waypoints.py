@@ -83,7 +83,7 @@ def test_without_a_robot_nothing_is_saved(mission, tmp_path, said):
     with pytest.raises(WaitTimeoutError, match="topic 'odom': got nothing within 5 s"):
         saver.wait_for_robot()
     saver.close()
-    assert said == ["not saved: the robot has not said yet where it is"]
+    assert said == ["not saved: no odometry has arrived yet"]
     assert not list(tmp_path.iterdir())
 
 
