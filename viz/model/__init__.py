@@ -1,1 +1,1 @@
-"""What is drawn, as plain data."""
+"""The data that pictures, terminal and page show, without any look."""

@@ -1,4 +1,4 @@
-"""From a machine's introspection record to the model of a picture."""
+"""Builds the model of a picture from a machine's introspection record."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from smachpy.introspection import NetTransitionRecord, StateRecord, TransitionRecord
 
 READABLE = 60
-"""Most states a picture shows when nobody asks for a depth."""
+"""The most states that a picture shows if no depth is given."""
 
 
 class UnknownPathError(SmachError):
     """No state has this path.
 
     Attributes:
-        path: What was asked for.
+        path: The path that was asked for.
     """
 
     def __init__(self, path: str, paths: Sequence[str]) -> None:
@@ -62,13 +62,13 @@ def readable_depth(record: StateRecord, most: int = READABLE) -> int:
 
 
 def extract(record: StateRecord, *, depth: int | None = None, show_implicit: bool = False) -> Node:
-    """Return what a picture of `record` shows.
+    """Return the model of a picture of `record`.
 
     Args:
         record: The machine, or any part of it.
         depth: Number of container levels to open; None opens as many as stay readable.
-        show_implicit: Draw the transitions nobody wrote down as well. Without it only those of
-            an ordinary end are drawn, not those of failure and preemption.
+        show_implicit: Also draw transitions that nobody wrote down. Otherwise only those of
+                successful outcomes are drawn: those of failure and preemption would hide the rest.
     """
     levels = readable_depth(record) if depth is None else depth
     return _node(record, levels, frozenset(record.outcomes), show_implicit=show_implicit)
@@ -109,7 +109,11 @@ def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_impli
 
 
 def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
-    """Return a plan as its net: an exec place is the box of its action, or a copy of that."""
+    """Return a plan as its net. An exec place is drawn as the box of its action.
+
+    An action with several exec places is drawn at each of them: the first box is the action
+    itself, the others are closed copies with its name as caption.
+    """
     net = record.net
     assert net is not None
     made = {
@@ -136,7 +140,7 @@ def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
             nodes.append(
                 Node(path, label, kind, details=details, caption=place.name, tokens=place.tokens)
             )
-    nodes += made.values()  # actions without a place
+    nodes += made.values()  # actions that no place runs
     arrows: list[tuple[str, str, str]] = []
     for transition in net.transitions:
         label = _free(transition.id, taken)
@@ -144,7 +148,7 @@ def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
         shown = transition.name or transition.id
         nodes.append(Node(f"{record.path}/{label}", label, TRANSITION, caption=shown))
         inward = [_weight(weight) for _, weight in transition.inputs]
-        if inward:  # what is written beside the transition stands at its first arrow
+        if inward:  # the transition's text is the label of its first incoming arrow
             inward[0] = " ".join(text for text in (caption, inward[0]) if text)
         into = zip(transition.inputs, inward, strict=True)
         arrows += [(names[place], label, text) for (place, _), text in into]
@@ -170,7 +174,7 @@ def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """Return `name`, with signs behind it if a state or another node has it already."""
+    """Return `name`, with primes appended while another node has that name already."""
     while name in taken:
         name += "\u2032"
     taken.add(name)
@@ -182,7 +186,7 @@ def _weight(weight: int) -> str:
 
 
 def _transition_caption(transition: NetTransitionRecord) -> str:
-    """Return what is written beside a transition: what it does but start and end, its guard."""
+    """Return a transition's text: its calls except start and end, and its guard."""
     words = [] if transition.calls else [transition.name.partition("[")[0].strip()]
     words += [what for _, what in transition.calls if what not in {"start", "end"}]
     guard = f"[{transition.guard}]" if transition.guard else ""
@@ -192,7 +196,11 @@ def _transition_caption(transition: NetTransitionRecord) -> str:
 def _checked(
     transition: TransitionRecord, record: StateRecord, labels: Collection[str]
 ) -> TransitionRecord:
-    """The same transition, leading to a state when it names an outcome that does not exist."""
+    """Return the transition with `target_is_outcome` corrected.
+
+    A target that is neither a state nor an outcome counts as a missing state, so that an
+    inconsistent machine can be drawn.
+    """
     is_outcome = transition.target in record.outcomes and (
         transition.target_is_outcome or transition.target not in labels
     )
@@ -202,7 +210,7 @@ def _checked(
 def _missing(
     record: StateRecord, edges: Iterable[Edge], labels: Collection[str]
 ) -> tuple[Node, ...]:
-    """States that an inconsistent machine speaks of and does not have."""
+    """Return nodes for the states that are targets but do not exist."""
     targets = [edge.target for edge in edges if not edge.to_outcome]
     names = dict.fromkeys(name for name in (*record.initial, *targets) if name not in labels)
     return tuple(Node(f"{record.path}/{name}", name, MISSING) for name in names)
@@ -222,14 +230,14 @@ def _closed(record: StateRecord) -> Node:
 
 
 def _is_drawn(transition: TransitionRecord) -> bool:
-    """Whether a transition is drawn when those that nobody wrote down are not asked for."""
+    """Return whether a transition is drawn without `show_implicit`."""
     if not transition.implicit:
         return True
     return is_good(transition.outcome)
 
 
 def _edges(record: StateRecord, transitions: Iterable[TransitionRecord]) -> tuple[Edge, ...]:
-    """One edge for all outcomes of a state that lead to the same place."""
+    """Return the edges: outcomes of one state with one target share an edge."""
     merged: dict[tuple[str, str, bool, bool], list[str]] = {}
     for t in transitions:
         key = (t.source, t.target, t.target_is_outcome, t.implicit)
@@ -245,7 +253,11 @@ def _edges(record: StateRecord, transitions: Iterable[TransitionRecord]) -> tupl
 def _backward(
     order: Iterable[str], arrows: Sequence[tuple[str, str]]
 ) -> frozenset[tuple[str, str]]:
-    """Arrows that close a loop when one reads from the first of `order`, then from the next."""
+    """Return the arrows that close a loop, in the reading order that `order` starts.
+
+    A depth-first search, with a stack of its own: a machine with 1,000 states in a row would
+    exceed Python's recursion limit.
+    """
     following: dict[str, list[str]] = {}
     for tail, head in arrows:
         following.setdefault(tail, []).append(head)
@@ -254,7 +266,9 @@ def _backward(
     for start in order:
         if start in done:
             continue
-        trail = {start}
+        trail = {
+            start
+        }  # the states on the way from `start` to `here`: an arrow to one of them is back
         stack = [(start, iter(following.get(start, ())))]
         while stack:
             here, ahead = stack[-1]
@@ -274,7 +288,7 @@ def _backward(
 def _outcomes_used(
     record: StateRecord, shown: Iterable[TransitionRecord]
 ) -> dict[str, frozenset[str]]:
-    """By child, the outcomes from which an arrow starts."""
+    """Return, by child, the outcomes at which an arrow starts."""
     pairs = [(t.source, t.outcome) for t in shown]
     pairs += [pair for rule in record.rules for pair in rule.conditions]
     uses: dict[str, set[str]] = {}
@@ -284,6 +298,8 @@ def _outcomes_used(
 
 
 def _pills(record: StateRecord, edges: Sequence[Edge], wired: frozenset[str]) -> tuple[Pill, ...]:
+    # An outcome at which an arrow ends or starts gets a pill; one that only implicit transitions
+    # lead to is drawn dashed.
     written = Counter(edge.target for edge in edges if edge.to_outcome and not edge.implicit)
     written.update(rule.outcome for rule in record.rules)
     drawn = {edge.target for edge in edges if edge.to_outcome}

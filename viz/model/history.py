@@ -1,7 +1,7 @@
-"""What a run did, for pictures, the terminal and tables: a view of a `RunState`.
+"""The history of a run, for pictures, the terminal and tables: a view of a `RunState`.
 
-It keeps counts and the newest facts, never the events, so a mission that runs for a month needs no
-more memory than one that runs for a minute.
+It keeps counts and the newest values, never the events, so its size depends on the machine and not
+on the length of the run.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class Goal:
 
     Attributes:
         since: When it was sent, on the machine's clock [s].
-        feedback: The newest one, as the server sent it.
-        first_feedback: The first one, from which progress is measured.
+        feedback: The newest feedback, as the server sent it.
+        first_feedback: The first feedback; progress is measured from it.
     """
 
     path: str
@@ -41,14 +41,14 @@ class Goal:
 
 @dataclass(slots=True)
 class Visits:
-    """Everything about the visits of one state.
+    """The visits of one state.
 
     Attributes:
-        count: Times entered.
-        since: When it was entered, None while it is not active [s].
-        seconds: Time spent inside in finished visits [s].
-        outcome: How the last finished visit ended; None before.
-        outcomes: Times each outcome ended it.
+        count: Number of visits.
+        since: When it was entered; None while it is not active [s].
+        seconds: Total duration of the finished visits [s].
+        outcome: Outcome of the last finished visit; None before.
+        outcomes: How often each outcome ended a visit.
     """
 
     count: int = 0
@@ -59,12 +59,12 @@ class Visits:
 
 
 class History:
-    """A listener that remembers what a picture or a table of the run needs.
+    """A listener that keeps what a picture or a table of the run needs.
 
-    Give `on_event` to `machine.subscribe`.
+    Pass `on_event` to `machine.subscribe`.
 
-    Threads: `on_event` may be called from any thread; it takes microseconds and never waits for
-    anything but another such call.
+    Threads: `on_event` may be called from any thread; it takes microseconds and waits only for
+    another call of it.
     """
 
     def __init__(self) -> None:
@@ -73,12 +73,13 @@ class History:
         self._seconds: float | None = None
 
     def on_event(self, event: Event) -> None:
-        """Take one event in."""
+        """Process one event."""
         if type(event) not in _EVENT_TYPES:
             return
         record: dict[str, Any] = dict(zip(event._fields, event, strict=True))
-        # The machine's clock in place of the date: a date that is set changes no duration.
-        # What went before the process that goes on is not on its clock, nor known here.
+        # The machine's clock instead of the event's date: a computer whose date is set changes no
+        # duration. After a recovery, what the earlier process did is not on this clock: a Recovered
+        # event counts as a start.
         kind = Started if type(event) is Recovered else type(event)
         record["kind"], record["stamp_ns"] = kind.__name__, round(event.t * 1e9)
         with self._lock:
@@ -87,7 +88,7 @@ class History:
                 self._seconds = (record["stamp_ns"] - self._state.data["started"]) / 1e9
 
     def marks(self) -> Marks:
-        """Return what a picture marks."""
+        """Return the marks for a picture."""
         visits = self.visits()
         return Marks(
             active=frozenset(p for p, v in visits.items() if v.since is not None),
@@ -101,7 +102,7 @@ class History:
         with self._lock:
             return {
                 path: Visits(
-                    max(state["visits"], 1),  # at least one where the end alone was heard of
+                    max(state["visits"], 1),  # at least one, even if only its end was received
                     _seconds(state["since"]),
                     state["seconds"],
                     state["outcome"],
@@ -117,11 +118,11 @@ class History:
             return list(self._running_goals())
 
     def goal(self, goal_id: str) -> Goal | None:
-        """Return a copy of one running goal, None when it does not run."""
+        """Return a copy of a running goal; None if it is not running."""
         return next((goal for goal in self.goals() if goal.goal_id == goal_id), None)
 
     def written(self, most: int) -> list[tuple[str, Any]]:
-        """Return the userdata keys that were written last with their values, the newest first."""
+        """Return the most recently written userdata keys and values, newest first."""
         with self._lock:
             entries = list(self._state.data["userdata"].values())
         newest: dict[str, Any] = {}
@@ -134,14 +135,14 @@ class History:
         return {p: v.since for p, v in self.visits().items() if v.since is not None}
 
     def since(self, path: str) -> float | None:
-        """Return when the state was entered, None while it does not run [s]."""
+        """Return when the state was entered [s]; None while it is not active."""
         with self._lock:
             state = self._state.data["states"].get(path)
             return None if state is None else _seconds(state["since"])
 
     @property
     def started(self) -> float | None:
-        """When the newest run began [s on the machine's clock]."""
+        """When the newest run began, on the machine's clock [s]."""
         return _seconds(self._state.data["started"])
 
     @property
@@ -150,7 +151,11 @@ class History:
         return self._seconds
 
     def _running_goals(self) -> Iterator[Goal]:
-        """The goals without an end, but for those that outlived their state."""
+        """Yield the goals without an end whose state is still in the same visit.
+
+        A goal whose state has ended, or was entered again since, is over even if its own end was
+        not reported.
+        """
         states = self._state.data["states"]
         for goal_id, goal in self._state.data["goals"].items():
             state = states[goal["path"]]

@@ -1,4 +1,4 @@
-"""Names, glyphs and texts that the pictures and the terminal share."""
+"""Names, glyphs and texts for the pictures and the terminal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from smachpy.outcome_classes import OutcomeClass
 
 LABEL_LENGTH = 40
-# Glyphs that Liberation Sans and Arial have: no picture shows empty boxes for them.
+# Glyphs that both Liberation Sans and Arial have, so that no picture shows empty boxes.
 GLYPHS = {"action": "\u25ba", "service": "\u2194", "monitor": "\u25cf", "condition": "?"}
 KIND_WORDS = {
     "concurrence": "concurrent",
@@ -31,19 +31,19 @@ FINDINGS = frozenset({"invalid", "false", "no"})
 
 
 def end_class(kind: str, outcome: str) -> OutcomeClass:
-    """Return the class of a state's end: what a monitor finds, 'invalid' too, is no failure."""
+    """Return the class of a state's outcome; a monitor's finding, even 'invalid', is no failure."""
     if kind in WATCHING and outcome.lower() in FINDINGS:
         return "other"
     return outcome_class(outcome)
 
 
 def one_line(text: str) -> str:
-    """Return all of a text on one line, with a sign for every character that cannot be shown."""
+    """Return a text on one line; characters that cannot be printed become U+FFFD."""
     line = " ".join(text.split())
     return line if line.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in line)
 
 
 def shorten(text: str, length: int = LABEL_LENGTH) -> str:
-    """Return one line of at most `length` printable characters, whatever `text` holds."""
-    line = one_line(text[: 4 * length])
+    """Return `text` as one line of at most `length` printable characters."""
+    line = one_line(text[: 4 * length])  # cut first: a value's text may have megabytes
     return line if len(line) <= length else line[: length - 1] + "\u2026"

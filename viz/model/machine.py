@@ -1,6 +1,6 @@
-"""What a picture shows: the states of a machine as far as they are opened, and marks on them.
+"""The model of a picture: the states of a machine, as deep as they are opened, and marks on them.
 
-Everything here is frozen and knows nothing of colours, layouts or files.
+Everything here is frozen, and independent of colours, layouts and files.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
 MISSING = "missing"
-"""Kind of a state that a machine speaks of and does not have."""
+"""Kind of a state that is a target in a machine but does not exist."""
 
 PLACE, TRANSITION = "place", "transition"
-"""Kinds of what a plan's net has beside its actions; places with a role are "goal place", ..."""
+"""Kinds of the nodes of a plan's net; a place with a role has the kind "goal place", ..."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +27,10 @@ class Edge:
         target: Label of a child, or an outcome of the container.
         to_outcome: Whether `target` is an outcome.
         outcomes: The outcomes of `source` that lead there.
-        implicit: Nobody wrote these transitions down: an outcome of the same name took them.
+        implicit: Nobody wrote these transitions down; the outcome has the target's name.
         back: Points against the reading direction.
         change: `added` or `removed`, where two versions are compared.
-        note: Numbers, for its label.
+        note: Numbers for its label.
     """
 
     source: str
@@ -45,13 +45,13 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """How a container comes to an outcome when several children decide together.
+    """How several children of a container decide on its outcome together.
 
     Attributes:
         outcome: The container's outcome.
         conditions: Pairs (child label, child outcome).
         text: The rule in words.
-        change: As that of `Edge`.
+        change: As in `Edge`.
     """
 
     outcome: str
@@ -65,7 +65,7 @@ class Pill:
     """An outcome on the border of an open container.
 
     Attributes:
-        by_default: Only transitions that nobody wrote down lead to it.
+        by_default: Only implicit transitions lead to it.
     """
 
     outcome: str
@@ -81,13 +81,13 @@ class Node:
         kind: As in `smachpy.introspection.StateRecord`, or `MISSING`.
         details: Pairs (name, value) for the tooltip.
         hidden: Number of states inside that the picture does not show.
-        children: Empty for a plain state and for a closed container.
+        children: Empty for a leaf and for a closed container.
         initial: Labels of the children that start first.
-        pills: Outcomes drawn on the border of an open container.
+        pills: Outcomes on the border of an open container.
         change: `added`, `removed` or `changed`, where two versions are compared.
         note: Numbers, for a second line of its label.
-        caption: What is written in place of the label, which is an id then; of a net only.
-        tokens: Of a place.
+        caption: Shown instead of the label, which is only an id then; in nets.
+        tokens: Tokens of a place.
     """
 
     path: str
@@ -123,14 +123,14 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What a run left on a machine.
+    """The marks of a run on a machine.
 
     Attributes:
         active: Paths of the states that are running, containers included.
         visits: Times each state was entered, by path.
         last: Outcome with which each state was last left, by path.
         taken: Times each transition was taken, by (path of the state left, outcome).
-        runs: Number of recorded runs that were counted; 0: it is one run, and its end is shown.
+        runs: Number of recorded runs that were counted; 0 for a single run, whose end is shown.
         heat: How hot each state is, 0 to 1, by path.
         notes: Numbers for a second line of a state's label, by path.
     """
@@ -144,14 +144,14 @@ class Marks:
     notes: Mapping[str, str] = field(default_factory=dict)
 
     def share(self, path: str, outcomes: Sequence[str]) -> float | None:
-        """Return the share of a state's ends that were one of `outcomes`; None without ends."""
+        """Return how often a state ended with one of `outcomes`, 0 to 1; None if it never ended."""
         ends = {key: n for key, n in self.taken.items() if key[0] == path}
         total = sum(ends.values())
         return sum(ends.get((path, o), 0) for o in outcomes) / total if total else None
 
     @property
     def has_run(self) -> bool:
-        """Whether there is a history, so that untouched parts can stand back."""
+        """Whether there is a history, so that parts without visits are drawn faint."""
         return bool(self.visits)
 
 
@@ -163,8 +163,8 @@ class Diagram:
         root: The outermost state.
         marks: What to highlight.
         links: Address of the page of a container, by path, for linked pages.
-        legend: What the signs mean, as pairs (change or "", words); beside the title.
-        compared: Whether two versions are compared, so that what is the same stands back.
+        legend: The meaning of the signs, as pairs (change or "", words); shown beside the title.
+        compared: Whether two versions are compared; unchanged parts are drawn faint then.
     """
 
     root: Node

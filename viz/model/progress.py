@@ -1,7 +1,7 @@
-"""What a goal's feedback says about progress, for any action that has the usual fields.
+"""Reads a goal's progress from its feedback, for any action with the usual field names.
 
-Goals and feedback are the user's messages, or what a record holds of them, so nothing is required
-of them: what is not there or cannot be read is left out.
+Goals and feedback are user-defined messages, or records of them, so no field is required: missing
+or unreadable fields are skipped.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ COUNTS = ("remaining", "left", *TIMES)
 TEXTS = ("text", "message", "status", "state", "phase")
 TEXT_LENGTH = 60
 LEAST_FRACTION = 0.05
-"""Of a goal that is done, before its end can be estimated."""
+"""The remaining time is estimated only after this fraction: earlier it is too uncertain."""
 LEAST_SECONDS = 1.0
-"""Since it was sent, before its end can be estimated [s]."""
+"""The remaining time is estimated only this long after the goal was sent [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What can be shown of a running goal.
+    """The progress of a running goal.
 
     Attributes:
-        fraction: 0 to 1, None when it cannot be told.
-        distance: Way left [m], None when it cannot be told.
+        fraction: 0 to 1; None if unknown.
+        distance: Remaining distance [m]; None if unknown.
         text: The feedback in words; may be empty.
     """
 
@@ -45,8 +45,8 @@ def progress_of(goal: Any, feedback: Any, first: Any) -> Progress:
 
     Args:
         goal: The goal.
-        feedback: Its newest feedback, None before any has come.
-        first: Its first feedback, from which progress is measured.
+        feedback: Its newest feedback; None before the first one.
+        first: Its first feedback; progress is measured from it.
     """
     if feedback is None:
         return Progress()
@@ -55,11 +55,11 @@ def progress_of(goal: Any, feedback: Any, first: Any) -> Progress:
 
 
 def seconds_left(feedback: Any, fraction: float | None, passed: float) -> float | None:
-    """Return how long a running goal will still take [s]: as its server says, else estimated.
+    """Return the remaining time of a running goal [s]: from its server, or else estimated.
 
     Args:
         feedback: Its newest feedback.
-        fraction: How much of it is done, None when that cannot be told.
+        fraction: Its progress, 0 to 1; None if unknown.
         passed: Time since it was sent [s].
     """
     said = _first(feedback, TIMES)
@@ -72,11 +72,11 @@ def seconds_left(feedback: Any, fraction: float | None, passed: float) -> float 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A mission's own word about how far it is: a value that a state wrote to userdata.
+    """The progress that the mission itself reports: a value that a state wrote to userdata.
 
     Attributes:
-        fraction: 0 to 1, None when there is no end.
-        seconds_left: Until the end [s], None when it is not known.
+        fraction: 0 to 1; None if there is no end.
+        seconds_left: Remaining time [s]; None if unknown.
         text: Where it is.
     """
 
@@ -86,7 +86,7 @@ class Written:
 
 
 def written_progress(value: Any) -> Written | None:
-    """Read a value that has the attributes `fraction`, `seconds_left` and `text`; else None."""
+    """Return a value with the attributes `fraction`, `seconds_left` and `text`; else None."""
     text = _read(value, "text")
     if not (isinstance(text, str) and {"fraction", "seconds_left"} <= {*_names(value)}):
         return None
@@ -101,6 +101,7 @@ def _distance(goal: Any, feedback: Any) -> float | None:
     if said is not None:
         return said
     base, target = _read(feedback, "base_position"), _read(goal, "target_pose")
+    # No distance field: move_base's feedback has the robot's pose, so measure to the goal.
     here, there = _position(base), _position(target)
     if here is None or there is None or _frame(base) != _frame(target):
         return None
@@ -108,7 +109,7 @@ def _distance(goal: Any, feedback: Any) -> float | None:
 
 
 def _frame(stamped: Any) -> Any:
-    """The frame that a pose is given in; distances between two frames mean nothing."""
+    """Return the frame of a pose; a distance between two frames would be meaningless."""
     frame = _read(_read(stamped, "header"), "frame_id")
     return frame.removeprefix("/") if isinstance(frame, str) else frame
 
@@ -139,7 +140,7 @@ def _text(feedback: Any) -> str:
             return shorten(value, TEXT_LENGTH)
     values = {name: _read(feedback, name) for name in _names(feedback)}
     texts = [value for value in values.values() if isinstance(value, str)]
-    if len(texts) == 1 and " " in texts[0]:  # a phrase, which needs no name and says it all
+    if len(texts) == 1 and " " in texts[0]:  # a whole phrase needs no field names
         return shorten(texts[0], TEXT_LENGTH)
     words = [
         f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
@@ -163,7 +164,7 @@ def _first(message: Any, names: tuple[str, ...]) -> float | None:
 
 
 def _recorded(message: Any) -> dict[str, Any] | None:
-    """The fields of a message that came in a record (`smachpy.events.to_record`), else None."""
+    """Return the fields of a recorded message (`smachpy.events.to_record`); else None."""
     if not isinstance(message, dict):
         return None
     fields = message.get("fields") if "$msg" in message else message
@@ -176,16 +177,16 @@ def _read(message: Any, name: str) -> Any:
         return fields.get(name)
     try:
         return getattr(message, name, None)
-    except Exception:  # noqa: BLE001  a user's property may raise anything; then it is not there
+    except Exception:  # noqa: BLE001  a user's property may raise anything: the field is skipped
         return None
 
 
 def _number(value: Any) -> float | None:
-    """Seconds of a duration, or the number itself, if it is a finite one."""
+    """Return a number, or the seconds of a duration; None if it is not finite."""
     seconds = _read(value, "to_sec")
     if callable(seconds):
         value = seconds()
-    elif isinstance(value, dict):  # a duration in a record
+    elif isinstance(value, dict):  # a recorded duration
         secs, nsecs = value.get("secs"), value.get("nsecs")
         value = secs + nsecs / 1e9 if type(secs) is int and type(nsecs) is int else None
     if isinstance(value, bool) or not isinstance(value, (int, float)):

@@ -1,7 +1,7 @@
-"""Why a run ended so: the causes from the first one to the outcome, from its events alone.
+"""Explains how a run ended: the causes from the first one to the outcome, from its events alone.
 
-Pure: no files, no time, no network. A step is an end of a state or what caused one; each follows
-from the one before it.
+Pure: no files, no time, no network. A step is the end of a state or the cause of one; each step
+follows from the previous one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 ENDS = frozenset({"Left", "Failed", "Finished"})
 MOST_BEFORE = 10
-"""So many failed states that led to each other are told of one machine."""
+"""The longest chain of failed states that is shown for one machine."""
 
 MOST_WRITTEN = 8
 LONGEST = 300
@@ -29,18 +29,18 @@ LONGEST = 300
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One cause, which the next one follows from.
+    """One cause in the chain.
 
     Attributes:
         path: The state.
         stamp_ns: When [ns since the epoch].
         what: What happened, in words: "aborted", "goal to move_base: LOST".
-        kind: Class of the outcome it is or led to, as `smachpy.outcome_classes` has it.
-        reason: Why, or where it led to; may be "".
-        detail: More lines, such as those of a traceback; may be "".
-        written: What the state wrote on the way: key, value, and the value before, "" when there
-            was none; as texts.
-        outcome: The outcome, when the step is the end of a state; else "".
+        kind: Class of its outcome, or of the outcome it led to (`smachpy.outcome_classes`).
+        reason: Why, or what it led to; may be "".
+        detail: More lines, such as a traceback; may be "".
+        written: The userdata that the state wrote: key, value, and the value before ("" if there
+            was none), as texts.
+        outcome: The outcome, if the step is the end of a state; else "".
     """
 
     path: str
@@ -55,15 +55,15 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Why:
-    """The newest run of a machine, and why it ended so.
+    """The newest run of a machine, and the causes of its end.
 
     Attributes:
         label: Name of the machine.
-        outcome: How it ended; None: it has not, or its end is missing. "exception": its code
-            raised.
-        began: When [ns since the epoch]; None: never.
-        ended: When, or of the last event that is known.
-        steps: From the first cause to the outcome; what ran last when it has not ended.
+        outcome: The outcome; "exception" if its code raised; None if it has not ended or its end is
+            missing.
+        began: When [ns since the epoch]; None if it never ran.
+        ended: When, or the time of the last known event.
+        steps: From the first cause to the outcome; if it has not ended, the states that ran last.
     """
 
     label: str
@@ -77,7 +77,7 @@ class Why:
         return {**asdict(self), "text": self.text()}
 
     def text(self) -> str:
-        """Return it for people, a step a line."""
+        """Return it as text, one step per line."""
         if self.began is None or self.ended is None:
             return f"{self.label}: has not run"
         began = self.began
@@ -100,11 +100,11 @@ class Why:
 
 
 def why(record: StateRecord, events: Sequence[dict[str, Any]]) -> Why:
-    """Return why the newest run of a machine ended so.
+    """Return the causes of the end of a machine's newest run.
 
     Args:
         record: The machine.
-        events: Its events in order, as `smachpy.events.to_record` has them; the oldest may be
+        events: Its events in order, as `smachpy.events.to_record` makes them; the oldest may be
             missing.
     """
     run = newest_run(events, record.path)
@@ -123,8 +123,8 @@ def why(record: StateRecord, events: Sequence[dict[str, Any]]) -> Why:
 def newest_run(events: Sequence[dict[str, Any]], root: str) -> list[dict[str, Any]]:
     """Return the events of the newest run of the machine at `root`.
 
-    One that another process goes on with is one run: ends that the end of the first process gave
-    states which go on are left out.
+    A run that another process continued is one run. Ends that states got only because the first
+    process ended are left out if the second process continues those states.
     """
     begins = [i for i, event in enumerate(events) if _is(event, "Started", root)]
     run = list(events[begins[-1] :] if begins else events)
@@ -138,7 +138,7 @@ def newest_run(events: Sequence[dict[str, Any]], root: str) -> list[dict[str, An
 
 
 _PASSED: dict[str, Any] = {"kind": "", "path": "", "stamp_ns": 0}
-_NEVER = 2**64
+_NEVER = 2**64  # later than any stamp [ns]
 
 
 def _is(event: dict[str, Any], kind: str, path: str) -> bool:
@@ -146,7 +146,7 @@ def _is(event: dict[str, Any], kind: str, path: str) -> bool:
 
 
 class _Reader:
-    """Reads one run backwards."""
+    """Follows the causes of one run backwards."""
 
     def __init__(self, states: dict[str, StateRecord], run: list[dict[str, Any]]) -> None:
         self._states = states
@@ -154,7 +154,7 @@ class _Reader:
         self._run = run
 
     def causes(self, path: str, end: int) -> tuple[Step, ...]:
-        """The steps to the end of a state, which is event number `end`, and that end."""
+        """Return the steps that led to the end of a state (event number `end`), and that end."""
         begin = self._begin(path, end)
         outcome = self._outcome(end)
         state = self._states.get(path)
@@ -169,7 +169,7 @@ class _Reader:
         return (*self._children(state, begin, end, outcome), own)
 
     def running(self) -> tuple[Step, ...]:
-        """The innermost states that have not ended."""
+        """Return a step for each innermost state that has not ended."""
         active: dict[str, int] = {}
         for i, event in enumerate(self._run):
             if event["kind"] in {"Started", "Entered"}:
@@ -227,7 +227,7 @@ class _Reader:
         )
 
     def _request(self, at: int) -> tuple[Step, ...]:
-        """Who asked a state to stop: a sibling whose end did is followed further."""
+        """Return who asked a state to stop; if it was a sibling's end, the causes of that end."""
         event = self._run[at]
         by = event.get("by") or ""
         if event.get("source") == "concurrence" and by in self._states:
@@ -243,7 +243,7 @@ class _Reader:
         return (Step(event["path"], event["stamp_ns"], what, "preempted"),)
 
     def _own_cause(self, path: str, begin: int, end: int, outcome: str) -> Step | None:
-        """What in a visit of a state made it end so, that is not another state; the strongest."""
+        """Return the strongest cause within a visit, other than the end of another state."""
         found: dict[str, dict[str, Any]] = {}
         attempts = 1
         for event in self._run[begin : end + 1]:
@@ -262,7 +262,7 @@ class _Reader:
         return None
 
     def _children(self, state: StateRecord, begin: int, end: int, outcome: str) -> tuple[Step, ...]:
-        """The steps to the end of the child that decided, with failures that led to it."""
+        """Return the steps to the end of the child that decided, with the failures before it."""
         children = {child.path for child in state.children}
         ends = [
             i
@@ -276,9 +276,9 @@ class _Reader:
             decided = self._deciding(state, begin, end, ends, outcome)
             return self.causes(self._run[decided]["path"], decided)
         chain = [ends[-1]]
-        for i in reversed(
-            ends[:-1]
-        ):  # failures that were handled, and what handled them failed too
+        # Backwards while the states failed: a failure whose recovery failed too belongs to the
+        # causes. A good outcome ends the chain: everything before it had been recovered from.
+        for i in reversed(ends[:-1]):
             if is_good(self._outcome(i)) or len(chain) > MOST_BEFORE:
                 break
             chain.insert(0, i)
@@ -287,7 +287,11 @@ class _Reader:
     def _deciding(
         self, state: StateRecord, begin: int, end: int, ends: list[int], outcome: str
     ) -> int:
-        """The end of the child that ended a concurrence: the one that stopped the others."""
+        """Return the end of the child that decided a concurrence.
+
+        In this order: the one that preempted its siblings, the first failure if the concurrence
+        failed or fell back to its default, the last end.
+        """
         askers = [
             event["by"]
             for event in self._run[begin:end]
@@ -306,7 +310,7 @@ class _Reader:
         return ends[-1]
 
     def _led(self, path: str, end: int) -> str:
-        """Where the outcome of a state led to in its container, in words."""
+        """Return in words what the outcome of a state led to in its container."""
         parent = self._parents.get(path)
         state = self._states.get(path)
         if parent is None or state is None:
@@ -327,7 +331,8 @@ class _Reader:
         ended = next(
             (e for e in self._run[end:] if e["kind"] in ENDS and e["path"] == parent.path), {}
         )
-        is_other = ended.get("outcome") not in {None, parent.default_outcome}  # a callback decided
+        # Another outcome than the default means that a callback decided.
+        is_other = ended.get("outcome") not in {None, parent.default_outcome}
         return f"no rule of {parent.label} names it{'' if is_other else default}"
 
 
@@ -353,7 +358,7 @@ _CAUSES: dict[str, Any] = {
         "",
     ),
 }
-"""What an event says of why its state ended: (what, reason, more lines); the strongest first."""
+"""The causes that events tell, as (what, reason, more lines); the strongest first."""
 
 
 def _short(value: Any) -> str:

@@ -1,9 +1,9 @@
-"""A `dot` program made of the Graphviz library inside the pygraphviz wheel.
+"""A `dot` program that uses the Graphviz library in the pygraphviz wheel.
 
-Run as a process of its own (`python -m viz.pictures.bundled_dot -Tsvg file.gv`), never imported: a
-fault in the C library must not reach a robot. Understands what `graphviz_process` and the package
-`graphviz` pass: `-K`, `-T`, `-o`, `-G/-N/-E name=value`, `-V`, and input files or a stream of
-graphs on standard input, each ended by the line `// end of graph`.
+It runs as a process (`python -m viz.pictures.bundled_dot -Tsvg file.gv`) and is never imported: a
+crash of the C library must not end a robot's process. It accepts the options that
+`graphviz_process` and the package `graphviz` use: `-K`, `-T`, `-o`, `-G/-N/-E name=value`, `-V`,
+and input files, or a stream of graphs on standard input, each ended by the line `// end of graph`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ except ImportError as failure:  # its wheel needs glib and X11's libraries, whic
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-END = b"// end of graph"  # the END of graphviz_process, which this process does not import
+END = b"// end of graph"  # the same as in graphviz_process, which this process must not import
 
 
 def main(arguments: list[str]) -> int:
-    """Draw every input one after another; returns the exit code."""
+    """Draw all inputs, one after another; return the exit code."""
     options = _parser().parse_args(arguments)
     if options.version:
         sys.stderr.write(f"dot - graphviz version {pygraphviz.__graphviz_version__}\n")
@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _texts(files: list[Path]) -> Iterator[str]:
-    """Every file; without any, every graph on standard input as soon as it is complete."""
+    """Yield the text of each file; without files, each graph on standard input once complete."""
     if files:
         yield from (file.read_text(encoding="utf-8") for file in files)
         return
@@ -89,4 +89,5 @@ def _draw(text: str, options: argparse.Namespace) -> bytes:
 if __name__ == "__main__":
     code = main(sys.argv[1:])
     sys.stdout.flush()
-    os._exit(code)  # the library's clean-up at exit costs time and can fault
+    # Not sys.exit: the library's cleanup takes time and can crash after the picture is written.
+    os._exit(code)

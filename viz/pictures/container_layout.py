@@ -1,7 +1,7 @@
-"""One container as a page for `dot`, and what comes back.
+"""Writes one container as a DOT page, and reads the layout that `dot` returns.
 
-The containers inside are boxes of known size, with a port for their entry on the upper border and
-one per outcome on the lower one. Lengths are points (1/72 inch), y points up.
+Containers inside are boxes of known size, with a port for their entry on the upper border and one
+per outcome on the lower border. Lengths are points (1/72 inch), y points up.
 """
 
 from __future__ import annotations
@@ -29,22 +29,23 @@ DOT_RADIUS = 4
 PORT = 8
 INCH = 72.0
 DETOUR = 250.0
-"""How much longer arrows may be to avoid one crossing [points]."""
+"""One crossing counts as much as this much arrow length [points]."""
 LOOP = 9
-"""Distance between arrows that leave a container and come back into it [points]."""
+"""Distance between arrows that lead from a container back into it [points]."""
 LOOP_LABEL = 26
-"""Room for the label of such an arrow [points]."""
+"""Space for the label of such an arrow [points]."""
 CORNER = 6
 """Radius of its corners [points]."""
 LABEL = (16.0, 6.0)
 """Half the size of a usual arrow's label [points]."""
 FOLDS = (2, 3, 4, 6, 8, 12, 16)
-"""Into how many pieces a container may be folded."""
+"""The numbers of pieces into which a container may be folded."""
 MOST_UNFOLDED = 100
-"""With more states than these in one container it is always folded, which also saves minutes."""
+"""A container with more states is always folded: that is readable, and minutes faster."""
 
 
-# What a layout depends on; leaving the looks out halves the time it takes to write and read.
+# The attributes that a layout depends on. Without the others, writing and reading takes half the
+# time.
 _SIZES = frozenset(
     {"arrowsize", "fixedsize", "fontname", "fontsize", "height", "label", "margin", "peripheries"}
     | {"shape", "weight", "width"}
@@ -53,14 +54,14 @@ _SIZES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Try:
-    """A way to lay a container out; of several the one with the shortest arrows is kept.
+    """One way to lay out a container; of several, the one with the shortest arrows is used.
 
     Attributes:
-        side: Where arrows come back into a container inside, `e` or `w`.
-        corner: Whether arrows that lead back leave an outcome towards that side.
-        back_first: Whether arrows that lead back are placed before the others.
-        plain: Straight arrows without regard to sides, for what makes `dot` crash otherwise.
-        pieces: Columns to fold a chain into, or rows to put states without arrows between them in.
+        side: Where back arrows enter an inner container, `e` or `w`.
+        corner: Whether back arrows leave an outcome towards that side.
+        back_first: Whether back arrows are placed before the others.
+        plain: Straight arrows without sides, for containers that make `dot` crash otherwise.
+        pieces: Number of columns for a chain, or of rows for states without arrows between them.
     """
 
     side: str = "e"
@@ -75,8 +76,8 @@ class Page:
     """One container, laid out.
 
     Attributes:
-        width, height: Outer size with the dot and the pills that stand over the border.
-        dx, dy: From coordinates of the page to coordinates of the outer box.
+        width, height: Outer size, including the entry dot and the pills on the border.
+        dx, dy: Offset from the page's coordinates to those of the outer box.
         floor: Height of the lower border in the outer box.
         ports: Centre and width along x in the outer box, by part.
     """
@@ -93,7 +94,7 @@ class Page:
 
 
 def tries(box: Box) -> tuple[Try, ...]:
-    """Ways to lay a container out; they differ only for arrows that lead back."""
+    """Return the ways to lay out a container; they differ only in how they treat back arrows."""
     if len(box.boxes) > MOST_UNFOLDED:
         return folds(box)
     back = [arrow for arrow in box.arrows if arrow.back]
@@ -105,18 +106,18 @@ def tries(box: Box) -> tuple[Try, ...]:
 
 
 def folds(box: Box) -> tuple[Try, ...]:
-    """Ways to lay out a container that is too long or too wide otherwise."""
+    """Return the ways to fold a container that is too long or too wide otherwise."""
     states = len(box.boxes)
-    if states > MOST_UNFOLDED:  # every way takes seconds
+    if states > MOST_UNFOLDED:  # only one way: each takes seconds at this size
         return (Try(pieces=ceil(sqrt(states) / 2)),)
     return tuple(Try(pieces=pieces) for pieces in FOLDS if pieces <= min(states // 2, 16))
 
 
 def pieces_of(box: Box, pieces: int) -> dict[str, int]:
-    """Return the piece of each state when a container is folded.
+    """Return the piece of each state of a folded container.
 
-    A chain is cut by how far a state is from the first; states without arrows between them are
-    dealt out as they come.
+    The states of a chain are cut by their distance from the first; states without arrows between
+    them are distributed in their order.
     """
     names = [child.name for child in box.boxes]
     following: dict[str, list[str]] = {name: [] for name in names}
@@ -127,7 +128,7 @@ def pieces_of(box: Box, pieces: int) -> dict[str, int]:
             following[tail].append(head)
             missing[head] += 1
     order = [name for name in names if not missing[name]]
-    for name in order:  # it grows: a state comes after all that lead to it
+    for name in order:  # grows while it is read: a state follows once all its predecessors are in
         for after in following[name]:
             missing[after] -= 1
             if not missing[after]:
@@ -136,7 +137,7 @@ def pieces_of(box: Box, pieces: int) -> dict[str, int]:
 
 
 def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> str:
-    """Return a container as DOT text; `pages` has the containers inside, by `id`."""
+    """Return a container as DOT text; `pages` holds the inner containers by `id`."""
     dot = graphviz.Digraph(graph_attr={**style.graph(theme), "label": box.attributes["label"]})
     dot.attr("graph", labelloc="t", pad="0", splines="line" if how.plain else "true")
     dot.attr("node", **_sizes(style.node_defaults(theme)))
@@ -165,7 +166,7 @@ def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> st
 
 
 def _write_folds(dot: graphviz.Digraph, box: Box, piece: Mapping[str, int]) -> None:
-    """Invisible arrows: each column begins at the top, each row stands below the one before."""
+    """Write invisible arrows that put each column at the top, or each row below the last one."""
     assert box.entry is not None
     pieces: dict[int, list[str]] = {}
     for name, number in piece.items():
@@ -180,7 +181,7 @@ def _write_folds(dot: graphviz.Digraph, box: Box, piece: Mapping[str, int]) -> N
 
 
 def _block(child: Box, page: Page | None, room: tuple[int, int]) -> Mapping[str, str]:
-    """The node that stands for a child: itself, or a table of the size of its page and loops."""
+    """Return the node for a child: itself, or a table with the size of its page and loops."""
     if page is None:
         return _sizes(child.attributes)
     right, below = room
@@ -202,7 +203,7 @@ def _sizes(attributes: Mapping[str, str]) -> dict[str, str]:
 
 
 def _loops(box: Box, child: Box) -> list[Arrow]:
-    """Arrows that leave an open child by an outcome and come straight back into it."""
+    """Return the arrows from an outcome of an open child straight back into it."""
     if child.entry is None:
         return []
     return [
@@ -213,7 +214,7 @@ def _loops(box: Box, child: Box) -> list[Arrow]:
 
 
 def loop_room(box: Box, child: Box) -> tuple[int, int]:
-    """Return how much room a child needs on its right and below for such arrows [points]."""
+    """Return the space for such arrows to the right of a child and below it [points]."""
     loops = _loops(box, child)
     if not loops:
         return 0, 0
@@ -222,7 +223,7 @@ def loop_room(box: Box, child: Box) -> tuple[int, int]:
 
 
 def _draw_loops(box: Box, pages: Mapping[int, Page], page: Page) -> None:
-    """Draw what `dot` does badly: it leads such arrows across whatever is near."""
+    """Draw the loops of open children here: `dot` would route them across their neighbours."""
     for child in box.boxes:
         inner = pages.get(id(child))
         for i, arrow in enumerate(_loops(box, child)):
@@ -241,7 +242,7 @@ def _draw_loops(box: Box, pages: Mapping[int, Page], page: Page) -> None:
 
 
 def _strip(width: int, ports: Mapping[str, tuple[float, float]]) -> str:
-    """A row two points high with a named cell per port."""
+    """Return a table row, two points high, with a named cell for each port."""
     cells = []
     at = 0
     for part, (centre, span) in sorted(ports.items(), key=lambda item: item[1][0]):
@@ -263,7 +264,7 @@ def _cell(width: int, port: str = "") -> str:
 
 
 def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: Try, *, free: bool) -> None:
-    """Write an arrow; one that is `free` says nothing about what stands above what."""
+    """Write an arrow; a `free` one does not constrain the vertical order of its ends."""
     towards = how.side if arrow.back and how.corner else ""
     tail, head = _end(arrow.tail, box, f"s{towards}"), _end(arrow.head, box, how.side)
     if how.plain:
@@ -271,6 +272,8 @@ def _write_arrow(dot: graphviz.Digraph, box: Box, arrow: Arrow, how: Try, *, fre
     attributes = {**_sizes(arrow.attributes), "id": arrow.name}
     if free:
         attributes["constraint"] = "false"
+    # Written reversed and drawn with `dir=back`: `dot` puts tails above heads, so a back arrow
+    # written as it is would turn the reading direction around.
     if arrow.back:
         dot.edge(head, tail, dir="back", **attributes)
     else:
@@ -286,12 +289,12 @@ def _end(anchor: Anchor, box: Box, side: str) -> str:
 
 
 def read_page(box: Box, result: Mapping[str, Any], pages: Mapping[int, Page]) -> Page:
-    """Return the page of `box` from what `dot` made of its text.
+    """Return the page of `box` from the layout of `dot`.
 
     Args:
         box: The container.
         result: Graphviz' JSON.
-        pages: The pages of the containers inside, by `id`.
+        pages: The pages of the inner containers, by `id`.
     """
     found = {item["name"]: item for item in result.get("objects", ()) if "pos" in item}
     curves = {
@@ -332,7 +335,7 @@ def read_page(box: Box, result: Mapping[str, Any], pages: Mapping[int, Page]) ->
 def _extent(
     result: Mapping[str, Any], curves: Mapping[str, Mapping[str, str]]
 ) -> tuple[float, float, float]:
-    """Left, right and upper end of a page; loops may leave the box that Graphviz reports."""
+    """Return left, right and top of a page; Graphviz' bounding box does not include all loops."""
     left, _, right, top = map(float, result["bb"].split(","))
     for attributes in curves.values():
         for x, _ in trace(attributes["pos"]):
@@ -341,10 +344,9 @@ def _extent(
 
 
 def untidiness(result: Mapping[str, Any]) -> float:
-    """Length of all arrows [points].
+    """Return the cost of a layout: the length of all arrows [points] and a penalty per fault.
 
-    Where one crosses another, a label or a state it does not belong to, that counts as much as a
-    long way round.
+    A fault is an arrow that crosses another arrow, a label or a state that it does not belong to.
     """
     arrows = _arrows(result)
     traces = [trace(edge["pos"]) for edge in arrows]
@@ -371,20 +373,23 @@ def untidiness(result: Mapping[str, Any]) -> float:
 
 
 def sprawl(result: Mapping[str, Any]) -> float:
-    """Return the height of the screen that shows a page at full size, one of 16 by 10 [points]."""
+    """Return the height of a 16:10 screen that shows the whole page at full size [points]."""
     _, _, width, height = map(float, result["bb"].split(","))
     return max(height, width / 1.6)
 
 
 def _arrows(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """What is seen of a page's arrows."""
+    """Return the visible arrows of a page: those that fold it have no id."""
     return [edge for edge in result.get("edges", ()) if "id" in edge]
 
 
 def _title(
     result: Mapping[str, Any], entry_x: float, left: float, right: float
 ) -> tuple[float, float]:
-    """Centre of the title, left of the line from the entry if it fits, else beside it."""
+    """Return the title's centre and the page's right end.
+
+    The title is to the left of the line from the entry if it fits there, else to its right.
+    """
     width = float(result["lwidth"]) * INCH
     if left + width + DOT_RADIUS <= entry_x:
         return left + width / 2 - 2, right

@@ -1,4 +1,4 @@
-"""Arrows as Graphviz writes them: chains of cubic Bezier curves, `e,x,y x,y x,y x,y x,y …`."""
+"""Arrows in Graphviz' notation: chains of cubic Bezier curves, `e,x,y x,y x,y x,y x,y …`."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def point(text: str) -> Point:
 
 
 def shift(text: str, dx: float, dy: float) -> str:
-    """Move every `x,y` in `text`."""
+    """Return `text` with every `x,y` moved."""
     return _PAIR.sub(lambda m: f"{float(m[1]) + dx:.2f},{float(m[2]) + dy:.2f}", text)
 
 
 def trace(curve: str, steps: int = 4) -> list[Point]:
-    """Return points along the curve, `steps` for each piece."""
+    """Return points along the curve, `steps` per segment."""
     ends = [point(pair) for pair in curve.split() if pair[0] not in "es"]
     found = ends[:1]
     for i in range(0, len(ends) - 3, 3):
@@ -42,12 +42,13 @@ def trace(curve: str, steps: int = 4) -> list[Point]:
 
 
 def length(line: Sequence[Point]) -> float:
-    """Return the length of a broken line."""
+    """Return the length of a polyline."""
     return sum(dist(a, b) for a, b in pairwise(line))
 
 
 def crossings(lines: Iterable[Sequence[Point]]) -> int:
-    """Return how often broken lines cross each other."""
+    """Return how often polylines cross each other."""
+    # Bounding boxes first: most pairs of lines, and of their pieces, are far apart.
     boxed = [(line, _box(line)) for line in lines]
     return sum(
         _crossed(a, b, c, d)
@@ -60,7 +61,7 @@ def crossings(lines: Iterable[Sequence[Point]]) -> int:
 
 
 def with_stem(curve: str, x: float, top: float) -> str:
-    """Let a curve begin at (`x`, `top`) and go straight to where it began."""
+    """Return the curve with a straight piece from (`x`, `top`) to its start."""
     head, _, rest = curve.rpartition("e,")
     arrow, _, points = rest.partition(" ")
     first_x, first_y = point(points.split(" ", 1)[0])
@@ -73,10 +74,10 @@ def around(start: Point, end: Point, lane: float, floor: float, corner: float) -
     """Return a curve down from `start`, right to x = `lane`, up and left to `end`, with its arrow.
 
     Args:
-        start: Where it begins.
-        end: The arrow's tip.
-        lane: Right end.
-        floor: Lower end.
+        start: The start.
+        end: The tip of the arrow.
+        lane: Its right end.
+        floor: Its lower end.
         corner: Radius of the corners.
     """
     (x, _), (tip_x, tip_y) = start, end

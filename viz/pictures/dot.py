@@ -1,4 +1,4 @@
-"""A picture as DOT text: containers are clusters, outcomes are pills inside them."""
+"""Writes a picture as DOT text: containers are clusters, outcomes are pills inside them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def dot_text(
         root: The picture.
         theme: The colours.
         geometry: Positions by name (`layout.compose`), for an engine that keeps them (`nop2`).
-            Without them any layout engine may draw the text; `dot` suits best.
+            Without positions any layout engine can draw the text; `dot` gives the best result.
     """
     return _Writer(theme, geometry or {}).text(root)
 
@@ -85,7 +85,7 @@ class _Writer:
 
 
 def _end(anchor: Anchor, inside: Box) -> tuple[str, str]:
-    """The node an arrow is tied to and the cluster at whose border it is cut."""
+    """Return the node that an arrow is attached to, and the cluster at whose border it is cut."""
     if not anchor.is_open:
         return anchor.box, ""
     if anchor.part.startswith(("o", "j")):

@@ -34,9 +34,9 @@ SHARP = 144
 MOST_PIXELS = 16000
 """Longest side of a PNG."""
 LARGEST = 14_400
-"""Longest side of a picture [points]: that of a page of PDF, past which readers give up."""
+"""Longest side of a picture [points]: a PDF page may not be larger, and readers refuse it."""
 MOST_STATES = 400
-"""Most states side by side in one container; `dot` needs minutes for more."""
+"""Most states in one container, side by side; `dot` needs minutes for more."""
 
 
 FORMATS = ("dot", "gv", "json", "mmd", "pdf", "png", "svg", "txt")
@@ -47,12 +47,12 @@ class PictureError(SmachError):
 
 
 class TooLargeError(PictureError):
-    """The picture would be larger than anybody can look at.
+    """The picture would be too large to be opened.
 
     Attributes:
         path: The container that is too large.
-        states: States it would show.
-        size: Width and height it would have [points]; None when it has not been laid out.
+        states: Number of states in it.
+        size: Its width and height [points]; None if it has not been laid out.
     """
 
     def __init__(
@@ -83,15 +83,15 @@ def render(
 
     Args:
         machine: A state machine, any container, or its record.
-        file: Where to; the ending names the format: svg, png, pdf, dot, json, mmd or txt.
+        file: The file; its suffix is the format: svg, png, pdf, dot, json, mmd or txt.
         theme: `light` or `dark`.
         depth: Container levels to open; None opens as many as stay readable (60 states).
         path: Draw only the container at this path.
         active: Paths of states to mark as running.
-        run: The history or the events of a run, whose states and transitions are marked; or the
-            marks of many (`viz.runs.statistics.marks_of`).
-        show_implicit: Draw the transitions nobody wrote down as well.
-        legend: What signs mean, beside the title (`viz.model.machine.Diagram`).
+        run: The history or the events of a run, to mark its states and transitions; or the marks
+            of many runs (`viz.runs.statistics.marks_of`).
+        show_implicit: Also draw transitions that nobody wrote down.
+        legend: The meaning of signs, beside the title (`viz.model.machine.Diagram`).
 
     Returns:
         The file.
@@ -103,7 +103,7 @@ def render(
         UnknownPathError: `path` or one of `active` names no state.
         EngineError: there is no `dot` program, or it failed.
 
-    Blocks: while `dot` runs, usually well under a second; never past its time limit.
+    Blocks: while `dot` runs, usually well under a second, at most until its time limit.
     """
     target = Path(file)
     content = picture(
@@ -139,16 +139,16 @@ def picture(
     whole = machine if isinstance(machine, StateRecord) else describe(machine)
     record = whole if path is None else extract.find(whole, path)
     marks = _marks(whole, active, run)
-    if form == "json":  # the record is the structure, whole and without a look
+    if form == "json":  # the whole structure: depth, theme and marks do not apply
         return (record.to_json(indent=2) + "\n").encode("utf-8", "replace")
     node = extract.extract(record, depth=depth, show_implicit=show_implicit)
     return draw(Diagram(node, marks, legend=legend), form, theme=theme)
 
 
 def draw(diagram: Diagram, form: str, *, theme: str = "light") -> bytes:
-    """Return a picture of a diagram that somebody has made, in any format but JSON.
+    """Return a picture of a given diagram, in any format except JSON.
 
-    Text and Mermaid do not show how two versions differ.
+    Text and Mermaid cannot show the differences of two versions.
 
     Raises, Blocks: as `render`.
     """
@@ -171,7 +171,7 @@ def draw(diagram: Diagram, form: str, *, theme: str = "light") -> bytes:
 
 
 def write(content: bytes, file: str | os.PathLike[str]) -> Path:
-    """Write a picture into a file, whole or not at all: a viewer never sees half of it.
+    """Write a picture to a file atomically: a viewer never sees a part of it.
 
     Raises:
         PictureError: it cannot be written.
@@ -193,7 +193,7 @@ def write(content: bytes, file: str | os.PathLike[str]) -> Path:
 
 
 def svg(machine: State | StateRecord) -> str:
-    """Return a machine as SVG text, as a notebook shows it."""
+    """Return a machine as SVG text, for a notebook."""
     return picture(machine, "svg").decode("utf-8")
 
 
@@ -206,7 +206,7 @@ def atlas(
     show_implicit: bool = False,
     legend: tuple[tuple[str, str], ...] = (),
 ) -> Path:
-    """Draw one SVG page per container into `folder`, each state linked to its own page.
+    """Draw one SVG page per container into `folder`, with links between the pages.
 
     Returns:
         The page of the outermost container, `index.svg`.
@@ -284,7 +284,7 @@ def _draw(diagram: Diagram, form: graphviz_process.Format, theme: Theme) -> byte
 
 
 def _check_states(roots: Iterable[Node]) -> None:
-    """Refuse what `dot` would work on for minutes."""
+    """Refuse containers that `dot` would work on for minutes."""
     for node in (node for root in roots for node in root.walk()):
         if len(node.children) > MOST_STATES:
             raise TooLargeError(
@@ -293,6 +293,6 @@ def _check_states(roots: Iterable[Node]) -> None:
 
 
 def _resolution(places: layout.Geometry) -> int:
-    """Sharp on any screen, but never more pixels than image viewers can open."""
+    """Return a PNG's resolution: sharp on any screen, but small enough for image viewers."""
     width, height = layout.canvas_size(places)
     return int(min(SHARP, MOST_PIXELS * INCH / max(width, height)))

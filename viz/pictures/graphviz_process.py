@@ -1,7 +1,7 @@
-"""Run the `dot` program: the only place that does.
+"""Runs the `dot` program; no other module does.
 
-It runs as a process of its own with a time limit, so that neither a fault nor an endless layout
-in the C library reaches the robot's process.
+`dot` runs as a separate process with a time limit, so that neither a crash nor an endless layout
+in the C library affects the robot's process.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 
 DOT_VARIABLE = "SMACHPY_DOT"
 TIME_LIMIT = 20.0
-"""Longest layout [s]; past it one more try with cheaper settings gets as long."""
+"""Time limit for a layout [s]; after it, one more attempt with cheaper settings gets as long."""
 CHEAPER = ("-Gmclimit=0.2", "-Gnslimit=3", "-Gnslimit1=3", "-Gsplines=line")
 FONTS = Path(__file__).with_name("fonts")
 
 END = "// end of graph"
-"""A comment line after every DOT text, by which a reader of a stream tells them apart."""
+"""The comment line after each DOT text, which separates the texts in a stream."""
 
 _JSON_END = b"\n}\n"
-_REAL = RealClock()  # `dot` runs in real time, whatever clock the machine has
+_REAL = RealClock()  # `dot` runs in real time, even if the machine's clock is virtual
 
 T = TypeVar("T")
 Format = Literal["svg", "png", "pdf"]
@@ -53,8 +53,8 @@ class EngineError(SmachError):
 def find_dot() -> tuple[str, ...]:
     """Return the command that runs `dot`.
 
-    The first of: what the environment variable `SMACHPY_DOT` names, a `dot` on the PATH, the
-    Graphviz library inside the pygraphviz package (extra `dot`).
+    The first of these that exists: the program named by the environment variable `SMACHPY_DOT`, a
+    `dot` on the PATH, the Graphviz library in the pygraphviz package (extra `dot`).
 
     Raises:
         EngineError: there is none, or `SMACHPY_DOT` names no program.
@@ -79,13 +79,13 @@ def find_dot() -> tuple[str, ...]:
 
 
 def lay_out(work: Callable[[Run], T]) -> T:
-    """Call `work` with a function that lays DOT texts out; return what `work` returns.
+    """Call `work` with a function that lays out DOT texts; return the result of `work`.
 
-    The function takes any number of texts and returns Graphviz' JSON for each, None for a text
-    on which `dot` crashes. It may be called again and again; one process serves all calls.
+    The function takes any number of texts and returns Graphviz' JSON for each; None for a text
+    that makes `dot` crash. It may be called repeatedly; one process serves all calls.
 
     Args:
-        work: Called once more, with cheaper settings, when the first time takes too long.
+        work: Called a second time, with cheaper settings, if the first attempt takes too long.
 
     Raises:
         EngineError: `dot` is missing, failed or took too long.
@@ -98,7 +98,7 @@ def lay_out(work: Callable[[Run], T]) -> T:
             with _Layouts(command, environment) as layouts:
                 return work(layouts.run)
         except _TooSlowError:
-            pass  # once more, cheaper
+            pass  # a second attempt follows, with cheaper settings
         try:
             with _Layouts([*command, *CHEAPER], environment) as layouts:
                 return work(layouts.run)
@@ -110,11 +110,11 @@ def lay_out(work: Callable[[Run], T]) -> T:
 
 
 def draw(text: str, form: Format, *, dots_per_inch: int = 72) -> bytes:
-    """Return the picture of a DOT text that carries its positions.
+    """Return the picture of a DOT text with positions.
 
     Args:
         text: The DOT text.
-        form: What to return.
+        form: The format.
         dots_per_inch: Resolution of a PNG.
 
     Raises:
@@ -127,20 +127,21 @@ def draw(text: str, form: Format, *, dots_per_inch: int = 72) -> bytes:
 
 
 def draw_pages(texts: Sequence[str]) -> list[bytes]:
-    """Return an SVG for each DOT text that carries its positions; one process for all.
+    """Return an SVG for each DOT text with positions, using one process.
 
     Raises:
         EngineError: as `lay_out`.
 
     Blocks: for at most `TIME_LIMIT`.
     """
+    # `dot` writes the documents one after another; each begins with this.
     start = b"<?xml "
     output = _call([*find_dot(), "-Knop2", "-Tsvg"], texts)
     return [start + page for page in output.split(start)[1:]]
 
 
 def describe_pages(texts: Sequence[str]) -> list[dict[str, Any]]:
-    """Return what `draw_pages` draws for each DOT text as Graphviz' JSON, with every drawing step.
+    """Return Graphviz' JSON for each DOT text with positions, with every drawing step.
 
     Raises:
         EngineError: as `lay_out`.
@@ -156,15 +157,15 @@ def _decoded(output: bytes) -> list[dict[str, Any]]:
 
 
 class _TooSlowError(Exception):
-    """The time limit has passed."""
+    """The time limit is over."""
 
 
 class _CrashError(Exception):
-    """`dot` ended by a signal."""
+    """`dot` was ended by a signal."""
 
 
 class _Layouts:
-    """A `dot` process that lays out one batch of texts after another."""
+    """A `dot` process that lays out batches of texts, one after another."""
 
     def __init__(self, command: Sequence[str], environment: dict[str, str]) -> None:
         self._command = command
@@ -179,7 +180,7 @@ class _Layouts:
         self._stop()
 
     def run(self, texts: Sequence[str]) -> list[dict[str, Any] | None]:
-        """Return the JSON of each text, None for one on which `dot` crashes."""
+        """Return the JSON of each text; None for a text that makes `dot` crash."""
         if not texts:
             return []
         try:
@@ -187,11 +188,13 @@ class _Layouts:
         except _CrashError:
             self._stop()
             self._start()
+            # `dot` does not say which text it crashed on: halve the batch until it is alone.
             half = len(texts) // 2
             return [*self.run(texts[:half]), *self.run(texts[half:])] if half else [None]
         return list(_decoded(output))
 
     def _start(self) -> None:
+        # A file and not a pipe: nobody reads it meanwhile, and a full pipe would block `dot`.
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed by `_stop`
         try:
             self._process = subprocess.Popen(  # noqa: S603  the command is the user's own `dot`
@@ -219,7 +222,7 @@ class _Layouts:
         self._errors.close()
 
     def _exchange(self, data: bytes, expected: int) -> bytes:
-        """Write and read at the same time, so that no full pipe stops either side."""
+        """Write and read at the same time, so that a full pipe cannot block both sides."""
         output = bytearray()
         found = 0
         with selectors.DefaultSelector() as selector:
@@ -231,6 +234,7 @@ class _Layouts:
                     raise _TooSlowError
                 for key, _ in ready:
                     if key.fileobj is self._out:
+                        # Search again in the last few bytes: a separator may arrive in two pieces.
                         seen = max(len(output) - len(_JSON_END) + 1, 0)
                         output += self._read()
                         found += output.count(_JSON_END, seen)
@@ -244,7 +248,7 @@ class _Layouts:
         try:
             return data[self._in.write(data[:65536]) or 0 :]
         except BrokenPipeError:
-            return b""  # it has ended; reading tells why
+            return b""  # the process has ended; `_read` reports why
 
     def _read(self) -> bytes:
         piece = os.read(self._out.fileno(), 1 << 20)
@@ -296,7 +300,7 @@ def _cannot_start(command: Sequence[str], error: Exception) -> EngineError:
 
 @contextlib.contextmanager
 def _environment() -> Iterator[dict[str, str]]:
-    """The environment of `dot`, with a font configuration that is gone afterwards."""
+    """Yield the environment for `dot`, with a temporary font configuration."""
     with tempfile.TemporaryDirectory(prefix="smachpy-dot-") as folder:
         fonts = Path(folder) / "fonts.conf"
         fonts.write_text(_font_configuration(), encoding="utf-8")
@@ -304,7 +308,7 @@ def _environment() -> Iterator[dict[str, str]]:
 
 
 def _font_configuration() -> str:
-    """The system's fonts and the shipped ones, which come first: same sizes on every machine."""
+    """Return a configuration with the shipped fonts first: labels have the same size everywhere."""
     system = os.environ.get("FONTCONFIG_FILE", "/etc/fonts/fonts.conf")
     return f"""<?xml version="1.0"?>
 <!DOCTYPE fontconfig SYSTEM "fonts.dtd">

@@ -1,10 +1,10 @@
-"""Where every piece of a picture goes: each container is laid out on its own, innermost first.
+"""Computes the positions in a picture: each container is laid out separately, innermost first.
 
-A container becomes a page for `dot`, in which the containers inside are boxes of known size with
-a port for their entry on the upper border and one per outcome on the lower one. So no arrow ever
-crosses a border except at an entry or an outcome, and the time grows with the number of states,
-while one layout of everything takes minutes for 500 states. All containers of one height share
-one run of `dot`. Lengths are points (1/72 inch), y points up.
+A container becomes a page for `dot`, in which inner containers are boxes of known size with a port
+for their entry on the upper border and one per outcome on the lower border. So an arrow crosses a
+border only at an entry or an outcome, and the time grows with the number of states; laying out
+everything at once takes minutes for 500 states. All containers of the same height share one run of
+`dot`. Lengths are points (1/72 inch), y points up.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ if TYPE_CHECKING:
 Geometry: TypeAlias = dict[str, dict[str, str]]
 
 CANVAS = "canvas"
-"""Name of the geometry of the whole picture."""
+"""Key of the whole picture's geometry."""
 PAD = 14
-"""Room around a picture [points]."""
+"""Margin around a picture [points]."""
 LONG = 1500
-"""A container that needs a screen higher than this is folded, if it can be [points]."""
+"""A container that needs a higher screen than this is folded, if possible [points]."""
 
 
 class LayoutError(SmachError):
-    """A container cannot be laid out, however simply."""
+    """A container cannot be laid out, even with the simplest settings."""
 
 
 def compose(root: Box, theme: Theme, run: Engine) -> Geometry:
@@ -55,20 +55,21 @@ def compose(root: Box, theme: Theme, run: Engine) -> Geometry:
     Args:
         root: The picture.
         theme: Fonts and sizes.
-        run: Lays DOT texts out and returns Graphviz' JSON for each, None for one it crashed on.
+        run: Lays out DOT texts and returns Graphviz' JSON for each; None if it crashed.
 
     Raises:
         LayoutError: `dot` crashes on a container.
 
-    Blocks: while `run` does, once per nesting level.
+    Blocks: while `run` blocks, once per nesting level.
     """
     return compose_all([root], theme, run)[0]
 
 
 def compose_all(roots: Sequence[Box], theme: Theme, run: Engine) -> list[Geometry]:
-    """`compose` for several pictures with as few runs as for the deepest one."""
+    """Do `compose` for several pictures, with as many runs as the deepest one needs."""
     containers = [box for root in roots for box in root.containers()]
     pages: dict[int, Page] = {}
+    # Innermost first: a page needs the sizes of the containers inside it.
     for height in range(1, max(root.height() for root in roots) + 1):
         level = [box for box in containers if box.height() == height]
         found = _results(level, tries, theme, pages, run)
@@ -92,7 +93,7 @@ def _results(
     pages: Mapping[int, Page],
     run: Engine,
 ) -> list[list[dict[str, Any]]]:
-    """What `dot` makes of each container in each of its `ways`, without what it crashes on."""
+    """Return the layouts of each container in each of its `ways`, without those that crashed."""
     tasks = [(box, how) for box in boxes for how in ways(box)]
     results = iter(run([page_text(box, how, theme, pages) for box, how in tasks]))
     return [
@@ -102,7 +103,7 @@ def _results(
 
 
 def _simplest(box: Box, theme: Theme, pages: Mapping[int, Page], run: Engine) -> dict[str, Any]:
-    """Lay out what made `dot` crash."""
+    """Lay out a container whose other layouts made `dot` crash."""
     (result,) = run([page_text(box, Try(plain=True), theme, pages)])
     if result is None:
         raise LayoutError(
@@ -114,7 +115,7 @@ def _simplest(box: Box, theme: Theme, pages: Mapping[int, Page], run: Engine) ->
 
 def _geometry(root: Box, pages: Mapping[int, Page]) -> Geometry:
     page = pages.get(id(root))
-    if page is None:  # a plain state, alone
+    if page is None:  # a single leaf
         return {CANVAS: {}, root.name: {"pos": "0,0"}}
     width, height = page.width + 2 * PAD, page.height + 2 * PAD
     view = f"{width},{height},1,{page.width / 2},{page.height / 2}"
@@ -124,7 +125,7 @@ def _geometry(root: Box, pages: Mapping[int, Page]) -> Geometry:
 
 
 def canvas_size(geometry: Geometry) -> tuple[float, float]:
-    """Return width and height of a laid out picture in points, roughly for a plain state."""
+    """Return width and height of a picture [points]; only roughly for a single leaf."""
     width, height, *_ = geometry[CANVAS].get("viewport", "300,60").split(",")
     return float(width), float(height)
 
@@ -132,7 +133,7 @@ def canvas_size(geometry: Geometry) -> tuple[float, float]:
 def _place(
     box: Box, pages: Mapping[int, Page], origin: tuple[float, float], geometry: Geometry
 ) -> None:
-    """Write absolute positions; `origin` is the lower left corner of the outer box."""
+    """Write absolute positions; `origin` is the lower left corner of the container."""
     page = pages[id(box)]
     ox, oy = origin
     sx, sy = ox + page.dx, oy + page.dy

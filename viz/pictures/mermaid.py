@@ -1,4 +1,4 @@
-"""A picture as Mermaid text (`stateDiagram-v2`), for READMEs and issue threads."""
+"""Writes a picture as Mermaid text (`stateDiagram-v2`), for READMEs and issue threads."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from viz.model.machine import Diagram, Node
     from viz.pictures.theme import Theme
 
-# Characters that mean something to Mermaid become its own numeric escapes.
+# Characters with a meaning in Mermaid become its own numeric escapes.
 _ESCAPES = {ord(c): f"#{ord(c)};" for c in '"#;:<>&{}[]()|%\\`*~'}
 
 
 def mermaid_text(diagram: Diagram, theme: Theme) -> str:
-    """Return the picture as Mermaid text; outcomes of containers are states at their end."""
+    """Return the picture as Mermaid text; a container's outcomes are states at its end."""
     return "\n".join(_Writer(diagram, theme).lines()) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""A picture as lines of text: the tree of states with what leads where."""
+"""Writes a picture as lines of text: the tree of states and their transitions."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
     from viz.model.machine import Diagram, Marks, Node
 
-STANDS = "\u25b8"
+RUNNING = "\u25b8"
 """Marks a state that is running."""
 DOT = "\u25cf"
-"""Stands for a token of a place."""
+"""A token of a place."""
 
 MOST_DOTS = 3
 
@@ -22,8 +22,8 @@ MOST_DOTS = 3
 def outline_text(diagram: Diagram) -> str:
     """Return the picture as an indented tree.
 
-    A state's line has its outcomes and where they lead; the first state of a container has an
-    asterisk, one that is running a triangle.
+    A state's line lists its outcomes and their targets; an asterisk marks the first state of a
+    container, a triangle a running state.
     """
     return "\n".join(_lines(diagram.root, diagram.marks, "", "", first=False, exits="")) + "\n"
 
@@ -53,7 +53,7 @@ def _title(node: Node, marks: Marks, *, first: bool) -> str:
     word = KIND_WORDS.get(node.kind, "")
     count = marks.visits.get(node.path, 0)
     parts = [
-        STANDS if node.path in marks.active else "",
+        RUNNING if node.path in marks.active else "",
         "*" if first else "",
         glyph,
         shorten(node.caption or node.label),

@@ -1,7 +1,7 @@
-"""From the model of a picture to boxes, dots and arrows with their looks.
+"""Turns the model of a picture into boxes, dots and arrows with their looks.
 
-Graphviz names here are numbers (`n0`, `n0_in`, `n0_o1`), never the user's: whatever a state is
-called, the DOT text stays valid.
+Graphviz names are numbers (`n0`, `n0_in`, `n0_o1`), never the user's labels: the DOT text stays
+valid whatever a state is called.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 SURE = 0.995
-"""A share from which on it is not worth a number."""
+"""A larger share is shown without a number: the arrow is practically always taken."""
 
 
 @dataclass(frozen=True, slots=True)
 class Vertex:
-    """Something small inside a container: its entry, an outcome, a join."""
+    """A small part of a container: its entry, an outcome or a join."""
 
     name: str
     attributes: Mapping[str, str]
@@ -33,11 +33,11 @@ class Vertex:
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
-    """Where an arrow begins or ends.
+    """An end of an arrow.
 
     Attributes:
-        box: Name of the box it belongs to.
-        part: Name of the vertex on that box's border or inside; empty for the box itself.
+        box: Name of the box it is attached to.
+        part: Name of the vertex in that box; "" for the box itself.
         is_open: Whether the box is an open container.
     """
 
@@ -51,7 +51,7 @@ class Arrow:
     """One arrow between pieces of one container.
 
     Attributes:
-        back: Points against the reading direction, so that layouts take it the other way round.
+        back: Points against the reading direction; layouts take it reversed.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A state; one that has an entry is an open container with everything inside."""
+    """A state; if it has an entry, it is an open container with everything inside."""
 
     name: str
     attributes: Mapping[str, str]
@@ -81,7 +81,7 @@ class Box:
             yield from box.containers()
 
     def height(self) -> int:
-        """Levels of open containers inside, this one included."""
+        """Return the number of levels of open containers, this one included."""
         if self.entry is None:
             return 0
         return 1 + max((box.height() for box in self.boxes), default=0)
@@ -102,7 +102,7 @@ def shapes_of(diagram: Diagram, theme: Theme) -> Box:
 
 
 class _Interior:
-    """Draws what is inside one open container."""
+    """Builds the contents of one open container."""
 
     def __init__(
         self,
@@ -129,7 +129,7 @@ class _Interior:
         node, theme = self._node, self._theme
         visited = node.path in self._marks.visits
         entry = style.entry(theme, touched=visited or not self._marks.has_run)
-        if node.kind == "plan":  # its tokens say where it begins
+        if node.kind == "plan":  # its tokens mark the start
             entry["style"] = "invis"
         return Box(
             self._name,
@@ -143,10 +143,8 @@ class _Interior:
 
     def _pill(self, pill: Pill) -> Vertex:
         taken = self._marks.taken.get((self._node.path, pill.outcome), 0)
-        stands_back = self._marks.has_run and not taken
-        look = style.pill(
-            pill.outcome, self._theme, by_default=pill.by_default, stands_back=stands_back
-        )
+        faint = self._marks.has_run and not taken
+        look = style.pill(pill.outcome, self._theme, by_default=pill.by_default, faint=faint)
         return Vertex(self._pills[pill.outcome], look)
 
     def _starts(self) -> None:
@@ -160,6 +158,8 @@ class _Interior:
 
     def _transition(self, edge: Edge) -> None:
         source = self._boxes[edge.source]
+        # An open container has a pill per outcome: each outcome gets an arrow of its own. A box has
+        # one arrow for all of them.
         groups = [(outcome,) for outcome in edge.outcomes] if source.entry else [edge.outcomes]
         for outcomes in groups:
             path = self._nodes[edge.source].path
@@ -184,12 +184,12 @@ class _Interior:
             self._arrow(self._exit(edge.source, outcomes[0]), head, attributes, back=back)
 
     def _share(self, path: str, outcomes: Sequence[str]) -> str:
-        """How often many runs took an arrow when they had the choice."""
+        """Return how often the counted runs took an arrow, in percent; "" for always or never."""
         share = self._marks.share(path, outcomes) if self._marks.runs else None
         return "" if share is None or not 0 < share < SURE else f"{share:.0%}"
 
     def _decisions(self) -> None:
-        """Rules over several states meet in a bar; one over a single state is a plain arrow."""
+        """Draw the rules: a bar where several states decide together, else a plain arrow."""
         for rule in self._node.rules:
             conditions = [pair for pair in rule.conditions if pair[0] in self._boxes]
             if rule.outcome not in self._pills:
@@ -203,7 +203,7 @@ class _Interior:
                 self._join(rule, conditions)
 
     def _by_itself(self, rule: Rule) -> None:
-        """An outcome that no child decides, such as that of an iterator without items."""
+        """Draw an outcome that no child decides, such as an iterator's without items."""
         self._arrow(
             Anchor(self._name, "in", is_open=True),
             self._outcome(rule.outcome),

@@ -1,7 +1,7 @@
-"""How each piece of a picture looks, as Graphviz attributes.
+"""The look of each part of a picture, as Graphviz attributes.
 
-Every text that comes from a machine passes through `shorten`, `markup` or `plain` here, so that no
-name can break a picture, whatever it contains.
+Every text from a machine passes through `shorten`, `markup` or `plain` here, so that no name can
+break a picture.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     Attributes = dict[str, str]
 
 TOOLTIP_LENGTH = 600
-MOST_DOTS = 3  # tokens; more are a number
+MOST_DOTS = 3  # more tokens are shown as a number
 SIGNS = {"added": "+", "removed": "\u2212", "changed": "\u2260"}
-"""What stands before the name of what has changed: never its colour alone."""
+"""The sign before a changed name: colour alone is not enough."""
 
-# Graphviz stumbles over more than XML's five characters, over a closing bracket for one.
+# Graphviz' HTML parser fails on more than XML's five characters, for example on "]".
 _ENTITIES = {ord(mark): f"&#{ord(mark)};" for mark in punctuation if mark not in "_-."}
 _BACKSLASH = re.compile(r"\\(?=[\w\\])")
 
@@ -51,16 +51,16 @@ def plain(text: str, length: int = TOOLTIP_LENGTH) -> str:
 
 
 def _inert(text: str) -> str:
-    """Part a backslash from a letter by a space without width.
+    """Put a zero-width space between a backslash and a letter.
 
-    Graphviz replaces a backslash and an N, a G and others by names of its own, also where the
-    backslash is escaped, because it looks more than once.
+    Graphviz replaces a backslash followed by N, G and other letters with names of its own, even if
+    the backslash is escaped, because it expands the text more than once.
     """
     return _BACKSLASH.sub("\\\\\u200b", text)
 
 
 def graph(theme: Theme) -> Attributes:
-    """Attributes of a whole picture."""
+    """Return the attributes of the whole picture."""
     return {
         "bgcolor": theme.background,
         "compound": "true",
@@ -80,7 +80,7 @@ def graph(theme: Theme) -> Attributes:
 
 
 def node_defaults(theme: Theme) -> Attributes:
-    """Attributes of every vertex that says nothing else."""
+    """Return the default attributes of nodes."""
     return {
         "color": theme.inactive.stroke,
         "fillcolor": theme.inactive.fill,
@@ -97,7 +97,7 @@ def node_defaults(theme: Theme) -> Attributes:
 
 
 def edge_defaults(theme: Theme) -> Attributes:
-    """Attributes of every edge that says nothing else."""
+    """Return the default attributes of edges."""
     return {
         "arrowsize": "0.62",
         "color": theme.edge,
@@ -110,7 +110,7 @@ def edge_defaults(theme: Theme) -> Attributes:
 
 
 def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
-    """A plain state, or a container that is closed."""
+    """Return the look of a leaf or a closed container."""
     marks = diagram.marks
     if node.kind == TRANSITION:
         return {**_identity(node, diagram), **_net_transition(node, theme)}
@@ -126,7 +126,7 @@ def state(node: Node, diagram: Diagram, theme: Theme) -> Attributes:
 
 
 def _place(node: Node, theme: Theme) -> Attributes:
-    """A place of a net: its name and tokens; that of an end has the end's colours."""
+    """Return the look of a net's place: name and tokens; goal and fail places are coloured."""
     swatch = {
         "goal place": theme.outcome("success"),
         "fail place": theme.outcome("failure"),
@@ -149,12 +149,12 @@ def _place(node: Node, theme: Theme) -> Attributes:
 
 
 def _net_transition(node: Node, theme: Theme) -> Attributes:
-    """A transition of a net: a bar."""
+    """Return the look of a net's transition: a bar."""
     return {**join(node.caption, theme), "height": "0.07"}
 
 
 def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attributes:
-    """An open container."""
+    """Return the look of an open container."""
     marks = diagram.marks
     active = node.path in marks.active
     word = KIND_WORDS.get(node.kind, "")
@@ -180,7 +180,7 @@ def container(node: Node, depth: int, diagram: Diagram, theme: Theme) -> Attribu
 
 
 def entry(theme: Theme, *, touched: bool) -> Attributes:
-    """The dot where a container is entered."""
+    """Return the look of the dot at which a container is entered."""
     colour = theme.ink if touched else theme.muted
     return {
         "color": colour,
@@ -195,8 +195,8 @@ def entry(theme: Theme, *, touched: bool) -> Attributes:
     }
 
 
-def pill(outcome: str, theme: Theme, *, by_default: bool, stands_back: bool) -> Attributes:
-    """An outcome on the border of a container."""
+def pill(outcome: str, theme: Theme, *, by_default: bool, faint: bool) -> Attributes:
+    """Return the look of an outcome on the border of a container."""
     swatch = theme.outcome(outcome_class(outcome))
     attributes = {
         "fontsize": "9",
@@ -208,13 +208,13 @@ def pill(outcome: str, theme: Theme, *, by_default: bool, stands_back: bool) -> 
         "tooltip": plain(f"outcome {outcome}"),
         "width": "0.3",
     } | _swatch(swatch)
-    if stands_back:
+    if faint:
         attributes["color"] = _see_through(swatch.stroke)
     return attributes
 
 
 def join(text: str, theme: Theme) -> Attributes:
-    """The bar at which several states decide together."""
+    """Return the look of the bar at which several states decide together."""
     return {
         "color": theme.muted,
         "fillcolor": theme.muted,
@@ -229,7 +229,7 @@ def join(text: str, theme: Theme) -> Attributes:
 
 
 def start(theme: Theme, *, fork: bool) -> Attributes:
-    """The arrow from the entry of a container to what runs first."""
+    """Return the look of the arrow from a container's entry to its first state."""
     return {
         "arrowsize": "0.5",
         "color": theme.muted,
@@ -251,18 +251,18 @@ def transition(
     change: str | None = None,
     remark: str = "",
 ) -> Attributes:
-    """An arrow that one or several outcomes of a state take.
+    """Return the look of an arrow for one or several outcomes of a state.
 
     Args:
         outcomes: Their names.
-        kind: Of the state.
+        kind: The state's kind.
         theme: The colours.
         marks: The run to show.
-        counts: Times each outcome was taken here.
+        counts: How often each outcome was taken here.
         labelled: Whether to write the names.
         implicit: Whether nobody wrote the transition down.
-        change: Where two versions are compared, what has become of it, "" if nothing.
-        remark: Numbers, for the label.
+        change: The change between two versions, "" for none; None if no versions are compared.
+        remark: Numbers for the label.
     """
     if change is not None:
         return _compared_transition(outcomes, theme, change, remark, labelled=labelled)
@@ -270,15 +270,16 @@ def transition(
     found: OutcomeClass = classes.pop() if len(classes) == 1 else "other"
     swatch = theme.outcome(found)
     taken = sum(counts.get(outcome, 0) for outcome in outcomes)
-    stands_back = marks.has_run and not taken
+    faint = marks.has_run and not taken
     stroke = theme.edge if found == "other" else swatch.stroke
     attributes = {
-        "color": _see_through(stroke) if stands_back else stroke,
+        "color": _see_through(stroke) if faint else stroke,
         "tooltip": plain(", ".join(outcomes)),
     }
     if implicit:
         attributes |= {"style": "dotted", "arrowsize": "0.5"}
     if taken:
+        # Logarithmic for many runs: a loop may be taken a thousand times, its alternative once.
         wide = min(4.0, 1.2 + 0.6 * log2(1 + taken)) if marks.runs else 2.6
         attributes |= {"penwidth": f"{wide:.2g}"}
     if labelled or taken > 1 or remark:
@@ -292,7 +293,7 @@ def transition(
 def _compared_transition(
     outcomes: Sequence[str], theme: Theme, change: str, remark: str, *, labelled: bool
 ) -> Attributes:
-    """An arrow of two versions: thick when added, dotted when removed, faint when neither."""
+    """Return the look in a comparison: thick if added, dotted if removed, else faint."""
     swatch = _change_swatch(change, theme)
     look = {
         "added": {"penwidth": "2.8"},
@@ -323,7 +324,7 @@ def _change_swatch(change: str, theme: Theme) -> Swatch:
 
 
 def _change_line(node: Node, theme: Theme) -> Attributes:
-    """The border of a state that has changed: thick, dotted or dashed."""
+    """Return the border of a changed state: thick, dotted or dashed."""
     look = {
         "added": ("2.8", "rounded,filled"),
         "removed": ("2.2", "rounded,filled,dotted"),
@@ -363,7 +364,7 @@ def _legend(diagram: Diagram, theme: Theme) -> str:
 
 
 def _heat_key(words: str, theme: Theme) -> str:
-    """A row of ever warmer squares."""
+    """Return a legend: a row of squares from cold to hot."""
     steps = [_mix(theme.inactive.fill, theme.heat, share) for share in (0.25, 0.5, 0.75, 1.0)]
     squares = "".join(f'<font point-size="11" color="{colour}">\u25a0</font>' for colour in steps)
     return f'{squares}<font point-size="9" color="{theme.muted}">&#160;{markup(words)}</font>'
@@ -373,12 +374,13 @@ def _note(node: Node, marks: Marks, theme: Theme, *, before: str) -> str:
     text = node.note or marks.notes.get(node.path, "")
     if not text:
         return ""
-    ink = theme.ink if marks.heat.get(node.path) else theme.muted  # legible on every warmth
+    # The stronger ink on warm fills: the muted one would be hard to read there.
+    ink = theme.ink if marks.heat.get(node.path) else theme.muted
     return f'{before}<font point-size="8.5" color="{ink}">{markup(text)}</font>'
 
 
 def _heated(node: Node, marks: Marks, theme: Theme) -> Attributes:
-    """The fill of a state by how hot it is."""
+    """Return the fill of a state for its heat."""
     heat = marks.heat.get(node.path)
     if not heat:
         return {}
@@ -386,18 +388,18 @@ def _heated(node: Node, marks: Marks, theme: Theme) -> Attributes:
 
 
 def _mix(cold: str, hot: str, share: float) -> str:
-    """A colour between two, `share` of the way from the first."""
+    """Return a mix of two colours; `share` 0 is the first, 1 the second."""
     pairs = [(int(cold[i : i + 2], 16), int(hot[i : i + 2], 16)) for i in (1, 3, 5)]
     return "#" + "".join(f"{round(a + (b - a) * share):02X}" for a, b in pairs)
 
 
 def note(text: str, theme: Theme) -> str:
-    """The label of an arrow that needs words of its own."""
+    """Return an arrow's label with free text."""
     return _beside([f'<font color="{theme.muted}">{markup(text)}</font>'])
 
 
 def _beside(lines: Sequence[str]) -> str:
-    """A label that keeps off its arrow."""
+    """Return a label with padding, so that it does not touch its arrow."""
     rows = "".join(f'<tr><td align="left">{line}</td></tr>' for line in lines)
     return f'<<table border="0" cellborder="0" cellspacing="0" cellpadding="2">{rows}</table>>'
 
@@ -411,7 +413,7 @@ def _outcome_line(
     *,
     labelled: bool,
 ) -> str:
-    """One line of an arrow's label: the outcome and how often it was taken."""
+    """Return one line of an arrow's label: the outcome and its count."""
     count = counts.get(outcome, 0)
     found = end_class(kind, outcome)
     plain_ink = found == "other" or (marks.has_run and not count)
@@ -421,7 +423,7 @@ def _outcome_line(
 
 
 def _identity(node: Node, diagram: Diagram) -> dict[str, str]:
-    """Id, tooltip and link: the same picture can be restyled and navigated by path."""
+    """Return id, tooltip and link: the path as id lets others find a state in the SVG."""
     lines = [node.path, f"{node.kind} ({node.type_name})" if node.type_name else node.kind]
     lines += [f"{name}: {value}" for name, value in node.details]
     if node.doc:
@@ -464,7 +466,7 @@ def _count(count: int, ink: str) -> str:
 
 
 def _status(node: Node, marks: Marks, theme: Theme) -> tuple[Swatch, Attributes]:
-    """Colours, line and fill of a state by what the run did with it."""
+    """Return colours, line and fill of a state for its marks."""
     last = marks.last.get(node.path)
     if node.kind == MISSING:
         return theme.failure, {"penwidth": "2.2", "style": "rounded,filled,dotted"}

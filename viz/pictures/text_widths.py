@@ -1,7 +1,7 @@
-"""Texts of an SVG that keep their width in whatever font the reader has.
+"""Fixes the width of texts in an SVG, whatever font the reader has.
 
-`dot` made room for them in the shipped font. With `textLength` (SVG 1.1, chapter 10.5) a reader
-without it squeezes or stretches another font's letters into that room.
+`dot` sized the boxes for the shipped font. With `textLength` (SVG 1.1, chapter 10.5) a viewer
+without that font fits the letters of another font into the same width.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ _TEXT = re.compile(rb'<text [^>]*?\bx="([^"]+)" y="([^"]+)"')
 
 
 def with_widths(svg: bytes, drawn: Mapping[str, Any]) -> bytes:
-    """Return `svg` with the width of every text.
+    """Return `svg` with a fixed width for each text.
 
     Args:
-        svg: What `dot` drew.
-        drawn: The same picture as Graphviz' JSON, which has the widths.
+        svg: The picture that `dot` drew.
+        drawn: The same picture as Graphviz' JSON, which contains the widths.
     """
+    # Matched by position: SVG texts carry no other key. y points down in SVG, up in the JSON.
     widths = dict(_widths(drawn))
 
     def fitted(match: re.Match[bytes]) -> bytes:
@@ -34,7 +35,7 @@ def with_widths(svg: bytes, drawn: Mapping[str, Any]) -> bytes:
 
 
 def _widths(drawn: Mapping[str, Any]) -> Iterator[tuple[tuple[float, float], float]]:
-    """Where each text begins and its width [points]."""
+    """Yield the start of each text and its width [points]."""
     for piece in (drawn, *drawn.get("objects", ()), *drawn.get("edges", ())):
         for name, steps in piece.items():
             if not name.endswith("draw_"):

@@ -1,8 +1,8 @@
 """The colours of every picture, in one place: light and dark.
 
-Colour is never the only sign: every status also has its own line style or glyph. Blue is now;
-green, vermilion and amber tell how something ended. Text keeps a contrast of at least 7:1 to its
-fill and strokes at least 3:1 to the page, also for colour-blind eyes.
+Colour is never the only sign: each status also has a line style or a glyph. Blue is the present;
+green, vermilion and amber are ways of ending. Text has a contrast of at least 7:1 to its fill,
+strokes at least 3:1 to the page, also for colour-blind readers.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from smachpy.outcome_classes import OutcomeClass
 
 FONT = "Liberation Sans,Arial,Helvetica,sans-serif"
-"""Font family of every picture; the first one is shipped, the others have its metrics."""
+"""Font family of all pictures; the first font is shipped, the others have the same metrics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class Theme:
     Attributes:
         name: `light` or `dark`.
         containers: Fill by nesting depth; deeper levels alternate the last two.
-        faint: Strokes of what a run never touched.
-        heat: Fill of the hottest state, between which and the usual fill all others are.
+        faint: Strokes of parts that a run did not visit.
+        heat: Fill of the hottest state; other states get a mix with the usual fill.
     """
 
     name: str

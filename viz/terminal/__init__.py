@@ -1,1 +1,1 @@
-"""Runs in a terminal."""
+"""Shows runs in a terminal."""

@@ -1,4 +1,4 @@
-"""One line of text for each event that people want to read."""
+"""Writes a line of text for each event that is worth reading."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ STYLES: dict[OutcomeClass, str] = {
     "preempted": "#B07C00",
     "other": "#7B8794",
 }
-"""The page's hues (`viz.pictures.theme`), as light as can be read on white and on black."""
+"""The page's hues (`viz.pictures.theme`), at a lightness that is readable on black and white."""
 RUNNING = "#0082D4"
 WAITING = "#B065A3"
 NARROW = 72
-"""Below this many columns names stand without their containers, and bars are left out."""
+"""Below this many columns names are shown without their containers, and bars are left out."""
 FEEDBACK_PERIOD = 5.0
-"""Time between two lines about one goal's feedback [s]."""
+"""Time between two lines for one goal's feedback [s]."""
 ERROR_LENGTH = 200
 
 
@@ -44,10 +44,10 @@ class EventLines:
 
     Args:
         record: The machine, for the targets of transitions.
-        history: What happened before; an event gets its line before it is folded in.
-        panel: The lines stand above a panel, which shows goals' feedback; else feedback is worth
-            a line now and then, and no reason is cut.
-        narrow: Lines are short: names without their containers.
+        history: The events so far; a line is made before its event is added to the history.
+        panel: Whether there is a panel below, which shows feedback. Without one, feedback gets a
+            line now and then, and no text is cut.
+        narrow: Write short lines: names without their containers.
     """
 
     def __init__(
@@ -104,12 +104,12 @@ class EventLines:
         }
 
     def line(self, event: ev.Event) -> Text | None:
-        """Return the line about `event`, None when it is not worth one."""
+        """Return the line for `event`; None if it gets none."""
         make = self._by_type.get(type(event))
         return None if make is None else make(event)
 
     def name(self, path: str) -> str:
-        """Return `path` without the root's name, in narrow lines its last name."""
+        """Return `path` without the root's name; in narrow lines only its last part."""
         if self._narrow:
             return shorten(path.rpartition("/")[2], 24)
         return shorten(path.removeprefix(self._root).lstrip("/") or path.lstrip("/"), 70)

@@ -1,4 +1,4 @@
-"""A run in the terminal, as it happens.
+"""Shows a run in the terminal while it happens.
 
     with TerminalView(describe(machine)) as view:
         unsubscribe = machine.subscribe(view.on_event)
@@ -8,11 +8,11 @@
             unsubscribe()
     view.print_summary(outcome)
 
-In a terminal every transition becomes a line that stays, above a panel with the running states,
-the goals with their feedback, a bar, way and time left, and the userdata that was written last.
-Without a terminal, or with `plain=True`, the lines come alone. The mission never waits for the
-screen: events are folded in memory, a task of the clock draws, and a terminal that blocks (Ctrl-S,
-a slow link) loses lines, not time.
+In a terminal, each transition becomes a permanent line above a panel with the running states, the
+goals with feedback, progress, distance and time left, and the userdata written last. Without a
+terminal, or with `plain=True`, there are only the lines. The mission never waits for the terminal:
+events are kept in memory and a task of the clock draws them; a terminal that blocks (Ctrl-S, a slow
+link) loses lines, but costs the mission no time.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ if TYPE_CHECKING:
     from viz.model.progress import Written
 
 FRAME = 0.1
-"""Shortest time between two drawings [s]."""
+"""Shortest time between two updates [s]."""
 TICK = 0.5
-"""Longest time between two drawings of the panel, which counts seconds [s]."""
+"""Longest time between two updates of the panel, which shows running seconds [s]."""
 BACKLOG = 2000
-"""Most lines that wait for a slow terminal; the oldest go first."""
+"""Most lines that wait for a slow terminal; the oldest are dropped first."""
 PATIENCE = 2.0
-"""Longest wait for a blocked terminal when the view closes [s]."""
+"""Longest wait for a blocked terminal at the end [s]."""
 MOST_KEYS = 5
-"""Userdata keys in the panel: those that were written last."""
+"""Userdata keys in the panel, the most recently written ones."""
 VALUE_LENGTH = 60
 MOST_ROWS = 40
-"""Rows of the table at the end; deeper levels are left out first."""
+"""Rows of the table at the end; deeper levels are left out if there are more."""
 
 _REPR = reprlib.Repr()
 _REPR.maxother = _REPR.maxstring = VALUE_LENGTH
@@ -70,14 +70,14 @@ class TerminalView:
 
     Args:
         record: The machine's structure.
-        plain: Only lines, no panel. A stream that is no terminal is plain in any case.
+        plain: Only lines, no panel. Output that is not a terminal is always plain.
         console: Where to draw; standard output by default.
         clock: The machine's clock; the current one by default.
-        drawing: The clock to draw by, where the machine's runs faster than people look; the
-            machine's by default.
+        drawing: The clock for updates, if the machine's runs faster than real time; the machine's
+            by default.
 
     Attributes:
-        history: What the view has heard, also for `viz.render(..., run=view.history)`.
+        history: The events so far, also for `viz.render(..., run=view.history)`.
 
     Threads: `on_event` may be called from any thread and never waits for the terminal.
     """
@@ -120,9 +120,9 @@ class TerminalView:
         self.close()
 
     def close(self) -> None:
-        """Draw what is left and give the terminal back; a second call does nothing.
+        """Draw the remaining lines and restore the terminal; a second call does nothing.
 
-        Blocks: until that is done, at most 2 s when the terminal takes nothing.
+        Blocks: until that is done, at most 2 s if the terminal blocks.
         """
         task, self._task = self._task, None
         if task is None:
@@ -132,7 +132,7 @@ class TerminalView:
         task.join(PATIENCE)
 
     def on_event(self, event: ev.Event) -> None:
-        """Take one event in; for `machine.subscribe`."""
+        """Process one event; for `machine.subscribe`."""
         line = self._event_lines.line(event)
         self.history.on_event(event)
         if line is not None and not self._gone:
@@ -146,7 +146,7 @@ class TerminalView:
         """Print the table of states and the mission's outcome; None: the mission raised.
 
         Raises:
-            BrokenPipeError: nobody reads standard output any more.
+            BrokenPipeError: standard output has been closed.
 
         Blocks: while the terminal takes the text.
         """
@@ -157,7 +157,7 @@ class TerminalView:
         self._console.print(summary(self._record, self.history, outcome, MOST_ROWS, narrow=narrow))
 
     def _draw(self) -> None:
-        """The drawing task: woken by events, at most ten times a second."""
+        """Draw in a task of its own: woken by events, at most ten times per second."""
         try:
             while not self._closing:
                 self._wake.wait(TICK if self._live is not None else None)
@@ -167,7 +167,7 @@ class TerminalView:
                     self._drawing.sleep(FRAME)
             self._frame()
             self._release()
-        except (OSError, SystemExit):  # a closed pipe, a lost login: the mission goes on unseen
+        except (OSError, SystemExit):  # a closed pipe or a lost login does not stop the mission
             self._gone = True
         except BaseException:
             self._release()
@@ -204,7 +204,7 @@ class TerminalView:
         return Group(*parts)
 
     def _userdata(self) -> list[RenderableType]:
-        """What was written last, one key a line, the newest first."""
+        """Return the userdata written last, one key per line, newest first."""
         table = Table.grid(padding=(0, 2))
         bars = Table.grid(padding=(0, 2), expand=False)
         for key, value in self.history.written(MOST_KEYS):
@@ -217,7 +217,7 @@ class TerminalView:
         return [part for part in (bars, table) if part.row_count]
 
     def _bar(self, key: str, progress: Written) -> list[RenderableType]:
-        """How far the mission is by its own word: name, bar, share, time left, text."""
+        """Return a row for the progress that the mission itself reports."""
         share, seconds = progress.fraction, progress.seconds_left
         cells: list[RenderableType] = [Text(f"  {shorten(key, 24)}", no_wrap=True)]
         if self._console.width >= NARROW and share is not None:
@@ -230,7 +230,7 @@ class TerminalView:
         return cells
 
     def _running(self) -> list[tuple[str, float]]:
-        """The running states that contain no other running state."""
+        """Return the running states that contain no other running state."""
         active = self.history.active()
         return [
             (path, since)
@@ -278,13 +278,14 @@ class TerminalView:
 
 
 def _standard_output() -> Console:
-    if isinstance(sys.stdout, io.TextIOWrapper):  # an ASCII terminal gets question marks
+    # An ASCII terminal gets question marks instead of an error for the first arrow.
+    if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")
     return _Output(highlight=False)
 
 
 class _Output(Console):
-    """A console that tells when nobody reads it, instead of ending the process."""
+    """A console that raises on a closed pipe; rich's own would end the process."""
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError(errno.EPIPE, "nobody reads standard output any more")
@@ -295,7 +296,7 @@ def _live_panel(console: Console) -> Live:
 
 
 def _span(seconds: float) -> str:
-    """A duration to look at: `3.2 s`, `2:05`, `1:02:05`."""
+    """Return a duration for reading: `3.2 s`, `2:05`, `1:02:05`."""
     if seconds < 60:  # noqa: PLR2004  a minute
         return f"{seconds:.1f} s"
     minutes, rest = divmod(int(seconds), 60)

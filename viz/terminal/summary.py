@@ -1,4 +1,4 @@
-"""The table at the end of a run: states, outcomes, durations."""
+"""Prints the table at the end of a run: states, outcomes, durations."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def summary(
     *,
     narrow: bool = False,
 ) -> RenderableType:
-    """Return the table of what the run visited and the line with the mission's outcome.
+    """Return the table of visited states and a line with the mission's outcome.
 
     Args:
         record: The machine.
         history: The run.
-        outcome: The mission's; None when it raised.
-        most_rows: Levels that would make the table longer are left out, innermost first.
-        narrow: A state's outcomes stand below its name.
+        outcome: The mission's outcome; None if it raised.
+        most_rows: The innermost levels are left out if the table would have more rows.
+        narrow: Put a state's outcomes below its name.
     """
     visits = history.visits()
     states = [state for state in record.walk() if state.path in visits and state is not record]
@@ -72,7 +72,7 @@ def _add(table: Table, state: StateRecord, visits: Visits, depth: int, *, narrow
 
 
 def _outcomes(visits: Visits) -> Text:
-    """All the ways the state ended, each with its count when there were several."""
+    """Return all outcomes of the state, with counts if there are several."""
     if len(visits.outcomes) == 1:
         return outcome_text(visits.outcome or "")
     return Text(", ").join(
