@@ -1,10 +1,10 @@
-"""The `smachpy` command: every subcommand is found through an entry point.
+"""The `smachpy` command; its subcommands are entry points.
 
 A package adds a subcommand with an entry point in the group `smachpy.commands` whose object is a
-function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`. With
-`words=()` set as well it gets what stands after the first `--` there, and renaming in the style of
-ROS (`a:=b`, `--ros-args`) in `names`. With `all_words=()` it gets all words there, but a `--help`
-that stands alone: they are another program's.
+function `register(subparsers)`. It adds one parser and sets `run=function(args) -> int`. If it also
+sets `words=()`, it receives the words after the first `--` there, and ROS name remapping (`a:=b`,
+`--ros-args`) in `names`. If it sets `all_words=()`, it receives all words there, except a lone
+`--help`: they are meant for another program.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ EXIT_INTERRUPTED = 128 + signal.SIGINT
 
 
 class UsageError(SmachError):
-    """What the user asked for cannot be done; the text says why and what to try."""
+    """The command cannot do what was asked; the text says why and what to try."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """argparse with the house's exit code and a way out in every error."""
+    """argparse with smachpy's exit code and the hint `--help` in every error."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\nTry '{self.prog} --help'.\n")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Put aside what is not for this command but for what it runs, if it has `words`."""
+        """Separate the words for this command from those for the mission that it runs."""
         if args and self.get_default("all_words") is not None and args not in _HELP:
             found, _ = super().parse_known_args([], namespace)
             found.all_words = tuple(args)
@@ -54,7 +54,9 @@ class _Parser(argparse.ArgumentParser):
             names = parse_arguments(args[:end])
             found, unknown = super().parse_known_args(list(names.rest), namespace)
             found.words, found.names = tuple(args[end + 1 :]), names
-        if unknown:  # told here by the subcommand: argparse leaves it to the parser above
+        if (
+            unknown
+        ):  # reported here: argparse would report it for the parser above, without its usage
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return found, []
 
@@ -62,14 +64,14 @@ class _Parser(argparse.ArgumentParser):
 def main(
     argv: Sequence[str] | None = None, *, on_ready: Callable[[], object] = lambda: None
 ) -> int:
-    """Run the command line; returns the exit code.
+    """Run the command line and return the exit code.
 
     Exit codes: 0 success, 1 the mission or check did not succeed, 2 bad input or an output that
     cannot be written, 130 Ctrl-C.
 
     Args:
-        argv: The arguments; those of the process when None.
-        on_ready: Called when everything is imported, before the command begins.
+        argv: The arguments; None takes those of the process.
+        on_ready: Called when everything is imported, before the command starts.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     return run_program("smachpy", lambda: _run(arguments, on_ready), draws=True)
@@ -113,7 +115,7 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def _wanted(arguments: Sequence[str]) -> list[EntryPoint]:
-    """The one command that is asked for, so that the others need not be imported, else all."""
+    """Return only the given command, so that the others need not be imported; without one, all."""
     commands = sorted(entry_points(group=GROUP), key=lambda command: command.name)
     first = next((word for word in arguments if not word.startswith("-")), None)
     return [command for command in commands if command.name == first] or commands

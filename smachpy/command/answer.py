@@ -1,4 +1,4 @@
-"""`smachpy answer`: what missions ask now, and the answer to it."""
+"""`smachpy answer`: shows the questions of missions, and answers one."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 EXIT_NOTHING = 1
 EXAMPLES = """examples:
-  smachpy answer                       what missions ask now
+    smachpy answer                       show the current questions
   smachpy answer yes                   answer the only question
-  smachpy answer yes --state CONFIRM   the question of that state, where there are several
+    smachpy answer yes --state CONFIRM   answer the question of that state, if there are several
 """
 
 
@@ -36,15 +36,19 @@ def register(subparsers: Any) -> None:
         "answer",
         help="answer the question of a mission",
         description="Show the questions that missions ask on this network and in your private "
-        "runs, or answer one. Exit codes: 0 taken or shown, 1 nobody asks anything, 2 not taken.",
+        "runs, or answer one. Exit codes: 0 answered or shown, 1 no questions, 2 not answered.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("answer", nargs="?", help="one of the answers; none shows the questions")
+    parser.add_argument(
+        "answer", nargs="?", help="one of the answers; without it, show the questions"
+    )
     parser.add_argument(
         "--state", metavar="PATH", help="the state that asks, or the end of its path"
     )
-    parser.add_argument("--by", metavar="NAME", help="who answers, for the record (default: you)")
+    parser.add_argument(
+        "--by", metavar="NAME", help="your name, for the record (default: login name)"
+    )
     parser.add_argument("--json", action="store_true", help="show the questions as JSON")
     parser.set_defaults(run=_run)
 
@@ -64,14 +68,14 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def choose(questions: Sequence[Question], state: str | None) -> Question:
-    """Return the question that is meant.
+    """Return the question to answer.
 
     Args:
-        questions: All there are.
-        state: Path of the state that asks, or the end of it; None: there is only one.
+        questions: All open questions.
+        state: Path of the state that asks, or the end of it; None if there is only one.
 
     Raises:
-        MissionError: there is none, or several fit.
+        MissionError: there is none, or several match.
     """
     paths = [one.path for one in questions]
     if not questions:
@@ -110,7 +114,7 @@ def _show(questions: Sequence[Question], *, as_json: bool) -> int:
 
 @contextlib.contextmanager
 def _nodes() -> Iterator[list[Node]]:
-    """The network that the environment names; else the default one and this user's private runs."""
+    """Yield nodes: on the network of the environment, or on the default one and private runs."""
     from actionlib_core.config import Config
     from actionlib_core.node import Node, get_node
     from actionlib_core.private_network import list_private_networks, network_is_chosen

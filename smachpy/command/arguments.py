@@ -1,4 +1,4 @@
-"""A mission's arguments: the parameters of its function, filled from a command line.
+"""Fills the parameters of a mission's function from a command line.
 
     def gotopose(robot: str, x: float, y: float, theta: float = 0.0) -> StateMachine: ...
 
@@ -6,7 +6,7 @@
     smachpy run rp_action.gotopose -- robot_0 10 2 --theta=1.57
     smachpy run rp_action.gotopose --input robot=robot_0 --input x=10 --input y=2
 
-The annotations say what fits; the first line and the `Args:` of the docstring are the help.
+The annotations give the types; the first line and the `Args:` of the docstring are the help.
 """
 
 from __future__ import annotations
@@ -56,13 +56,13 @@ _WORDS: Final[dict[object, str]] = {
 
 
 class Text(str):
-    """A value as it was typed; what it means depends on the parameter that it is for."""
+    """A value as typed; its meaning depends on the parameter."""
 
     __slots__ = ()
 
 
 class MisfitError(ValueError):
-    """A value does not fit; the text says what was expected."""
+    """A value does not fit a parameter; the text says what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +70,12 @@ class Parameter:
     """One parameter of a mission's function.
 
     Attributes:
-        name: As in Python.
-        hint: Its type; `Any` when there is no annotation.
-        default: `NO_DEFAULT` when it has to be given.
-        text: From the docstring.
-        rest: It takes all the words that are left: a list, and the last in its place.
-        named: It is given by name only.
+        name: The name in Python.
+        hint: Its type; `Any` without an annotation.
+        default: `NO_DEFAULT` if it is required.
+        text: Its text in the docstring.
+        rest: It takes all remaining words: a list that is the last positional parameter.
+        named: It is keyword-only.
     """
 
     name: str
@@ -87,14 +87,15 @@ class Parameter:
 
     @property
     def required(self) -> bool:
-        """Whether it has to be given."""
+        """Whether it has no default."""
         return self.default is NO_DEFAULT
 
     def shown(self) -> str:
-        """Return it as it stands in a usage line."""
+        """Return its form in a usage line."""
         if self.named:
             name = self.name.replace("_", "-")
-            flags = {False: f"--{name}", True: f"--no-{name}"}  # what there is to say
+            # The usage shows only the flag that changes the default.
+            flags = {False: f"--{name}", True: f"--no-{name}"}
             known = isinstance(self.default, bool)
             word = flags[bool(self.default)] if known else f"--{name} VALUE"
         else:
@@ -103,18 +104,18 @@ class Parameter:
         return word if self.required else f"[{word}]"
 
 
-# -- what fits -------------------------------------------------------------------------------------
+# -- types -----------------------------------------------------------------------------------------
 
 
 def fit(value: object, hint: Any) -> Any:
-    """Return `value` as a parameter of type `hint` takes it.
+    """Return `value` converted for a parameter of type `hint`.
 
     Args:
         value: A Python value, or a `Text`.
         hint: A type, a union, `Literal`, an enumeration, a list of any of them, or `Any`.
 
     Raises:
-        MisfitError: it cannot be taken.
+        MisfitError: it cannot be converted.
     """
     kinds = _alternatives(hint)
     if isinstance(value, Text):
@@ -130,7 +131,7 @@ def fit(value: object, hint: Any) -> Any:
 
 
 def expectation(hint: Any) -> str:
-    """Return what is expected of a parameter, in words."""
+    """Return the type of a parameter in words."""
     kinds = _alternatives(hint)
     return " or ".join(_kind_in_words(k) for k in kinds if not (k is int and float in kinds))
 
@@ -154,7 +155,7 @@ def _alternatives(hint: Any) -> tuple[Any, ...]:
 
 
 def _choices(kind: Any) -> dict[str, Any]:
-    """Return what may be typed for a `Literal` or an enumeration, and what it stands for."""
+    """Return the words for a `Literal` or an enumeration, with their values."""
     if get_origin(kind) is Literal:
         return {str(choice): choice for choice in get_args(kind)}
     if isinstance(kind, type) and issubclass(kind, enum.Enum):
@@ -167,7 +168,11 @@ def _is_list(kind: Any) -> bool:
 
 
 def _read(text: Text, kinds: tuple[Any, ...]) -> Any:
-    """Return what was typed, as one of `kinds`."""
+    """Return a typed word as one of `kinds`.
+
+    In this order: a choice, the YAML value if its type fits as it is, text or a path, a
+    conversion. Text comes after the YAML types, so that `x: int | str` reads "3" as a number.
+    """
     for kind in kinds:
         choices = _choices(kind)
         if text in choices:
@@ -188,12 +193,12 @@ def _read(text: Text, kinds: tuple[Any, ...]) -> Any:
 def _yaml(text: Text) -> object:
     try:
         return load_yaml(str(text))
-    except YamlTextError:  # `2026-13-01` looks like a date and is none
+    except YamlTextError:  # `2026-13-01`, for example, looks like a date but is none
         return str(text)
 
 
 def _is_a(value: object, kind: Any) -> bool:
-    """Tell whether a value needs no conversion."""
+    """Return whether a value needs no conversion."""
     if kind is Any:
         return True
     if kind is float:
@@ -207,7 +212,7 @@ def _is_a(value: object, kind: Any) -> bool:
 
 
 def _convert(value: object, kind: Any, text: Text | None = None) -> Any:
-    """Return a value as a `kind`, None when it cannot be one."""
+    """Return a value converted to `kind`; None if that is impossible."""
     choices = _choices(kind)
     if choices:
         return choices.get(str(value), value if value in choices.values() else None)
@@ -270,12 +275,12 @@ def _hint(thing: Callable[..., object], parameter: inspect.Parameter) -> Any:
     names = getattr(inspect.unwrap(thing), "__globals__", {})
     try:
         return get_type_hints(holder, globalns=names)["it"]
-    except (NameError, TypeError, SyntaxError):  # a name that only type checkers import
+    except (NameError, TypeError, SyntaxError):  # a name imported under TYPE_CHECKING only
         return Any
 
 
 def _texts(thing: object) -> dict[str, str]:
-    """Return what a docstring's `Args:` say, by name."""
+    """Return the texts of a docstring's `Args:` section, by name."""
     _, _, section = (inspect.getdoc(thing) or "").partition("\nArgs:\n")
     texts: dict[str, str] = {}
     name = ""
@@ -295,12 +300,12 @@ def _texts(thing: object) -> dict[str, str]:
 
 
 def wants_help(words: Sequence[str]) -> bool:
-    """Tell whether the words after `--` ask what may stand there."""
+    """Return whether the words after `--` ask for help about themselves."""
     return not _HELP.isdisjoint(words)
 
 
 def usage(target: Target) -> str:
-    """Return what a mission is and what it takes, several lines."""
+    """Return a mission's help: usage, summary and parameters."""
     parameters = list(parameters_of(target.thing).values())
     lines = [usage_line(target, parameters), ""]
     if target.summary:
@@ -320,7 +325,7 @@ def usage(target: Target) -> str:
 
 
 def usage_line(target: Target, parameters: Sequence[Parameter]) -> str:
-    """Return the line that shows how to call it."""
+    """Return the usage line of a mission."""
     words = " ".join(parameter.shown() for parameter in parameters)
     return f"usage: smachpy run {target.name} [OPTIONS]{' -- ' if words else ''}{words}"
 
@@ -332,12 +337,12 @@ def read_words(
 
     Args:
         target: The mission.
-        words: What stands after `--`: values in the order of the parameters, `--name VALUE`,
-            `--name=VALUE`; `--flag` and `--no-flag` for a truth value.
-        given: What was given by name already (`--input`).
+        words: The words after `--`: values in the order of the parameters, `--name VALUE`,
+            `--name=VALUE`; `--flag` and `--no-flag` for a bool.
+        given: Values that were already given by name (`--input`).
 
     Raises:
-        MissionError: a word is too many, unknown, missing or does not fit; names all of them.
+        MissionError: words are superfluous, unknown, missing or do not fit; all are listed.
     """
     parameters = parameters_of(target.thing)
     reader = _Reader(parameters, given)
@@ -396,7 +401,9 @@ class _Reader:
         elif words and words[0] != "--" and not _OPTION.match(words[0]):
             self._take(parameter, Text(words.pop(0)), word)
         else:
-            self.problems.append(f"{word}: no value follows; expected {_wish(parameter)}.")
+            wish = expectation(parameter.hint)
+            self.problems.append(f"{word}: no value follows; expected {wish}.")
+            # Counts as given, so that it is not reported as missing too.
             self.values.setdefault(name, None)
 
     def _flag(self, name: str) -> Parameter | None:
@@ -415,6 +422,7 @@ class _Reader:
         for parameter in free:
             if not places:
                 return
+            # One word that begins with "[" is a whole list in YAML, not its only item.
             if parameter.rest and (len(places) > 1 or not places[0].startswith("[")):
                 self._take(parameter, [Text(word) for word in places], parameter.name)
                 return
@@ -436,7 +444,3 @@ class _Reader:
             shown = str(value) if isinstance(value, Text) else value
             self.problems.append(f"{where}: got {shown!r}; expected {error}.")
             self.values[parameter.name] = None
-
-
-def _wish(parameter: Parameter) -> str:
-    return expectation(parameter.hint)

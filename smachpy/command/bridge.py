@@ -1,13 +1,14 @@
-"""`smachpy bridge ros1`: real ROS 1 robots, without ROS installed."""
+"""`smachpy bridge ros1`: connects real ROS 1 robots, without ROS installed."""
 
 from __future__ import annotations
 
-import argparse
 from typing import TYPE_CHECKING, Any
 
-from smachpy.sim.geometry import finite
+from smachpy.sim.geometry import positive_seconds
 
 if TYPE_CHECKING:
+    import argparse
+
     from actionlib_core.ros1 import Ros1Bridge
 
 EXIT_ENDED = 1
@@ -15,7 +16,7 @@ EXIT_ENDED = 1
 
 def register(subparsers: Any) -> None:
     """Add `smachpy bridge`."""
-    parser = subparsers.add_parser("bridge", help="reach robots of another kind")
+    parser = subparsers.add_parser("bridge", help="connect robots that use another middleware")
     kinds = parser.add_subparsers(metavar="KIND", required=True, parser_class=type(parser))
     ros1 = kinds.add_parser(
         "ros1",
@@ -23,12 +24,12 @@ def register(subparsers: Any) -> None:
         description="Carry actions, topics and services between a ROS 1 robot and this network, "
         "until Ctrl-C. Without names: all actions and services of the robot, and the topics that "
         "programs here use. Exit codes: 0, 1 the robot's master "
-        "has ended the bridge, 2 bad input.",
+        "ended the bridge, 2 bad input.",
     )
     ros1.add_argument(
         "--master",
         metavar="URL",
-        help="of the robot: http://robot:11311 (default: $ROS_MASTER_URI, else this computer's)",
+        help="the robot's master: http://robot:11311 (default: $ROS_MASTER_URI or this computer)",
     )
     names = (
         ("--action", "NAME[:TYPE]", "an action: move_base:move_base_msgs/MoveBaseAction"),
@@ -40,31 +41,31 @@ def register(subparsers: Any) -> None:
             option, action="append", default=[], metavar=metavar, help=f"{text} (repeatable)"
         )
     ros1.add_argument(
-        "--used", action="store_true", help="beside names: also what is carried without any"
+        "--used", action="store_true", help="in addition to given names: the default without names"
     )
-    ros1.add_argument("--all", action="store_true", help="everything but the log")
+    ros1.add_argument("--all", action="store_true", help="everything except the log")
     ros1.add_argument(
         "--namespace",
         default="",
         metavar="NAME",
-        help="what the robot's names live under here, robot_1 say",
+        help="prefix of the robot's names here, for example robot_1",
     )
     ros1.add_argument(
         "--host",
         default="",
         metavar="HOST",
-        help="under which the robot finds this computer (default: $ROS_HOSTNAME, $ROS_IP, the "
-        "address from which its master is reached)",
+        help="the name or address of this computer for the robot (default: $ROS_HOSTNAME, $ROS_IP, "
+        "the address from which its master is reached)",
     )
     ros1.add_argument(
         "--status-timeout",
-        type=_seconds,
+        type=positive_seconds,
         default=5.0,
         metavar="S",
-        help="an action server of the robot that says nothing for so long is gone [s] "
+        help="an action server of the robot that is silent for this long is gone [s] "
         "(default: %(default)g)",
     )
-    ros1.add_argument("--config", metavar="FILE", help="how to join the network")
+    ros1.add_argument("--config", metavar="FILE", help="network configuration")
     ros1.set_defaults(run=_run)
 
 
@@ -102,10 +103,3 @@ def _ready(bridge: Ros1Bridge, namespace: str) -> str:
 def _split_action(text: str) -> tuple[str, str]:
     name, _, type_name = text.partition(":")
     return name, type_name
-
-
-def _seconds(text: str) -> float:
-    seconds = finite(text)
-    if seconds <= 0:
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
-    return seconds

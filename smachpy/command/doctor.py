@@ -1,4 +1,4 @@
-"""`smachpy doctor --ros2`: whether a ROS 2 robot can be used from here, and what to try if not."""
+"""`smachpy doctor --ros2`: checks whether a ROS 2 robot can be used from here."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros2.network import RosNetwork
 
 EXIT_PROBLEM = 1
-LIST_S = 2.0
-ASK_S = 2.0
+LIST_S = 2.0  # [s] for the list of the robot's nodes
+ASK_S = 2.0  # [s] for the nodes' answers
 PARAMETERS = "rcl_interfaces/srv/GetParameters"
 
 
@@ -30,13 +30,13 @@ def register(subparsers: Any) -> None:
     """Add `smachpy doctor`."""
     parser = subparsers.add_parser(
         "doctor",
-        help="say what is wrong with the link to a ROS 2 robot",
+        help="diagnose the connection to a ROS 2 robot",
         description="Look at a ROS 2 robot whose middleware is rmw_zenoh: router, nodes, type "
-        "hashes, actions, quality of service, answers, clock. Exit codes: 0 all is well, 1 there "
-        "are problems, 2 bad input.",
+        "hashes, actions, quality of service, answers, clock. Exit codes: 0 no problems, 1 "
+        "problems, 2 bad input.",
         epilog="example: smachpy doctor --ros2 tcp/robot.local:7447 --domain 42",
     )
-    # It takes nothing else, so the endpoint may be left out.
+    # `--ros2` needs no value here: this command has nothing else to check.
     add_ros2_options(parser, nargs="?", const=os.environ.get(ROS2_VARIABLE) or ROUTER_ENDPOINT)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=_run)
@@ -72,9 +72,9 @@ def _print(findings: list[tuple[Ros2, Finding]]) -> None:
 
 
 def look_at(node: Node, settings: Ros2) -> list[Finding]:
-    """Return what is found of one network, the worst thing last where nothing more can be seen.
+    """Return the findings for one network; if nothing more can be seen, the last one says why.
 
-    Blocks: until the router has answered and the nodes too, `LIST_S` and `ASK_S` at most.
+    Blocks: until the router and the nodes have answered, `LIST_S` and `ASK_S` at most.
     """
     from actionlib_core.wire.ros2 import diagnosis
     from actionlib_core.wire.ros2.diagnosis import Finding, Level
@@ -101,7 +101,7 @@ def look_at(node: Node, settings: Ros2) -> list[Finding]:
 
 
 def _ask(node: Node, network: RosNetwork, tokens: list[Token]) -> list[Finding]:
-    """Ask each node for none of its parameters: how fast it answers, and what time it has."""
+    """Ask each node for an empty list of parameters, to see its delay and its clock."""
     from actionlib_core.interfaces import ros2
     from actionlib_core.wire.ros2 import diagnosis
     from actionlib_core.wire.ros2.graph import RosType
@@ -143,6 +143,8 @@ def _ask(node: Node, network: RosNetwork, tokens: list[Token]) -> list[Finding]:
         query.close()
     seconds = {name: (at - started) / 1e9 for name, (at, _) in answers.items()}
     findings = [diagnosis.diagnose_answers({name: seconds.get(name) for name in asked})]
+    # As in NTP: the reply was sent half-way between question and answer, give or take half the
+    # delay.
     offsets = {
         name: ((there - (started + at) / 2) / 1e9, (at - started) / 2e9)
         for name, (at, reply) in answers.items()
@@ -152,7 +154,7 @@ def _ask(node: Node, network: RosNetwork, tokens: list[Token]) -> list[Finding]:
 
 
 def _time_in(reply: Reply) -> int:
-    """Return when a node has sent a reply [ns since 1970], by its clock; 0 if it does not say."""
+    """Return when a node sent its reply, by its own clock [ns since 1970]; 0 if unknown."""
     from actionlib_core.wire.ros2.attachment import unpack_attachment
 
     try:

@@ -1,4 +1,4 @@
-"""`smachpy run --durable`: the mission's journal, and which mission of it is meant."""
+"""`smachpy run --durable`: opens the mission's journal, and finds the mission in it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from actionlib_core.output import tell
 from smachpy.command.targets import PLANS
 from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
-from smachpy.sim.geometry import finite
+from smachpy.sim.geometry import positive_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
     from smachpy.durable.store import FencedError, MissionRow, Store
     from smachpy.machines.container import Container
 
-LEASE_S: Final = 15.0
+LEASE_S: Final = 15.0  # [s] default of --lease
 EXIT_FENCED: Final = 2
 JOURNAL: Final = "./.smachpy/journal.db"
 
 
 @dataclass(frozen=True, slots=True)
 class DurableOptions:
-    """How a mission is kept.
+    """The options of a durable run.
 
     Attributes:
         journal: A path, or a URL of PostgreSQL.
-        mission: The mission's id; None finds it by what is run.
-        target: What was given to `smachpy run`; a file by its whole path.
-        argv: The arguments that belong to the mission.
-        robot: The robot that it needs, or None.
-        outage: Whether deadlines go on while no process runs it.
-        max_outage: How old the journal may be [s]; None: what the mission says.
-        lease_s: How long a runner that says nothing holds the mission [s].
+        mission: The mission's id; None finds it by target and robot.
+        target: The target of `smachpy run`; for a file its absolute path.
+        argv: The mission's own arguments.
+        robot: The robot that it uses, or None.
+        outage: Whether deadlines continue during an outage.
+        max_outage: The largest age of the journal [s]; None: as the mission declares.
+        lease_s: How long a silent process holds the mission [s].
         migrate: Old path -> new path.
     """
 
@@ -57,36 +57,36 @@ class DurableOptions:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add `--durable` and what goes with it."""
+    """Add `--durable` and its companions."""
     group = parser.add_argument_group("a mission that survives (docs/durable_missions.md)")
     group.add_argument(
         "--durable",
         nargs="?",
         const=JOURNAL,
         metavar="JOURNAL",
-        help=f"keep it in a file (default: {JOURNAL}) or at postgresql://HOST/DATABASE; go on "
-        "with it if it has begun",
+        help=f"store it in a file (default: {JOURNAL}) or at postgresql://HOST/DATABASE; continue "
+        "it if it has begun",
     )
-    group.add_argument("--mission", metavar="ID", help="which one, where it is to have a name")
+    group.add_argument("--mission", metavar="ID", help="the mission's id, if it needs a name")
     group.add_argument(
         "--outage",
         choices=("counts", "pauses"),
         default="counts",
-        help="whether timeouts go on while no process runs it (default: %(default)s)",
+        help="whether timeouts continue while no process runs it (default: %(default)s)",
     )
     group.add_argument(
         "--max-outage",
-        type=_seconds,
+        type=positive_seconds,
         metavar="S",
-        help="do not go on with a journal that is older [s] (default: what the mission says)",
+        help="refuse a journal that is older [s] (default: as the mission declares)",
     )
     group.add_argument(
         "--lease",
-        type=_seconds,
+        type=positive_seconds,
         default=LEASE_S,
         metavar="S",
-        help="in a database: after so long without a sign of this process another one may take the "
-        "mission over [s] (default: %(default)g)",
+        help="in a database: after this long without a sign of this process another one may take "
+        "over the mission [s] (default: %(default)g)",
     )
     group.add_argument(
         "--migrate",
@@ -94,15 +94,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=_pair,
         metavar="OLD=NEW",
-        help="what has become of a state's path since the mission began",
+        help="a state's new path, if it changed since the mission began",
     )
 
 
 def durable_options(args: argparse.Namespace) -> DurableOptions | None:
-    """Return what was given; None without `--durable`.
+    """Return the options; None without `--durable`.
 
     Raises:
-        MissionError: options that go with it were given without it.
+        MissionError: a companion option was given without it, or time is virtual.
     """
     if args.durable is None:
         given = [
@@ -138,29 +138,33 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
 
 
 def whole_target(text: str) -> str:
-    """Return what names a mission; a file by its whole path."""
+    """Return a mission's target; for a file with its absolute path."""
     place, colon, attribute = text.partition(":")
     is_file = place.endswith((".py", *PLANS)) or "/" in place
     return f"{Path(place).resolve()}{colon}{attribute}" if is_file else text
 
 
 def words_of(args: argparse.Namespace) -> tuple[str, ...]:
-    """Return the words of a command line that are the mission's arguments."""
+    """Return the part of a command line that is for the mission."""
     inputs = [word for key, text in args.input for word in ("--input", f"{key}={text}")]
     words = ["--", *args.words] if args.words else []
     return (*inputs, *words)
 
 
 def _leave(error: FencedError) -> None:
-    """End the process at once: to preempt would cancel goals, which another process follows now."""
+    """End the process at once: a preempt would cancel goals that another process follows now."""
     tell("smachpy", str(error))
     sys.stdout.flush()
     os._exit(EXIT_FENCED)
 
 
 @contextlib.contextmanager
-def kept(target: Target, machine: Container, options: DurableOptions | None) -> Iterator[None]:
-    """Keep the run of `machine` in the block, if that was asked for, or go on with one.
+def journalled(
+    target: Target, machine: Container, options: DurableOptions | None
+) -> Iterator[None]:
+    """Write the run of `machine` to its journal within the block, or continue one.
+
+        Without options nothing is written.
 
     Raises:
         SmachError: as `smachpy.run_durable` does.
@@ -173,7 +177,8 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
 
     info = mission_info(target.thing)
     limit = info.max_outage if options.max_outage is None else options.max_outage
-    # Who cannot reach the store has stopped before another one may take over: see `open_store`.
+    # Give up before the lease runs out: this process must have stopped before another one may
+    # take over (`open_store`).
     patience = min(8.0, options.lease_s / 2)
     with contextlib.closing(open_store(options.journal, patience=patience)) as store:
         row = find_or_create(store, machine, options)
@@ -195,10 +200,10 @@ def kept(target: Target, machine: Container, options: DurableOptions | None) -> 
 
 
 def find_or_create(store: Store, machine: Container, options: DurableOptions) -> MissionRow:
-    """Return the mission that is to go on, or a new one.
+    """Return the mission to continue, or a new one.
 
     Raises:
-        MissionError: the one that has begun has other arguments.
+        MissionError: the mission that has begun has other arguments.
     """
     from smachpy.durable.mission import new_mission
 
@@ -231,16 +236,9 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
 
 
 def store_name(journal: str) -> str:
-    """Return what to call a journal, without the password of its URL."""
+    """Return a journal's name for messages, without the password in its URL."""
     scheme, mark, rest = journal.partition("://")
     return f"{scheme}{mark}{rest.rpartition('@')[2]}" if mark else journal
-
-
-def _seconds(text: str) -> float:
-    seconds = finite(text)
-    if seconds <= 0:
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
-    return seconds
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""A run's events as lines of JSON on a stream, standard output for example."""
+"""Writes a run's events as lines of JSON to a stream, for example to standard output."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
 
 CLOSE_S = 10.0
-"""Longest wait at the end for a reader that is behind [s]."""
+"""Longest wait at the end for a slow reader [s]."""
 
 
 class EventStream:
-    """Writes every event as it happens, in the form of a recorded run; a context manager.
+    """Writes every event at once, in the format of a recorded run; a context manager.
 
     The mission never waits for the reader.
 
     Args:
-        out: Where to write.
+        out: The stream.
         record: The machine's structure.
         stamp_ns: When the run began [ns since the epoch].
 
@@ -36,7 +36,8 @@ class EventStream:
     def __init__(self, out: TextIO, record: StateRecord, stamp_ns: int) -> None:
         self._header = header_line(record, stamp_ns)
         self._out = out
-        self._executor = SerialExecutor(RealClock(), "events")  # a reader is slow in real time
+        # Real time: a slow reader is slow in real time, even if the mission's clock is virtual.
+        self._executor = SerialExecutor(RealClock(), "events")
         self._lock = threading.Lock()
         self._waiting: deque[str] = deque()
         self._scheduled = False
@@ -51,14 +52,14 @@ class EventStream:
         self.close()
 
     def close(self) -> None:
-        """Write what waits; a second call does nothing.
+        """Write the remaining lines; a second call does nothing.
 
-        Blocks: `CLOSE_S` at most.
+        Blocks: for `CLOSE_S` seconds at most.
         """
         self._executor.join(CLOSE_S)
 
     def on_event(self, event: ev.Event) -> None:
-        """Take one event in; for `machine.subscribe`."""
+        """Process one event; for `machine.subscribe`."""
         record = to_record(event)
         with self._lock:
             self._number += 1
@@ -66,7 +67,7 @@ class EventStream:
         self._put(line)
 
     def print_summary(self, outcome: str | None) -> None:
-        """Nothing: the last event says how it ended."""
+        """Print nothing: the last event has the outcome."""
 
     def _put(self, line: str) -> None:
         with self._lock:
@@ -85,5 +86,5 @@ class EventStream:
         try:
             self._out.write("".join(lines))
             self._out.flush()
-        except (OSError, ValueError):  # nobody reads any more: the mission goes on unseen
+        except (OSError, ValueError):  # the reader is gone: the mission continues without it
             self._gone = True

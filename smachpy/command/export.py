@@ -1,4 +1,4 @@
-"""`smachpy export`: a machine as a Petri net, for other tools."""
+"""`smachpy export`: writes a machine as a Petri net, for other tools."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to say when a module cannot be imported: an extra is missing, or a name is taken twice."""
+"""Explains failed imports: an extra is missing, or two packages have the same name."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ EXTRAS: Final = {
     "anywidget": "notebook",
 }
 OWN_PACKAGES: Final = ("actionlib_core", "viz", "missions")
-"""Top-level packages that are installed beside `smachpy`."""
+"""Top-level packages that are installed together with `smachpy`."""
 _OURS: Final = Path(__file__).resolve().parents[2]
 
 
 def load_view(name: str) -> Any:
-    """Return what an installed package offers to show runs with (`smachpy.pictures`).
+    """Return a view of an installed package by its entry point's name (`smachpy.pictures`).
 
     Raises:
         SmachError: there is none.
@@ -48,21 +48,21 @@ def load_view(name: str) -> Any:
 
 
 def advice(error: ImportError) -> str | None:
-    """Say why a module cannot be imported, and what to do.
+    """Return why a module cannot be imported, and what to do.
 
     Returns:
-        None when the module belongs to no extra and hides no package of ours: then it is not the
-        installation that is wrong.
+        None if the module belongs to no extra and hides none of our packages: then the cause is
+        not the installation.
     """
     return clash(error) or _missing_extra(error)
 
 
 def clash(error: ImportError, folders: Iterable[Path] = ()) -> str | None:
-    """Say which of two packages of one name hides the other, None when that is not the reason.
+    """Return which of two packages of one name hides the other; None if that is not the cause.
 
     Args:
-        error: What importing a module raised.
-        folders: Where the user's own modules are looked for.
+        error: The exception of the import.
+        folders: Where the user's own modules are.
     """
     name = (error.name or "").partition(".")[0]
     if name not in OWN_PACKAGES:
@@ -87,10 +87,10 @@ def clash(error: ImportError, folders: Iterable[Path] = ()) -> str | None:
 
 
 def hidden_by(module: str) -> Path | None:
-    """Return the user's package that is imported in place of ours, None when ours is.
+    """Return the user's package that is imported instead of ours; None if ours is.
 
     Args:
-        module: A module of ours, or its package.
+        module: The name of one of our modules or packages.
     """
     name = module.partition(".")[0]
     used = _place_of(name) if name in OWN_PACKAGES else None
@@ -98,7 +98,7 @@ def hidden_by(module: str) -> Path | None:
 
 
 def _place_of(name: str) -> Path | None:
-    """Return the folder or file of a top-level module, as it is imported here."""
+    """Return the folder or file from which a top-level module is imported here."""
     module = sys.modules.get(name)
     try:
         spec = module.__spec__ if module is not None else importlib.util.find_spec(name)

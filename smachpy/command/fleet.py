@@ -1,4 +1,4 @@
-"""`smachpy submit` and `smachpy runner`: missions in a queue, and who runs them."""
+"""`smachpy submit` and `smachpy runner`: a queue of missions, and the process that runs them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from actionlib_core.clock import Event, RealClock
 from actionlib_core.names import check_name
 from actionlib_core.output import printable, tell
 from smachpy.command.durable import JOURNAL, LEASE_S, store_name, whole_target, words_of
-from smachpy.command.run import add_input, positive_seconds, read_inputs
+from smachpy.command.run import add_input, read_inputs
+from smachpy.sim.geometry import positive_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
     from smachpy.durable.store import MissionRow, Store
 
 LOOK_S: Final = 2.0
-"""How often a runner looks into the queue: whose lease has run out tells nobody [s]."""
-FIRST_REST_S: Final = 5.0
-LONGEST_REST_S: Final = 300.0
+"""Period of a runner's look into the queue [s]: nobody announces that a lease has run out."""
+FIRST_REST_S: Final = 5.0  # [s] before a mission whose process died is tried again; doubles
+LONGEST_REST_S: Final = 300.0  # [s] limit of that pause
 MOST_AT_ONCE: Final = 999
 
 
@@ -35,23 +36,23 @@ def register_submit(subparsers: Any) -> None:
         "submit",
         help="put a mission into the queue of runners",
         usage="smachpy submit MISSION --db JOURNAL [OPTIONS] [-- ARGUMENTS]",
-        description="Put a mission into a queue, from which a 'smachpy runner' takes it.",
-        epilog="What stands after -- are the arguments of the mission's function. The mission is "
-        "built once here, so that what is wrong with it is said here.",
+        description="Put a mission into the queue of a 'smachpy runner'.",
+        epilog="The words after -- are the arguments of the mission's function. The mission is "
+        "built once here, so that errors are reported now.",
     )
     parser.add_argument(
-        "target", metavar="MISSION", help="as of `smachpy run`; runners must have it, too"
+        "target", metavar="MISSION", help="as for `smachpy run`; runners need it, too"
     )
     _add_db(parser)
     add_input(parser)
     parser.add_argument("--mission", metavar="ID", help="its id (default: a new one)")
-    parser.add_argument("--robot", default="", metavar="NAME", help="the robot that it moves")
+    parser.add_argument("--robot", default="", metavar="NAME", help="the robot that it uses")
     when = parser.add_mutually_exclusive_group()
-    when.add_argument("--at", metavar="TIME", help="not before 08:30, or 2026-03-28T08:30+01:00")
+    when.add_argument("--at", metavar="TIME", help="start it at 08:30, or 2026-03-28T08:30+01:00")
     when.add_argument(
         "--every",
         metavar="CRON",
-        help="again and again, '0 8 * * 1-5 Europe/Berlin' (default zone: UTC), until "
+        help="repeat it, '0 8 * * 1-5 Europe/Berlin' (default zone: UTC), until "
         "'smachpy missions cancel'",
     )
     parser.set_defaults(run=_submit, words=())
@@ -62,9 +63,9 @@ def register_runner(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "runner",
         help="run the missions of a queue",
-        description="Run missions that 'smachpy submit' has put into a queue, and go on with those "
-        "whose process or computer died. Any number of runners, on any number of computers, may "
-        "share a database. Ctrl-C and SIGTERM end it; what it runs is left to the others.",
+        description="Run the missions that 'smachpy submit' queued, and continue those whose "
+        "process or computer died. Any number of runners on any number of computers may share a "
+        "database. Ctrl-C and SIGTERM end it; its missions continue on other runners.",
     )
     _add_db(parser)
     parser.add_argument(
@@ -72,7 +73,7 @@ def register_runner(subparsers: Any) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="run missions of this robot only (again for another one; default: all missions)",
+        help="run only missions of this robot (repeatable; default: all missions)",
     )
     parser.add_argument(
         "--at-once",
@@ -86,10 +87,10 @@ def register_runner(subparsers: Any) -> None:
         type=positive_seconds,
         default=LEASE_S,
         metavar="S",
-        help="after so long without a sign of this computer another one takes its missions over "
+        help="after this long without a sign of this computer another one takes over its missions "
         "[s] (default: %(default)g)",
     )
-    parser.add_argument("--until-empty", action="store_true", help="end when nothing is left to do")
+    parser.add_argument("--until-empty", action="store_true", help="end when the queue is empty")
     parser.set_defaults(run=_run)
 
 
@@ -160,13 +161,13 @@ class Runner:
     Args:
         store: The queue.
         journal: Its path or URL, for the processes.
-        robots: Missions of these robots only; empty: all missions.
-        at_once: How many missions run at once.
-        lease_s: How long a process that says nothing holds its mission [s].
+        robots: Run only missions of these robots; empty: all missions.
+        at_once: Number of missions that run at once.
+        lease_s: How long a silent process holds its mission [s].
 
     Attributes:
         wake: Set when there may be something to do.
-        idle: Nothing runs here, and nothing that this runner could take will be due.
+        idle: Whether nothing runs here, and nothing that this runner could take will be due.
 
     Threads: `look`, `wait` and `leave` are called from one thread.
     """
@@ -174,7 +175,7 @@ class Runner:
     def __init__(
         self, store: Store, journal: str, *, robots: Sequence[str], at_once: int, lease_s: float
     ) -> None:
-        self._clock = RealClock()  # processes know no other
+        self._clock = RealClock()  # the missions run in processes of their own, in real time
         self.wake: Event = self._clock.event("work for the runner")
         self.idle = False
         self._store = store
@@ -183,12 +184,14 @@ class Runner:
         self._at_once = at_once
         self._lease_s = lease_s
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
-        self._rests: dict[str, tuple[float, float]] = {}  # id -> until when, how long
+        self._rests: dict[
+            str, tuple[float, float]
+        ] = {}  # id -> (end of its pause, length of it) [s]
         self._pause = 0.0
         self._unreachable = False
 
     def look(self) -> None:
-        """Start what can be started, and note what has ended."""
+        """Start missions that are due, and note those that have ended."""
         from smachpy.durable.schedule import due_schedules, next_mission, next_time
         from smachpy.durable.store import RUNNING, StoreError
 
@@ -204,6 +207,7 @@ class Runner:
         except StoreError as error:
             if error.reason not in {"busy", "unreachable"}:
                 raise
+            # Reported once per outage: the loop comes back every few seconds.
             if not self._unreachable:
                 tell("smachpy runner", str(error))
             self._unreachable = True
@@ -216,6 +220,7 @@ class Runner:
                 break
             self._start(row)
             running = dataclasses.replace(row, status=RUNNING)
+            # The row is as it was read: mark it here, so that its robot gets no second mission.
             rows = [running if each is row else each for each in rows]
         later = next_time(rows, now)
         if later is not None:
@@ -223,11 +228,11 @@ class Runner:
         self.idle = not self._processes and later is None and self._pause > 0
 
     def wait(self) -> None:
-        """Wait until there may be something to do."""
+        """Wait until a mission has ended or may be due."""
         self.wake.wait(self._pause)
 
     def leave(self) -> None:
-        """End the processes at once: their missions go on elsewhere, with the goals that run."""
+        """Kill the processes: other runners continue their missions, with the goals that run."""
         for process in self._processes.values():
             process.kill()
             process.wait()
@@ -252,7 +257,7 @@ class Runner:
         self.wake.set()
 
     def _note_ends(self, now: float) -> None:
-        """Say how missions have ended; one that is not over rests before it is tried again."""
+        """Report missions that have ended; one that is not over pauses before the next attempt."""
         from smachpy.durable.store import INTERRUPTED, QUEUED, UnknownMissionError
 
         ended = [one for one, process in self._processes.items() if process.poll() is not None]

@@ -1,4 +1,4 @@
-"""`smachpy missions`: the missions of a journal, and what a person does with them."""
+"""`smachpy missions`: lists, shows, resumes, cancels and forgets the missions of a journal."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from smachpy.durable.store import MissionRow
 
 
-_PASSED_ON = (
+_RUN_OPTIONS = (
     ("plain", "lines only, for logs"),
     ("view", "show it in a browser while it runs, and after"),
     ("control", "let viewers pause, step, jump and preempt"),
 )
-"""Options of `smachpy run` that `resume` has too, and their meaning."""
+"""Options of `smachpy run` that `resume` passes on, with their help."""
 
 
 def register(subparsers: Any) -> None:
@@ -33,7 +33,7 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "missions",
         help="list, show, resume, cancel and forget durable missions",
-        description="What `smachpy run --durable` keeps. Exit codes: 0 it was done, 2 bad input; "
+        description="Missions of `smachpy run --durable`. Exit codes: 0 done, 2 bad input; "
         "resume: those of `smachpy run`.",
     )
     commands = parser.add_subparsers(metavar="WHAT", required=True, dest="what")
@@ -46,7 +46,9 @@ def register(subparsers: Any) -> None:
     ):
         command = commands.add_parser(name, help=text, description=text)
         if name != "list":
-            command.add_argument("mission", metavar="ID", help="as 'smachpy missions list' has it")
+            command.add_argument(
+                "mission", metavar="ID", help="as listed by 'smachpy missions list'"
+            )
         command.add_argument(
             "--durable",
             default=JOURNAL,
@@ -56,7 +58,7 @@ def register(subparsers: Any) -> None:
         if name in {"list", "show"}:
             command.add_argument("--json", action="store_true", help="as JSON")
         if name == "resume":
-            for option, meaning in _PASSED_ON:
+            for option, meaning in _RUN_OPTIONS:
                 command.add_argument(f"--{option}", action="store_true", help=meaning)
             command.add_argument(
                 "--record", type=Path, metavar="FILE", help="where the run is recorded"
@@ -96,7 +98,7 @@ def _list(args: argparse.Namespace) -> int:
         return 0
     table = Table(box=None, pad_edge=False)
     for title in ("mission", "status", "outcome", "robot", "changed", "outages", "active"):
-        table.add_column(title, overflow="fold")  # paths and ids are copied
+        table.add_column(title, overflow="fold")  # never cut: people copy paths and ids
     for one in found:
         stands = [f"({one['problem']})"] if one["problem"] else one["active"]
         cells = (
@@ -115,7 +117,7 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _status(status: str, due: float | None, every: str | None) -> str:
-    """Return a mission's status; of one that is queued also when it is due, and how often."""
+    """Return a mission's status; if queued, also when it is due and how often."""
     from smachpy.durable.store import QUEUED
 
     if status != QUEUED:
@@ -185,8 +187,9 @@ def _resume(args: argparse.Namespace) -> int:
         if row.status in OVER:
             raise MissionOverError(store_name(args.durable), row.id, row.status)
     robot = ["--robot", row.robot] if row.robot else []
+    # No limit for the age: whoever resumes by hand has looked at it.
     own = ["--durable", args.durable, "--mission", row.id, "--max-outage", "1e12"]
-    options = [f"--{option}" for option, _ in _PASSED_ON if getattr(args, option)]
+    options = [f"--{option}" for option, _ in _RUN_OPTIONS if getattr(args, option)]
     options += [] if args.record is None else ["--record", str(args.record)]
     return main(["run", row.target, *own, *robot, *options, *row.argv])
 

@@ -1,4 +1,4 @@
-"""What `smachpy run --out DIR` leaves: events, pictures and a summary."""
+"""Writes the files of `smachpy run --out DIR`: events, pictures and a summary."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 class OutFolder:
-    """The files of one run, which replace those of the mission's last run.
+    """The files of one run; they replace those of the mission's previous run.
 
     Args:
-        folder: Where to write; made when it is not there.
-        name: The mission's, in front of the files' names.
+        folder: The folder; it is created if necessary.
+        name: The mission's name, the prefix of the files.
         machine: The mission.
-        robot: Its map and dock are in the picture of the track.
+        robot: Provides map and dock for the picture of the track.
 
     Raises:
         MissionError: a file cannot be written.
@@ -46,7 +46,7 @@ class OutFolder:
         self._events = self._path(".jsonl")
         with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
-            # What cannot be drawn or written is known before anything moves.
+            # Errors in drawing or writing show up here, before the robot moves.
             self._draw(machine, self._path(".svg"))
             for old in (self._events, self._path("_summary.json"), self._path("_track.png")):
                 old.unlink(missing_ok=True)
@@ -54,7 +54,7 @@ class OutFolder:
 
     @contextlib.contextmanager
     def collecting(self) -> Iterator[None]:
-        """Collect events inside the `with` block.
+        """Collect events within the `with` block.
 
         Raises:
             MissionError: the file cannot be written.
@@ -72,10 +72,10 @@ class OutFolder:
         """Write the pictures and the summary.
 
         Args:
-            facts: How the run was started and ended: first in the summary.
+            facts: How the run was started and ended; the first part of the summary.
 
         Returns:
-            All files, the events too.
+            All files, including the events.
 
         Raises:
             MissionError: a file cannot be written.
@@ -91,7 +91,7 @@ class OutFolder:
         return [*files, self._events, path]
 
     def _summary(self) -> dict[str, Any]:
-        """Return what the run did, as plain data."""
+        """Return the states' visits as plain data."""
         return {
             "seconds": self._history.seconds,
             "states": {
@@ -125,7 +125,7 @@ class OutFolder:
 
 
 def _why_no_track() -> str | None:
-    """Import what draws tracks, which takes a moment; return what is missing for it."""
+    """Import the track drawing now, since that takes a moment; return what is missing for it."""
     try:
         importlib.import_module("smachpy.sim.track")
     except ModuleNotFoundError as error:

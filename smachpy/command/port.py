@@ -1,4 +1,4 @@
-"""`smachpy port`: a script for ROS 1 in this package's own words."""
+"""`smachpy port`: rewrites a script for ROS 1 with smachpy's own API."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "port",
         help="rewrite a script for ROS 1",
-        description="Rewrite a script for ROS 1 in smachpy's own words, comments and layout kept, "
-        "and list what a person must look at.",
+        description="Rewrite a script for ROS 1 with smachpy's own API, with its comments and "
+        "layout, and list what a person must check.",
     )
-    parser.add_argument("script", type=Path, metavar="SCRIPT", help="it stays as it is")
+    parser.add_argument("script", type=Path, metavar="SCRIPT", help="the script; it is not changed")
     parser.add_argument(
         "-o",
         "--output",
@@ -32,7 +32,7 @@ def register(subparsers: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Rewrite the script; notes go to the standard error output."""
+    """Rewrite the script; notes go to standard error."""
     from smachpy.ros1.port import port_file
 
     try:

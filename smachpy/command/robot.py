@@ -1,4 +1,4 @@
-"""`smachpy robot`: the simulated robot as a program of its own."""
+"""`smachpy robot`: runs the simulated robot as a separate program."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def register(subparsers: Any) -> None:
     )
     add_robot_options(parser)
     parser.add_argument(
-        "--namespace", help="in front of its names, robot_1 say (default: the configuration's)"
+        "--namespace",
+        help="prefix of its names, for example robot_1 (default: the configuration's)",
     )
     several = parser.add_mutually_exclusive_group()
     several.add_argument(
@@ -63,15 +64,15 @@ def register(subparsers: Any) -> None:
         "--distro",
         choices=get_args(Distro),
         default=Ros2().distro,
-        help="whose definitions of messages to take (default: %(default)s)",
+        help="the release whose message definitions to use (default: %(default)s)",
     )
-    parser.add_argument("--parameters", action="store_true", help="list all parameters and end")
+    parser.add_argument("--parameters", action="store_true", help="list all parameters")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     parser.set_defaults(run=_run, words=())
 
 
 def add_robot_options(group: Any) -> None:
-    """Add what says which robot is simulated, and where."""
+    """Add the options for the simulated robot and its place."""
     group.add_argument(
         "--map",
         type=Path,
@@ -99,15 +100,15 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def serve(args: argparse.Namespace) -> int:
-    """Put the robots on the floor and serve them until SIGINT or SIGTERM; returns the exit code.
+    """Simulate the robots until SIGINT or SIGTERM; return the exit code.
 
-    A single robot has the namespace of the configuration, unless `args` say otherwise; in a
-    world the robots have names of their own.
+    A single robot has the namespace of the configuration, unless `args` give one; in a world the
+    robots have names of their own.
 
     Raises:
-        InputFileError: the map, the config or the world file is wrong.
-        NavigationError: a robot cannot stand where it should start.
-        ServerConflictError: there is a robot of that name already.
+        InputFileError: the map, the config or the world file has problems.
+        NavigationError: a robot cannot stand at its start pose.
+        ServerConflictError: there is already a robot of that name.
     """
     from actionlib_core.config import load_config as load_network
     from actionlib_core.node import Node
@@ -121,7 +122,8 @@ def serve(args: argparse.Namespace) -> int:
         alone = args.world is None and not args.robots
         served = make_robot(args.map, args.config, args.pose or ()) if alone else None
         spec = _world(args) if served is None else None
-        # A robot that drives on ROS 2 is not to be joined by this one, but where it is asked for.
+        # `ros2` in the configuration is for missions: the simulated robot joins only the network
+        # that --ros2 names.
         config = dataclasses.replace(load_network(), ros2=())
         name, space = ("move_base", config.namespace) if served else ("simulation", "")
         if args.ros2:
@@ -151,16 +153,16 @@ def serve(args: argparse.Namespace) -> int:
 
 
 def make_robot(floor: Path, config: Path, pose: Sequence[float]) -> Robot:
-    """Put one robot on a floor of its own.
+    """Return one robot on a floor of its own.
 
     Args:
         floor: The map.
         config: The robot's parameters.
-        pose: Where it begins (x, y, yaw) [m, m, rad]; empty: where its parameters say.
+        pose: The start pose (x, y, yaw) [m, m, rad]; empty: as in the parameters.
 
     Raises:
-        InputFileError: a file is wrong.
-        NavigationError: it cannot stand there.
+        InputFileError: a file has problems.
+        NavigationError: the robot cannot stand there.
     """
     from smachpy.sim.occupancy import load_map
     from smachpy.sim.world import Robot, World
@@ -175,7 +177,7 @@ def make_robot(floor: Path, config: Path, pose: Sequence[float]) -> Robot:
 
 
 def team(floor: Path, config: Path, pose: Sequence[float], count: int) -> WorldSpec:
-    """Return a floor with robots robot_0, robot_1, ...; arguments and errors as `make_robot`."""
+    """Return a world with robots robot_0, robot_1, ...; arguments and errors as in `make_robot`."""
     from smachpy.sim.occupancy import load_map
     from smachpy.sim.world_file import WorldSpec, place_robots
 
@@ -196,7 +198,7 @@ def _world(args: argparse.Namespace) -> WorldSpec:
 def _ready(
     server: RobotServer | Simulation | Nav2Server, node: Node, args: argparse.Namespace
 ) -> str:
-    """Return the line that says what is served."""
+    """Return the line that says what is running."""
     from smachpy.sim.simulation import Simulation
 
     ros2 = f", ROS 2 {args.distro}, domain {args.domain}" if args.ros2 else ""
@@ -213,7 +215,7 @@ def _ready(
 
 
 def parameters() -> str:
-    """Return all parameters as the YAML text of their defaults, with unit and limits."""
+    """Return all parameters as YAML with their defaults, units and limits."""
     lines = []
     for part in dataclasses.fields(SimConfig):
         default = part.default
@@ -233,7 +235,7 @@ def parameters() -> str:
 
 
 def _count(text: str) -> int:
-    """Read how many robots."""
+    """Read the number of robots."""
     if not (text.isdecimal() and 1 <= int(text) <= _MOST_ROBOTS):
         raise argparse.ArgumentTypeError(f"got {text!r}; expected 1 to {_MOST_ROBOTS}")
     return int(text)

@@ -1,4 +1,4 @@
-"""`smachpy run --ros1`: a script for ROS 1, run as it is."""
+"""`smachpy run --ros1`: runs an unchanged script for ROS 1."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from smachpy.machines.container import Container
 
 LINGER_S: Final = 60.0
-"""Virtual time that a script has to go on in after its last machine has ended [s]."""
+"""Virtual time for a script to continue after its last machine has ended [s]."""
 
 
 def run_ros1(
@@ -45,12 +45,12 @@ def run_ros1(
 ) -> int:
     """Run a script for ROS 1 to its end and return the exit code.
 
-    That is the script's own when it ends by `sys.exit` with another one than 0; else the outcome of
-    the machine that ended last counts, as for a mission; a script without one ends with 0. Of a
-    `robot` it also reads the parameters that it has not set itself.
+    That is the script's own, if it ends by `sys.exit` with another code than 0; else the outcome
+    of the last machine counts, as for a mission; without a machine it is 0. Parameters that the
+    script has not set are read from `robot`, if given.
 
-    Blocks: until the script has ended. In virtual time it is asked to end when nothing can happen
-        any more, or `LINGER_S` after its last machine has ended.
+    Blocks: until the script has ended. In virtual time it is asked to end when nothing can
+        happen any more, or `LINGER_S` after its last machine has ended.
     """
     from smachpy.ros1 import install, session
     from smachpy.ros1.session import Session
@@ -92,7 +92,7 @@ def run_ros1(
 
 
 def _run(script: Path, argv: list[str], options: RunOptions) -> int | None:
-    """Run the script; return the exit code that it asks for, None for none.
+    """Run the script; return the exit code that it asks for, None if none.
 
     Raises:
         MissionError: in virtual time, nothing can happen any more.
@@ -113,7 +113,7 @@ def _run(script: Path, argv: list[str], options: RunOptions) -> int | None:
         raise
     except Deadlock as error:
         raise MissionError(f"--time {options.pace}: {error}\nTry --time real.") from error
-    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001  a border: it is told
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001  the script's: reported here
         cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else error
         if shutdown.requested() and isinstance(cause, ROSInterruptException | KeyboardInterrupt):
             return None
@@ -150,7 +150,7 @@ def _node_maker(options: RunOptions, stack: contextlib.ExitStack) -> Callable[[s
 
 
 class _Runs:
-    """Shows every machine that a script runs, and remembers how the last one ended."""
+    """Shows every machine that a script runs, and keeps the outcome of the last one."""
 
     def __init__(
         self,
@@ -172,14 +172,14 @@ class _Runs:
         self._watch: Any = None
 
     def observe(self) -> None:
-        """Hear of every machine from now on."""
+        """Start observing the machines of this process."""
         from smachpy.run.threads import OBSERVERS
 
         OBSERVERS.append(self._begin)
         self._stack.callback(OBSERVERS.remove, self._begin)
 
     def need(self, action: str) -> None:
-        """Bring up the robot whose action is called, in virtual time, where nobody else is."""
+        """In virtual time, start the simulated robot whose action is called, unless it is there."""
         prefix, _, word = action.strip("/").rpartition("/")
         wanted = self._options.pace.virtual and word in ROBOT_ACTIONS
         if wanted and prefix not in self._robots:
@@ -187,7 +187,7 @@ class _Runs:
             self._surroundings.put_robot(prefix, self._options.server_timeout)
 
     def put_robot(self) -> None:
-        """Bring up the robot that the command line asks for."""
+        """Start the robot that the command line asks for."""
         self._robots.add("")
         self._surroundings.put_robot("", self._options.server_timeout)
 
@@ -223,17 +223,17 @@ class _Runs:
         return end
 
     def exit_code(self) -> int:
-        """Return what the outcome of the last machine means."""
+        """Return the exit code for the outcome of the last machine."""
         if self._last is None or self._last[1]:
             return EXIT_SUCCESS
         return EXIT_OTHER_OUTCOME
 
     def was_interrupted(self, ending: shutdown.Shutdown) -> bool:
-        """Tell whether a signal asked the program to end."""
+        """Return whether a signal asked the program to end."""
         return (ending.reason or "").startswith("SIG")
 
     def finish(self, ending: shutdown.Shutdown) -> None:
-        """Write the files of the run, and let people look at its page for a while."""
+        """Write the files of the run, and keep its page for a while."""
         if self._out is not None:
             facts = {
                 "mission": self._name,

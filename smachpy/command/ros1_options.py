@@ -1,4 +1,4 @@
-"""`--ros1`: what the command line says of scripts for ROS 1, and how one is loaded."""
+"""The options of `--ros1`, and loading a script for ROS 1."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Ros1Options:
-    """How a script for ROS 1 is taken.
+    """The options for a script for ROS 1.
 
     Attributes:
-        params: Files of parameters, each with the name space that it is for.
-        stub_missing: Stand-ins for what nobody has.
-        timeout: Longest time that a script may take to build its machine [s].
-        words: The script's own arguments, with its remapping and parameters.
+        params: Parameter files, each with its namespace.
+        stub_missing: Use stand-ins for modules and messages that are not there.
+        timeout: Longest time for the script to build its machine [s].
+        words: The script's own arguments, including remappings and parameters.
     """
 
     params: tuple[tuple[str, Path], ...] = ()
@@ -46,27 +46,27 @@ class Ros1Options:
 
 
 def add_options(parser: Any, *, loads: bool) -> None:
-    """Add `--ros1` and what belongs to it.
+    """Add `--ros1` and its companions.
 
     Args:
-        parser: The command's.
-        loads: It loads machines without running them.
+        parser: The parser of the command.
+        loads: Whether the command loads machines without running them.
     """
     group = parser.add_argument_group("scripts for ROS 1")
     group.add_argument(
-        "--ros1", action="store_true", help="TARGET is a script for ROS 1; it stays as it is"
+        "--ros1", action="store_true", help="TARGET is a script for ROS 1; it is not changed"
     )
     group.add_argument(
         "--params",
         action="append",
         default=[],
         metavar="[NS=]FILE",
-        help="its parameters, a YAML file; may be repeated",
+        help="its parameters, a YAML file (repeatable)",
     )
     group.add_argument(
         "--stub-missing",
         action="store_true",
-        help="stand-ins for modules, messages and parameters that nobody has",
+        help="use stand-ins for missing modules, messages and parameters",
     )
     if loads:
         parser.set_defaults(words=(), names=NameArguments(), loads=True)
@@ -75,12 +75,12 @@ def add_options(parser: Any, *, loads: bool) -> None:
             type=float,
             default=10.0,
             metavar="S",
-            help="longest time in which it builds its machine [s] (default: %(default)g)",
+            help="longest time to build its machine [s] (default: %(default)g)",
         )
 
 
 def options_of(args: argparse.Namespace) -> Ros1Options | None:
-    """Return what the command line says of scripts for ROS 1; None without `--ros1`.
+    """Return the options for a script for ROS 1; None without `--ros1`.
 
     Raises:
         MissionError: an option needs `--ros1`.
@@ -114,7 +114,7 @@ def _params(text: str) -> tuple[str, Path]:
 
 
 def load_script(text: str, options: Ros1Options) -> Target:
-    """Return the machine of a script, which ends where it would run it.
+    """Return the machine of a script; the script is stopped where it would run it.
 
     Raises:
         LoadError: there is none.
@@ -141,7 +141,7 @@ def script_of(text: str) -> Path:
     """Return the path of a script.
 
     Raises:
-        TargetError: it is no file.
+        TargetError: it is not a file.
     """
     path = Path(text)
     if not path.is_file():
@@ -150,12 +150,12 @@ def script_of(text: str) -> Path:
 
 
 def tell_stubs(stubbed: list[str]) -> None:
-    """Say what got a stand-in."""
+    """Report the stand-ins."""
     if stubbed:
         tell("smachpy", f"--stub-missing: stand-ins for {', '.join(stubbed)}")
 
 
 def load_any(text: str, args: argparse.Namespace) -> Target:
-    """Load what a user named: a script for ROS 1 with `--ros1`, else as `load_target`."""
+    """Load a target: a script for ROS 1 with `--ros1`, else as `load_target`."""
     options = options_of(args)
     return load_target(text) if options is None else load_script(text, options)

@@ -1,4 +1,4 @@
-"""`smachpy run --ros1-robot`: the robot of a mission is a real one that runs ROS 1."""
+"""`smachpy run --ros1-robot`: connects a mission to a real robot that runs ROS 1."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ def add_option(group: Any) -> None:
     group.add_argument(
         "--ros1-robot",
         metavar="URL",
-        help="a real robot that runs ROS 1, by its master: http://robot:11311. What the mission "
-        "uses is carried to and from it, nothing else; see 'smachpy bridge ros1'",
+        help="use a real robot that runs ROS 1; URL of its master: http://robot:11311. Only what "
+        "the mission uses is carried; see 'smachpy bridge ros1'",
     )
 
 
 @contextlib.contextmanager
 def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
-    """Have the robot on the run's network inside the `with` block.
+    """Connect the robot to the run's network within the `with` block.
 
     Raises:
-        MissionError: it stands beside a simulated robot or virtual time, or the robot's master
-            does not answer within the time that servers have.
+        MissionError: it was combined with a simulated robot or virtual time, or the robot's
+            master does not answer within the server timeout.
         Ros1Error: the address cannot be used.
 
     Blocks: until the master has answered.
@@ -56,7 +56,7 @@ def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
 
 
 def _names_of_viewers() -> list[str]:
-    """Return patterns of what only our own viewers use; those of ROS 1 get SMACH's topics."""
+    """Return patterns of names that only our viewers use; viewers of ROS 1 get SMACH's topics."""
     from smachpy.network import feed, remote_control, values
 
     names = (

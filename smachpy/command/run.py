@@ -22,7 +22,7 @@ from smachpy.command.ros1_robot import add_option as add_ros1_robot
 from smachpy.command.ros1_robot import ros1_robot
 from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
-from smachpy.sim.geometry import finite
+from smachpy.sim.geometry import positive_seconds
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
 
 if TYPE_CHECKING:
@@ -38,11 +38,16 @@ def register_list(subparsers: Any) -> None:
     """Add `smachpy list`."""
     parser = subparsers.add_parser(
         "list",
-        help="name the missions",
-        description="Name the missions that are installed, and the Petri net plans in a folder.",
+        help="list the missions",
+        description="List the installed missions, and the Petri net plans in a folder.",
     )
     parser.add_argument(
-        "folder", type=Path, nargs="?", default=Path(), metavar="FOLDER", help="of plans (here)"
+        "folder",
+        type=Path,
+        nargs="?",
+        default=Path(),
+        metavar="FOLDER",
+        help="folder of plans (here)",
     )
     parser.set_defaults(run=_list)
 
@@ -55,11 +60,11 @@ def register(subparsers: Any) -> None:
         help="run a mission",
         usage="smachpy run MISSION [OPTIONS] [-- ARGUMENTS]",
         description="Run a mission to its end and show it in the terminal. Exit codes: 0 it "
-        "succeeded, 1 it ended otherwise, 2 bad input; the mission was preempted: 130 by Ctrl-C, "
-        "143 by SIGTERM.",
-        epilog="What stands after -- are the arguments of the mission's function: smachpy run "
-        "there_and_back -- 4.6 10.6. 'smachpy run MISSION --help' shows them. Names are "
-        "changed by a:=b, __ns:=robot_1 or --ros-args.",
+        "succeeded, 1 it ended otherwise, 2 bad input; if the mission was preempted: 130 by "
+        "Ctrl-C, 143 by SIGTERM.",
+        epilog="The words after -- are the arguments of the mission's function: smachpy run "
+        "there_and_back -- 4.6 10.6. 'smachpy run MISSION --help' lists them. Names are "
+        "remapped with a:=b, __ns:=robot_1 or --ros-args.",
     )
     parser.add_argument(
         "-h", "--help", action=_Help, nargs=0, help="show this, and the mission's arguments"
@@ -75,14 +80,14 @@ def register(subparsers: Any) -> None:
         type=_pace,
         default="real",
         metavar="PACE",
-        help="real; virtual: in this process alone, as fast as it can; 10x: so, at that rate",
+        help="real; virtual: within this process, as fast as possible; 10x: virtual at that rate",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write events, pictures and a summary there"
     )
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--plain", action="store_true", help="lines only, for logs")
-    shown.add_argument("--json", action="store_true", help="one event a line, as JSON")
+    shown.add_argument("--json", action="store_true", help="one event per line, as JSON")
     parser.add_argument(
         "--success",
         action="append",
@@ -107,26 +112,26 @@ def register(subparsers: Any) -> None:
         "--start-robot",
         action=argparse.BooleanOptionalAction,
         default=False,
-        help="start it for this run (default: use one that runs)",
+        help="start it for this run (default: use a running robot)",
     )
     robot.add_argument(
         "--robot",
         default="",
         metavar="NAME",
-        help="the robot to use: its name is in front of the mission's names",
+        help="the robot to use: its name is the prefix of the mission's names",
     )
     add_robot_options(robot)
     robot.add_argument(
         "--world",
         type=Path,
         metavar="FILE",
-        help="a world file in place of map, parameters and pose (default: what the mission needs)",
+        help="a world file instead of map, parameters and pose (default: what the mission needs)",
     )
     robot.add_argument(
         "--share",
         action="store_true",
-        help="with robots of its own: be on the network that others are on (default: one of its "
-        "own, unless SMACHPY_DOMAIN or SMACHPY_CONFIG names one)",
+        help="with robots of its own: use the common network (default: a network of its own, "
+        "unless SMACHPY_DOMAIN or SMACHPY_CONFIG names one)",
     )
     parser.set_defaults(run=_run, words=())
 
@@ -134,17 +139,19 @@ def register(subparsers: Any) -> None:
 def _add_watching(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("watching")
     group.add_argument(
-        "--view", action="store_true", help="show it in a browser while it runs, and after"
+        "--view", action="store_true", help="show it in a browser, during the run and after it"
     )
     group.add_argument(
         "--view-for",
         type=time_span,
         metavar="TIME",
-        help="how long the page stays when the run has ended: 30s, 10m, 2h, or 0 (default: until "
-        "Ctrl-C)",
+        help="how long the page stays after the run: 30s, 10m, 2h, or 0 (default: until Ctrl-C)",
     )
     group.add_argument(
-        "--port", type=int, default=8080, help="of that page; 0 takes any (default: %(default)s)"
+        "--port",
+        type=int,
+        default=8080,
+        help="port of the page; 0 takes any (default: %(default)s)",
     )
     group.add_argument(
         "--control", action="store_true", help="let viewers pause, step, jump and preempt"
@@ -172,16 +179,18 @@ def _run(args: argparse.Namespace) -> int:
     events = sys.stdout if args.json else None
     with contextlib.ExitStack() as stack:
         stack.enter_context(ros2_of_options(args))
-        if args.json:  # whatever a mission prints: events are alone
+        if args.json:  # standard output is for events only: a mission's prints go to standard error
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         shown = args.time.virtual and args.view
-        if args.start_robot or shown:  # its module, once imported, may join a network
+        if (
+            args.start_robot or shown
+        ):  # before the mission's module is imported: that may join a network
             _use_own_network(args, stack)
         return _run_mission(args, events, stack)
 
 
 def _use_own_network(args: argparse.Namespace, stack: contextlib.ExitStack) -> None:
-    """Give a run that brings its robots a domain of its own, unless it is said which to use."""
+    """Give a run with its own robots a domain of its own, unless one was chosen."""
     from actionlib_core.node import has_node
     from actionlib_core.private_network import network_is_chosen, private_network
 
@@ -192,7 +201,7 @@ def _use_own_network(args: argparse.Namespace, stack: contextlib.ExitStack) -> N
 
 
 def _brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Text]) -> bool:
-    """Tell whether a mission starts its robots itself, when called with these arguments."""
+    """Return whether a mission starts robots itself when called with these arguments."""
     robots = mission_info(target.thing).robots
     if not isinstance(robots, str):
         return robots
@@ -266,7 +275,7 @@ def _options(
 
 
 def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
-    """Return what to simulate; `world` is where the mission plays unless something else is said."""
+    """Return what to simulate; `world` is the mission's own, for a run without other options."""
     from smachpy.command.surroundings import RobotOptions
 
     said = args.pose or args.map != OFFICE_MAP or args.config != OFFICE_ROBOT
@@ -282,7 +291,7 @@ def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
 
 
 class _Help(argparse.Action):
-    """Shows the options, and the arguments of the mission that was named before."""
+    """Prints the options, and the arguments of the mission that was named before."""
 
     def __call__(
         self,
@@ -310,14 +319,6 @@ def time_span(text: str) -> float:
     return float(match[1]) * {"": 1, "s": 1, "m": 60, "h": 3600}[match[2]]
 
 
-def positive_seconds(text: str) -> float:
-    """Return seconds above 0, for argparse."""
-    seconds = finite(text)
-    if seconds <= 0:
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
-    return seconds
-
-
 def _pace(text: str) -> Pace:
     from smachpy.command.surroundings import Pace
 
@@ -328,7 +329,7 @@ def _pace(text: str) -> Pace:
 
 
 def add_input(parser: argparse.ArgumentParser) -> None:
-    """Add the option `--input`; `read_inputs` takes what it gives."""
+    """Add the option `--input`; `read_inputs` reads its values."""
     parser.add_argument(
         "--input",
         "-i",
@@ -341,7 +342,7 @@ def add_input(parser: argparse.ArgumentParser) -> None:
 
 
 def read_inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
-    """Return the values of `--input` by key; one given twice is refused."""
+    """Return the values of `--input` by key; a key must not be given twice."""
     inputs = dict(pairs)
     if len(inputs) < len(pairs):
         twice = next(key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1)

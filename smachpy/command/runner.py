@@ -1,4 +1,4 @@
-"""Run one mission for a person: robot, terminal view, signals, pictures, exit code."""
+"""Runs one mission for a user: robot, terminal view, signals, pictures, exit code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from actionlib_core.names import NameArguments
 from actionlib_core.output import printable, tell
 from smachpy import InvalidUserCodeError, describe
 from smachpy.command.arguments import MisfitError, fit, parameters_of, read_words
-from smachpy.command.durable import DurableOptions, kept
+from smachpy.command.durable import DurableOptions, journalled
 from smachpy.command.extras import load_view
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
@@ -39,7 +39,7 @@ EXIT_SUCCESS: Final = 0
 EXIT_OTHER_OUTCOME: Final = 1
 OFFICE: Final = RobotOptions(start=False, map=OFFICE_MAP, config=OFFICE_ROBOT)
 NO_NAMES: Final = NameArguments()
-_SIGNAL_EXIT: Final = 128  # plus the signal's number, as shells have it
+_SIGNAL_EXIT: Final = 128  # plus the signal's number, as in shells
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,18 +50,18 @@ class RunOptions:
         inputs: Arguments of the mission's function, or values of its userdata keys.
         words: Arguments of its function, in order.
         pace: How time passes.
-        robot: The simulated robot that the run brings along.
-        names: Renaming from the command line.
-        namespace: What the mission's relative names live under; "" leaves it to the configuration.
+        robot: The simulated robot of the run.
+        names: Remapping from the command line.
+        namespace: Prefix of the mission's relative names; "" uses the configuration's.
         out: Folder for events, pictures and summary; None writes none.
         plain: Only lines, no panel.
-        events: Where events go as lines of JSON, instead of what a person would see.
-        success: Outcomes that count as success; empty takes 'succeeded', or all that do not sound
-            like a failure.
+        events: Stream for events as lines of JSON, which replace the terminal view.
+        success: Outcomes that count as success; empty: 'succeeded', or all that do not look like a
+            failure.
         server_timeout: How long to wait for the action servers that the mission needs [s].
         debug: Show the traceback of a mission that raises.
-        watching: Who else may see it, and the file that it is written to.
-        durable: How it is kept, so that it survives its process; None: it is not.
+        watching: Page, network and recording of the run.
+        durable: Journal of the run; None for a run that need not survive.
     """
 
     inputs: Mapping[str, object] = field(default_factory=dict)
@@ -81,7 +81,7 @@ class RunOptions:
 
 
 def run_mission(target: Target, options: RunOptions) -> int:
-    """Run it to its end and return the exit code.
+    """Run a mission to its end and return the exit code.
 
     Ctrl-C and SIGTERM request the shutdown, which preempts the mission; a second Ctrl-C ends the
     process.
@@ -120,13 +120,15 @@ def run_mission(target: Target, options: RunOptions) -> int:
             return signal_exit(ending)
         if out is not None:
             stack.enter_context(out.collecting())
-        keeping = stack.enter_context(contextlib.ExitStack())
-        keeping.enter_context(kept(target, machine, options.durable))
+        # A stack of its own, closed right after the mission: the journal must be complete before
+        # the page lingers, which may take hours.
+        journal = stack.enter_context(contextlib.ExitStack())
+        journal.enter_context(journalled(target, machine, options.durable))
         watch = stack.enter_context(watched(target.name, machine, record.path, options.watching))
         show = show_run(record, options)
         stack.enter_context(show)
         stack.callback(machine.subscribe(show.on_event))
-        with keeping:
+        with journal:
             outcome = _execute(machine, show, options)
         surroundings.over()
         good = outcome in good_outcomes(record, options)
@@ -146,13 +148,13 @@ def run_mission(target: Target, options: RunOptions) -> int:
 
 
 def show_run(record: StateRecord, options: RunOptions) -> Any:
-    """Return what shows the run: a terminal view, or an event stream."""
+    """Return the view of the run: the terminal, or an event stream."""
     clock = current_clock()
     if options.events is not None:
         from smachpy.command.event_stream import EventStream
 
         return EventStream(options.events, record, clock.time_ns())
-    # Where time jumps there is nothing to see between two lines.
+    # If time jumps, a panel would show nothing between two lines.
     jumps = options.pace.virtual and options.pace.rate is None
     return load_view("terminal")(
         record,
@@ -163,15 +165,15 @@ def show_run(record: StateRecord, options: RunOptions) -> Any:
 
 
 def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = ()) -> Container:
-    """Make the machine.
+    """Build the machine.
 
     Args:
         target: The mission.
         inputs: Arguments of its function, or values of its userdata keys, by name.
-        words: Arguments of its function as they stand after `--`.
+        words: Arguments of its function, the words after `--`.
 
     Raises:
-        MissionError: one of them does not fit, is missing, or is not known.
+        MissionError: an argument does not fit, is missing or unknown.
     """
     machine = target.build(**read_words(target, words, inputs))
     parameters = parameters_of(target.thing)
@@ -195,7 +197,7 @@ def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = (
 
 
 def _fit_userdata(machine: Container, key: str, value: object) -> object:
-    """Return an input as the machine's own value of that key has it, if there is one."""
+    """Return an input with the type of the machine's own value for that key, if there is one."""
     own = machine.userdata[key] if key in machine.userdata else None  # noqa: SIM401  no dict
     hint: Any = Any
     if isinstance(own, bool | str):
@@ -237,10 +239,10 @@ def _check_success(target: Target, record: StateRecord, options: RunOptions) -> 
 
 
 def _execute(machine: Container, show: Any, options: RunOptions) -> str | None:
-    """Run it; None when its own code raised, which is said here.
+    """Run the machine; return None if its code raised, after reporting it.
 
     Raises:
-        MissionError: in virtual time, nothing can happen any more.
+        MissionError: in virtual time, everything waits for something that cannot happen.
     """
     outcome: str | None = None
     try:
@@ -261,7 +263,7 @@ def _execute(machine: Container, show: Any, options: RunOptions) -> str | None:
 
 
 def _stuck(error: BaseException | None) -> str | None:
-    """Return what everybody waits for when that is why a mission in virtual time raised."""
+    """Return the text of a deadlock in virtual time, if that is why the mission raised."""
     from actionlib_core.clock import Deadlock
 
     while error is not None and not isinstance(error, Deadlock):
@@ -270,6 +272,6 @@ def _stuck(error: BaseException | None) -> str | None:
 
 
 def signal_exit(ending: shutdown.Shutdown) -> int:
-    """Return the exit code of a program that a signal has ended."""
+    """Return the exit code of a program that was ended by a signal."""
     members = signal.Signals.__members__
     return _SIGNAL_EXIT + members.get(ending.reason or "", signal.SIGINT)

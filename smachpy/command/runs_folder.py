@@ -1,4 +1,4 @@
-"""Where runs that somebody watches are kept: a folder of this user's, with the newest of them."""
+"""The user's folder for recordings of viewed runs; it keeps the newest of them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 VARIABLE: Final = "SMACHPY_RUNS"
 KEPT: Final = 100
-"""So many files of this folder are kept; only those with names of `new_file` are ever removed."""
+"""The number of files kept; only files with names of `new_file` are ever removed."""
 
 _NAME = re.compile(r".+-\d{8}-\d{6}-\d+\.jsonl")
 
@@ -33,16 +33,16 @@ def runs_folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def new_file(mission: str, stamp_ns: int, run: str = "") -> Path | None:
-    """Return the name of a new file, and remove the oldest that are too many.
+    """Return the path of a new file, and remove the oldest ones.
 
     Args:
         mission: Name of the mission.
         stamp_ns: When it begins [ns since the epoch].
-        run: Names a durable run (`smachpy.durable.store.MissionRow.run`): the file that holds what
-            an earlier process did of it, if there is one.
+        run: Name of a durable run (`smachpy.durable.store.MissionRow.run`): if an earlier process
+            recorded a part of it, that file is returned.
 
     Returns:
-        None when nothing can be written there, which is logged.
+        None if nothing can be written there, which is logged.
     """
     folder = runs_folder()
     try:

@@ -1,4 +1,4 @@
-"""Where a mission runs: on the network in real time, or alone in this process in virtual time."""
+"""The surroundings of a mission: the network in real time, or this process in virtual time."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from smachpy.sim.world_file import WorldSpec
 
 ROBOT_ACTIONS: Final = frozenset({"move_base", "charge"})
-"""What the simulated robot does; the last word of an action's name."""
+"""The actions of the simulated robot, by the last part of their name."""
 
 MOST_NAMED: Final = 3
-"""Names of servers that may be meant, in an error."""
+"""The most names that an error suggests."""
 
 _NUMBERED = re.compile(r"robot_(\d{1,2})")
 _TIMES = re.compile(r"(?P<number>\d+(\.\d+)?)x")
@@ -46,9 +46,10 @@ class Pace:
     """How time passes.
 
     Attributes:
-        virtual: In this process alone, on a clock of its own.
+        virtual: Within this process, on a virtual clock.
         rate: Seconds per real second; None: as fast as the computer allows.
-        seed: Chooses who is next where several can go on in virtual time; None: who came first.
+        seed: Chooses the next thread where several are ready in virtual time; None: first come,
+            first served.
     """
 
     virtual: bool = False
@@ -83,15 +84,15 @@ REAL_TIME: Final = Pace()
 
 @dataclass(frozen=True, slots=True)
 class RobotOptions:
-    """The simulated robot that a run brings along.
+    """The robot of a run.
 
     Attributes:
-        start: Start it for this run.
-        map: Its floor.
+        start: Start a simulated one for this run.
+        map: Its map.
         config: Its parameters.
-        pose: Where it starts [m, m, rad]; empty: where its parameters say.
-        world: A world file in place of all that: robots, doors, what moves.
-        ros1: Address of the master of a real robot that runs ROS 1, in place of a simulated one.
+        pose: Its start pose [m, m, rad]; empty: as in the parameters.
+        world: A world file instead of all that: robots, doors, moving obstacles.
+        ros1: URL of the master of a real robot that runs ROS 1, instead of a simulated one.
     """
 
     start: bool
@@ -102,17 +103,17 @@ class RobotOptions:
     ros1: str = ""
 
     def arguments(self) -> tuple[str, ...]:
-        """Return them as the robot's program takes them."""
+        """Return the arguments for the robot's program."""
         if self.world is not None:
             return ("--world", str(self.world))
         pose = ("--pose", *map(str, self.pose)) if self.pose else ()
         return ("--map", str(self.map), "--config", str(self.config), *pose)
 
     def floor(self) -> tuple[OccupancyMap, Pose2D | None]:
-        """Return the map, and where the robot charges.
+        """Return the map, and the pose of the robot's dock.
 
         Raises:
-            InputFileError: a file is wrong.
+            InputFileError: a file has problems.
         """
         from smachpy.sim.config import load_config
         from smachpy.sim.occupancy import load_map
@@ -144,24 +145,24 @@ class RobotOptions:
 
 
 class Surroundings(Protocol):
-    """Brings up what a mission needs around it."""
+    """Starts and stops what a mission needs: its robot and the wait for its servers."""
 
     def start(self, machine: Container, needed: Mapping[str, str]) -> None:
-        """Begin to bring it up.
+        """Begin to start it.
 
         Args:
-            machine: The mission, which is preempted when its robot refuses.
-            needed: Names of the actions that others have to serve, and their types.
+            machine: The mission; it is preempted if its robot refuses to run.
+            needed: Names and types of the actions that others must serve.
 
         Raises:
-            MissionError: it cannot be had here.
+            MissionError: that is not possible here.
         """
 
     def put_robot(self, prefix: str, timeout: float) -> None:
-        """Bring up the simulated robot, or the world, before it is known who needs it.
+        """Start the simulated robot or world before it is known which actions are needed.
 
         Args:
-            prefix: What the robot's names live under, below the node's name space.
+            prefix: Prefix of the robot's names, below the node's namespace.
             timeout: How long to wait for it [s].
 
         Raises:
@@ -171,7 +172,7 @@ class Surroundings(Protocol):
         """
 
     def wait(self, timeout: float) -> bool:
-        """Wait until all is there; False when the program is to end.
+        """Wait until everything is there; return False if the program is to end.
 
         Raises:
             MissionError: something is missing after `timeout` [s], or the robot could not start.
@@ -180,16 +181,16 @@ class Surroundings(Protocol):
         """
 
     def over(self) -> None:
-        """Take notice that the mission has ended.
+        """Note that the mission has ended.
 
         Raises:
-            MissionError: its goals may have gone to a wrong robot.
+            MissionError: its goals may have gone to another robot.
         """
 
     def close(self) -> None:
-        """Take everything down.
+        """Stop everything.
 
-        Blocks: 3.5 s at most.
+        Blocks: for 3.5 s at most.
         """
 
 
@@ -197,19 +198,19 @@ class Surroundings(Protocol):
 def open_surroundings(
     pace: Pace, robot: RobotOptions, names: NameArguments, namespace: str
 ) -> Iterator[Surroundings]:
-    """Make clock and node for a mission; both are in force inside the `with` block.
+    """Make clock and node for a mission; both are current within the `with` block.
 
     Args:
         pace: How time passes.
         robot: The simulated robot.
-        names: Renaming from the command line.
-        namespace: What relative names live under; "" leaves it to the configuration.
+        names: Remapping from the command line.
+        namespace: Prefix of relative names; "" uses the configuration's.
 
     Raises:
         NameSetupError: a name is not allowed.
         TransportError: the network cannot be joined.
-        MissionError: names are to be changed, but the mission's module has made its node; or the
-            world is wrong, or has no such robot.
+        MissionError: names are to be remapped, but the mission's module has already made its node;
+            or the world file has problems, or has no such robot.
     """
     if pace.virtual or robot.start:
         namespace = robot.choose_robot(namespace)
@@ -245,7 +246,7 @@ def _name_node(names: NameArguments, namespace: str) -> None:
 
 
 class _Network:
-    """The network as configured; the robot is a process of its own."""
+    """The configured network; the robot runs in a process of its own."""
 
     def __init__(self, robot: RobotOptions) -> None:
         self._options = robot
@@ -297,9 +298,8 @@ class _Network:
 
     def over(self) -> None:
         if self._robot is not None:
-            if (
-                self._robot.refused()
-            ):  # an older robot of its name turned up late, and got the goals
+            # An older robot of the same name appeared late: it, and not ours, got the goals.
+            if self._robot.refused():
                 self._robot.check()
             self._robot.let_go()
 
@@ -312,12 +312,12 @@ class _Network:
 
 
 def _robots_of(needed: Mapping[str, str]) -> tuple[str, int]:
-    """Return the robots whose actions a mission calls: a name, "" for its own, and how many.
+    """Return the robots whose actions a mission calls: a prefix and their number.
 
-    Several are robot_0, robot_1, ... up to the highest that it names; then the name is "".
+    Several robots are robot_0, robot_1, ... up to the highest in use; their prefix is "".
 
     Raises:
-        MissionError: they are several, and have other names.
+        MissionError: there are several, with other names.
     """
     prefixes = {
         name.strip("/").rpartition("/")[0]
@@ -336,13 +336,13 @@ def _robots_of(needed: Mapping[str, str]) -> tuple[str, int]:
 
 
 class ServerWait:
-    """Waits until every needed action has a server, or something makes waiting pointless.
+    """Waits until every needed action has a server, or waiting has become pointless.
 
     Args:
-        names: The actions, as the mission names them, and their types.
+        names: The actions, with the names in the mission, and their types.
 
     Raises:
-        ConfigError: one is to be on ROS 2, and nothing there corresponds to it.
+        ConfigError: an action is configured for ROS 2, but has no counterpart there.
         TransportError: the robot's network cannot be joined.
     """
 
@@ -362,11 +362,11 @@ class ServerWait:
 
     @property
     def found(self) -> bool:
-        """Whether one of the servers is there."""
+        """Whether at least one of the servers is there."""
         return len(self._missing) < len(self._watches)
 
     def wake(self) -> None:
-        """Look again whether to go on waiting; from any thread."""
+        """Make `wait` check again; from any thread."""
         self._wake.set()
 
     def close(self) -> None:
@@ -378,8 +378,8 @@ class ServerWait:
         """Wait for the servers, and for `robot` to be ready.
 
         Returns:
-            What is missing after `timeout` [s], full name -> name in the mission; nothing when all
-            is there or the program is to end.
+                The actions without a server after `timeout` [s], full name -> name in the mission;
+                empty if all are there or the program is to end.
 
         Raises:
             MissionError: the robot could not start.
@@ -405,7 +405,7 @@ class ServerWait:
 
 
 def missing_on_robot(missing: Mapping[str, str], timeout: float) -> str:
-    """Return what to say about actions that have no server, where a ROS 2 robot is in use."""
+    """Return the error for actions without a server, if a ROS 2 robot is in use."""
     what = "action" if len(missing) == 1 else "actions"
     listed = ", ".join(f"'/{full}'" for full in sorted(missing))
     return (
@@ -415,7 +415,7 @@ def missing_on_robot(missing: Mapping[str, str], timeout: float) -> str:
 
 
 def missing_on_ros1_robot(missing: Mapping[str, str], timeout: float, master: str) -> str:
-    """Return what to say about actions that have no server, where a ROS 1 robot is in use."""
+    """Return the error for actions without a server, if a ROS 1 robot is in use."""
     what, be = ("action", "has") if len(missing) == 1 else ("actions", "have")
     listed = ", ".join(f"'/{full}'" for full in sorted(missing))
     return (
@@ -426,12 +426,12 @@ def missing_on_ros1_robot(missing: Mapping[str, str], timeout: float, master: st
 
 
 def missing_text(missing: Mapping[str, str], there: Collection[str], timeout: float) -> str:
-    """Return what to say about actions without a server.
+    """Return the error for actions without a server.
 
     Args:
         missing: Full name -> name in the mission.
-        there: Full names of the actions that have one.
-        timeout: How long they were waited for [s].
+        there: Full names of the actions with a server.
+        timeout: How long the mission waited for them [s].
     """
     what, be = ("action", "has") if len(missing) == 1 else ("actions", "have")
     listed = ", ".join(f"'/{full}'" for full in sorted(missing))
@@ -452,7 +452,7 @@ def missing_text(missing: Mapping[str, str], there: Collection[str], timeout: fl
 
 
 def _close_names(name: str, there: Collection[str]) -> list[str]:
-    """Return the names that somebody who said `name` may have meant: another robot's, or alike."""
+    """Return names that may be meant by `name`: the same action elsewhere, or a similar one."""
     word = name.rpartition("/")[2]
     same = sorted(other for other in there if other.rpartition("/")[2] == word)
     return same[:MOST_NAMED] or nearest(name, there)
@@ -486,7 +486,7 @@ def _open_virtual(
 
 
 class _VirtualNetwork:
-    """A network in memory, with the robot in this process; nobody else is there."""
+    """A network in memory, with the robot in this process and nobody else."""
 
     def __init__(self, pace: Pace, robot: RobotOptions, session: Callable[[], Transport]) -> None:
         self._pace = pace
@@ -571,7 +571,7 @@ class _VirtualNetwork:
         return not shutdown.requested()
 
     def over(self) -> None:
-        """Nothing is left to say."""
+        """Do nothing: no other robot can have interfered."""
 
     def close(self) -> None:
         self._down.close()

@@ -1,4 +1,4 @@
-"""Find the machine that a user names on a command line: a mission, a module or a file."""
+"""Finds the machine that a user names on a command line: a mission, a module or a file."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class TargetError(SmachError):
     """The named mission, module or file cannot be loaded.
 
     Attributes:
-        target: What the user wrote.
-        problem: Why, and what to try.
+        target: The user's text.
+        problem: The reason, and what to try.
     """
 
     def __init__(self, target: str, problem: str) -> None:
@@ -46,7 +46,7 @@ class Target:
     """A machine, or the function that makes it.
 
     Attributes:
-        name: What to call it in messages and file names.
+        name: Its name in messages and file names.
         source: Where it was found, `module:attribute`.
         summary: First line of its docstring.
     """
@@ -60,8 +60,8 @@ class Target:
         """Return the machine; a factory is called with `arguments`.
 
         Raises:
-            TargetError: it takes no such argument, raises something that smachpy does not raise, or
-                gives something that is no container.
+            TargetError: it takes no such argument, raises an exception of another library, or
+                returns something else than a container.
         """
         if isinstance(self.thing, Container):
             if arguments:
@@ -74,7 +74,7 @@ class Target:
         self._check_arguments(arguments)
         try:
             machine = self.thing(**arguments)
-        except (SmachError, ActionlibError):  # says itself what was wrong with an argument
+        except (SmachError, ActionlibError):  # these say themselves which argument was wrong
             raise
         except Exception as error:
             raise TargetError(
@@ -112,9 +112,9 @@ class Target:
 
 
 def list_missions() -> dict[str, str]:
-    """Return the missions that installed packages offer, name -> what it does, in one line.
+    """Return the missions of all installed packages: name -> summary, in one line.
 
-    They are the entry points `smachpy.missions`. The line of one that cannot be loaded says why.
+    They are the entry points `smachpy.missions`. If one cannot be loaded, its line says why.
     """
     lines = {}
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
@@ -131,9 +131,9 @@ def list_missions() -> dict[str, str]:
 
 
 def list_plans(folder: Path) -> dict[str, str]:
-    """Return the Petri net plans in a folder, name for `smachpy run` -> their actions, in a line.
+    """Return the Petri net plans in a folder: name for `smachpy run` -> its actions, in one line.
 
-    The line of one that cannot be read says why.
+    If one cannot be read, its line says why.
 
     Raises:
         TargetError: the folder cannot be read.
@@ -159,17 +159,17 @@ def list_plans(folder: Path) -> dict[str, str]:
 
 
 def load_target(text: str) -> Target:
-    """Load what a user named.
+    """Load the machine that a user names.
 
     Args:
         text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
-            `:factory` a file's `mission`, `machine` or `sm` is taken, else its only function with
-            `@smachpy.mission`, else its only machine. Or a
-            Petri net plan, `path.pnml` (.plan, .pddlout); STEM.actions.yaml or actions.yaml beside
-            it says what its actions and conditions are.
+            `:factory` it is the file's `mission`, `machine` or `sm`, else its only function with
+            `@smachpy.mission`, else its only machine. Or a Petri net plan, `path.pnml` (.plan,
+            .pddlout), with its actions and conditions in STEM.actions.yaml or actions.yaml beside
+            it.
 
     Raises:
-        TargetError: there is no such thing; names the nearest ones.
+        TargetError: there is no such target; the nearest names are listed.
     """
     if text.endswith(PLANS):
         return _plan_target(text)
@@ -229,7 +229,7 @@ def _import_file(text: str, path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        sys.modules.pop(name, None)  # half of it is there
+        sys.modules.pop(name, None)  # it was executed only in part
         why = clash(error, [path.parent]) if isinstance(error, ImportError) else None
         raise TargetError(text, why or f"running the file raised {raised_text(error)}") from error
     finally:
@@ -238,7 +238,7 @@ def _import_file(text: str, path: Path) -> ModuleType:
 
 
 def _free_name(stem: str) -> str:
-    """Return `stem`, with a number after it if a module, another file's maybe, has that name."""
+    """Return `stem`, with a number appended if a module already has that name."""
     name, number = stem, 1
     while name in sys.modules:
         number += 1
@@ -312,11 +312,11 @@ def _suggest(word: str, names: list[str]) -> str:
 
 
 def raised_text(error: BaseException, said: str = "") -> str:
-    """Return what the user's code raised, with the innermost of its lines.
+    """Return an exception of the user's code as text, with the lines that raised it.
 
     Args:
-        error: What was raised.
-        said: What to say of it, in place of its type and text.
+        error: The exception.
+        said: Text instead of its type and message.
     """
     lines = (said or f"{type(error).__name__}: {error}", *trace_of(error).splitlines())
     return "\n    ".join(lines)

@@ -1,4 +1,4 @@
-"""Collects, from a mission's events, where the robot drove and what for."""
+"""Records from a mission's events where the robots drove, and their goals."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from smachpy.sim.occupancy import OccupancyMap
     from smachpy.sim.track import GoalMark
 
-_SAME_STATE = 3  # goals of one state that have its name
-_SAME_PLACE = 0.05  # [m] a goal this near to a named waypoint has its name
+_SAME_STATE = 3  # a state with more goals than this does not name them
+_SAME_PLACE = 0.05  # [m] a goal this close to a named waypoint gets its name
 
 
 class TrackRecorder:
     """Listens to a mission and can draw its track; for `machine.subscribe(recorder.on_event)`.
 
-    The track is made of the poses that `move_base` and Nav2 report as feedback, and other actions
+    The track consists of the poses in the feedback of `move_base` and Nav2, and of other actions
     whose feedback has a field `base_position` or `current_pose`. A goal is named after the waypoint
-    that a state wrote to userdata, that is anything with a `name` and a `pose`, else after the
-    state that sent it.
+    that a state wrote to userdata (any value with a `name` and a `pose`), else after the state that
+    sent it.
 
     Threads: `on_event` may be called from any thread.
 
     Attributes:
-        tracks: The places, (x, y) [m] in the map frame, by robot: what is in front of the names of
-            its actions, "" for a robot without a name.
+        tracks: The positions, (x, y) [m] in the map frame, by robot: the prefix of its actions, ""
+            for a robot without a name.
     """
 
     def __init__(self) -> None:
@@ -49,11 +49,11 @@ class TrackRecorder:
 
     @property
     def has_goals(self) -> bool:
-        """Whether any goal was a place to drive to, or several robots drove."""
+        """Whether there is anything to draw: a goal on the map, or several robots."""
         return bool(self._goals) or len(self.tracks) > 1
 
     def on_event(self, event: ev.Event) -> None:
-        """Take one event in."""
+        """Process one event."""
         with self._lock:
             if isinstance(event, ev.GoalFeedback):
                 self._on_feedback(_robot(event.action), event.feedback)
@@ -87,7 +87,7 @@ class TrackRecorder:
     def _marks(self) -> list[GoalMark]:
         from smachpy.sim.track import GoalMark
 
-        # A state that drives to many places is no name for any of them.
+        # A state that drives to many places would give all of them the same name.
         times = Counter(label for _, label, _ in self._goals.values())
         return [
             GoalMark(
@@ -130,12 +130,12 @@ class TrackRecorder:
 
 
 def _robot(action: str) -> str:
-    """Return what stands in front of an action's name: the robot's."""
+    """Return the prefix of an action's name, which is the robot's."""
     return action.lstrip("/").rpartition("/")[0]
 
 
 def _find_place(message: Any, *fields: str) -> Any:
-    """Return the PoseStamped in the first of some fields: those of move_base and of Nav2."""
+    """Return the PoseStamped in the first field found: move_base and Nav2 use other names."""
     for field in fields:
         place = getattr(message, field, None)
         if hasattr(place, "header") and hasattr(place, "pose"):

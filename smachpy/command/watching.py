@@ -1,4 +1,4 @@
-"""A run that others can see: over the network, in a browser, in a file."""
+"""Shows a run to others: over the network, in a browser, in a file."""
 
 from __future__ import annotations
 
@@ -26,17 +26,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Watching:
-    """Who may see a run, and how.
+    """How a run is shown.
 
     Attributes:
-        record: File to write the run to; None writes one only for those who view it, to the folder
-            of runs.
-        view: Serve the page of the live viewer while it runs, and after its end.
+        record: File to record the run to; None records only viewed runs, in the folder of runs.
+        view: Serve the page of the live viewer during the run and after its end.
         view_for: How long after its end [s]; None: until the program is to end.
-        port: Of that page; 0 takes any.
-        control: Obey pause, step, jump and the like from viewers.
-        journal: Where a durable mission is kept, for the page's list of runs.
-        alone: The mission is on no network that others are on: it is shown to `view` only.
+        port: Port of that page; 0 takes any.
+        control: Obey commands of viewers: pause, step, jump and so on.
+        journal: Journal of a durable mission, for the page's list of runs.
+        alone: The mission is not on a shared network: only `view` shows it.
     """
 
     record: Path | None = None
@@ -49,11 +48,11 @@ class Watching:
 
 
 class Watch:
-    """The page and the file of one run, while they are there.
+    """The page and the recording of one run.
 
     Args:
-        file: Where the run is written to.
-        viewer: What serves the page.
+        file: The recording.
+        viewer: The process that serves the page.
         stay: How long the page stays after the end [s]; None: until the program is to end.
     """
 
@@ -61,20 +60,20 @@ class Watch:
         self._file = file
         self._viewer = viewer
         self._stay = stay
-        self._clock = RealClock()  # people look in real time
+        self._clock = RealClock()  # the page is read in real time
         self._over = self._clock.event("page of the run")
 
     def viewer_ended(self) -> None:
-        """Take the end of the viewer; from any thread."""
+        """Note that the viewer may have ended; from any thread."""
         if self._viewer is not None and self._viewer.exit_code is not None:
             self._over.set()
 
     def linger(self, outcome: str | None, ending: Shutdown) -> None:
-        """Complete the file, say where the run can be looked at, and leave it there for a while.
+        """Complete the recording, say where the run can be viewed, and keep the page for a while.
 
         Args:
-            outcome: How the run has ended; None: its own code raised.
-            ending: What ends the program.
+            outcome: The outcome; None: the mission's code raised.
+            ending: The shutdown of the program.
 
         Blocks: until the time is over, `ending` is requested, or the viewer has ended.
         """
@@ -89,7 +88,7 @@ class Watch:
         how = "raised an exception" if outcome is None else f"ended: {printable(outcome)}"
         left = "" if self._stay is None else f" for {self._stay:g} s"
         print(f"{how}; still at {self._viewer.address}{left} (Ctrl-C ends it)", flush=True)
-        with use_clock(self._clock):  # the mission's may stand still by now
+        with use_clock(self._clock):  # the mission's virtual clock has stopped by now
             cancel = ending.on_shutdown(self._over.set)
         self.viewer_ended()
         self._over.wait(self._stay)
@@ -98,16 +97,16 @@ class Watch:
 
 @contextlib.contextmanager
 def watched(name: str, machine: Container, path: str, watching: Watching) -> Iterator[Watch]:
-    """Let a machine be seen while the context lasts; nothing that watches can hold it up.
+    """Show a machine within the block; no viewer can delay it.
 
     Args:
-        name: What viewers find it under.
+        name: The name for viewers.
         machine: The machine.
         path: Its path in its record.
-        watching: Who may see it.
+        watching: How to show it.
 
     Yields:
-        What keeps the page after the end.
+            The page, which can stay after the end.
 
     Raises:
         SmachError: the file exists, or the page cannot be served.
@@ -116,7 +115,8 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
     with contextlib.ExitStack() as stack:
         robot = stack.enter_context(RobotTopics())
         node = None
-        if watching.alone and watching.view:  # viewers are on another network, in real time
+        # The mission's network is in memory: viewers need a node on the real one, in real time.
+        if watching.alone and watching.view:
             node = stack.enter_context(Node("mission", clock=RealClock()))
         file = _file(name, machine, watching)
         if file is not None:
@@ -149,7 +149,7 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
 
 
 def _file(name: str, machine: Container, watching: Watching) -> Recorder | None:
-    """What writes the run down: a durable one that goes on, to the file that it began with."""
+    """Return the recorder; a durable run that continues goes to the file that it began with."""
     journal = machine._smachpy.journal
     run = "" if journal is None else journal.run
     path = watching.record

@@ -1,4 +1,4 @@
-"""Poses and angles in the plane."""
+"""Poses and angles in the plane, and numbers of the command line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _TAU = 2.0 * math.pi
 
 @register_type
 class Pose2D(NamedTuple):
-    """A place and a heading.
+    """A position and a heading.
 
     Attributes:
         x: [m].
@@ -26,7 +26,7 @@ class Pose2D(NamedTuple):
     yaw: float
 
     def then(self, step: Pose2D) -> Pose2D:
-        """Return `step`, given in this pose's own frame, in the frame this pose is given in."""
+        """Return `step`, given relative to this pose, in the frame of this pose."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return Pose2D(
             self.x + c * step.x - s * step.y,
@@ -35,7 +35,7 @@ class Pose2D(NamedTuple):
         )
 
     def distance(self, other: Pose2D) -> float:
-        """Return the straight distance [m] between the two places."""
+        """Return the straight distance between the two positions [m]."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
 
@@ -43,12 +43,12 @@ ORIGIN: Final = Pose2D(0.0, 0.0, 0.0)
 
 
 def wrap_angle(angle: float) -> float:
-    """Return `angle` [rad] turned by whole circles into [-pi, pi)."""
+    """Return `angle` [rad] wrapped to [-pi, pi)."""
     return (angle + math.pi) % _TAU - math.pi
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
-    """Return the heading [rad] of a quaternion, whose length need not be one."""
+    """Return the heading of a quaternion [rad], which need not be normalised."""
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
@@ -58,10 +58,10 @@ def quaternion_of(yaw: float) -> tuple[float, float, float, float]:
 
 
 def finite(text: str) -> float:
-    """Read a number of the command line that is neither infinite nor none at all.
+    """Read a finite number of the command line.
 
     Raises:
-        argparse.ArgumentTypeError: it is not.
+        argparse.ArgumentTypeError: it is not one.
     """
     try:
         value = float(text)
@@ -70,3 +70,15 @@ def finite(text: str) -> float:
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"got {text!r}; expected a finite number")
     return value
+
+
+def positive_seconds(text: str) -> float:
+    """Read a duration of the command line [s].
+
+    Raises:
+        argparse.ArgumentTypeError: it is not a finite number above 0.
+    """
+    seconds = finite(text)
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected seconds above 0")
+    return seconds
