@@ -180,7 +180,9 @@ class _Runs:
 
     def need(self, action: str) -> None:
         """In virtual time, start the simulated robot whose action is called, unless it is there."""
-        prefix, _, word = action.strip("/").rpartition("/")
+        node = get_node()
+        name = node.resolve(action)  # as the command line renames it
+        prefix, _, word = name.removeprefix(f"{node.namespace}/").rpartition("/")
         wanted = self._options.pace.virtual and word in ROBOT_ACTIONS
         if wanted and prefix not in self._robots:
             self._robots.add(prefix)

@@ -127,6 +127,12 @@ def test_a_state_that_returns_no_text_is_told_and_shown(smachpy, tmp_path, value
     assert "Traceback" not in output, output
 
 
+def test_the_simulated_robot_has_the_name_that_the_command_line_gives(smachpy, scripts):
+    words = ("--time", "virtual", "--plain", "move_base:=robot_1/move_base")
+    code, output = smachpy("run", "--ros1", scripts / "move_base_client.py", *words)
+    assert code == 0, output
+
+
 def test_who_waits_for_what_nobody_offers(smachpy, tmp_path):
     script = tmp_path / "waits.py"
     script.write_text("import rospy\nrospy.init_node('waits')\nrospy.wait_for_service('/nobody')\n")
