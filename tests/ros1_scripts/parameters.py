@@ -12,7 +12,7 @@ class Configured(smach.State):
 
     def execute(self, ud):
         rospy.set_param("/found/lab", {"x": 1, "y": [1, 2]})
-        assert rospy.has_param("/found/lab/x") and rospy.get_param("found")["lab"]["y"] == [1, 2]
+        assert rospy.has_param("//found//lab/x") and rospy.get_param("found")["lab"]["y"] == [1, 2]
         rospy.set_param("~mine", True)
         assert rospy.get_param("/configured/mine") is True
         assert rospy.search_param("found") == "/found"

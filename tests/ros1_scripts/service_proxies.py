@@ -7,8 +7,8 @@ from std_srvs.srv import *
 class Call(smach.State):
     def __init__(self):
         smach.State.__init__(self, outcomes=["ok", "failed"])
-        rospy.wait_for_service("/switch")
-        self.switch = rospy.ServiceProxy("/switch", SetBool)
+        rospy.wait_for_service("//switch")
+        self.switch = rospy.ServiceProxy("//switch", SetBool)
 
     def execute(self, ud):
         try:

@@ -14,13 +14,13 @@ class Hear(smach.State):
             return "silence"
         except rospy.ROSException:
             rospy.loginfo("nothing, as expected")
-        msg = rospy.wait_for_message("/chatter", String, rospy.Duration(5))
+        msg = rospy.wait_for_message("//chatter", String, rospy.Duration(5))
         kind = rospy.wait_for_message("/chatter", AnyMsg, 5)._connection_header["type"]
         return "heard" if msg.data == "hello" and kind == "std_msgs/String" else "silence"
 
 
 rospy.init_node("hear")
-pub = rospy.Publisher("/chatter", String, latch=True)
+pub = rospy.Publisher(rospy.get_namespace() + "/chatter", String, latch=True)
 pub.publish("hello")
 sm = smach.StateMachine(outcomes=["heard", "silence"])
 with sm:

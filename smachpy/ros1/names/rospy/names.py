@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from actionlib_core.names import resolve_name as _resolve
 from actionlib_core.node import get_node
 from smachpy.ros1.session import session
@@ -42,6 +44,7 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
     """
     if not name:
         return get_namespace()
+    name = canonical(name)
     name = name.rstrip("/") if len(name) > 1 else name
     if name in {"/", "~"}:
         return "/" if name == "/" else get_name()
@@ -49,6 +52,11 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
         return f"/{get_node().resolve(name)}"
     node = (caller_id or get_name()).strip("/")
     return f"/{_resolve(name, namespace=node.rpartition('/')[0], node=node)}"
+
+
+def canonical(name: str) -> str:
+    """Return a name with single slashes: rospy took doubled ones."""
+    return re.sub("//+", "/", name) if isinstance(name, str) else name  # else a stand-in
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
