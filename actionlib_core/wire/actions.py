@@ -16,7 +16,8 @@ from actionlib_core.exceptions import ActionlibError, ServerConflictError, Trans
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces._message import codecs_of
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
-from actionlib_core.transport import Quality
+from actionlib_core.transport import Quality, Sample
+from actionlib_core.wire import in_process
 from actionlib_core.wire.arrivals import Bursts, Readable
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import (
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
         PublisherPort,
         Query,
         Reply,
-        Sample,
         Transport,
     )
     from actionlib_core.wire.action_types import ActionTypes
@@ -298,6 +298,7 @@ class ActionClientPort:
         action = types.action
         self.endpoint = node.endpoint(Kind.ACTION_CLIENT, name, action._type, action._md5sum)
         self._encodings = encoding_of(GoalStatusArray), encoding_of(types.action_result)
+        self._goal_encoding = encoding_of(types.action_goal)
         stopped = f"action '{name}': the client is stopped."
         self._publishers = _Publishers(node.transport, stopped)
         self._goals = self._publishers[self._keys.goal, types.action_goal, GOAL]
@@ -306,6 +307,11 @@ class ActionClientPort:
         self.read_feedback = codecs_of(types.feedback)[1]
         self.read_result = codecs_of(types.result)[1]
         self._feedback: Bursts[Sample] = Bursts(node.clock, spawn, self._on_feedback)
+        self.take_feedback = self._feedback.take
+        self._session = node.transport.session_id
+        self._in_process: dict[str, in_process.ServerInProcess] = {}  # by token
+        self._direct: frozenset[str] = frozenset()  # their sessions
+        self._closed = False
 
     def open(self, listener: ClientListener) -> None:
         self._listener = listener
@@ -314,8 +320,8 @@ class ActionClientPort:
         # last, since goals are sent to those that are found.
         self._declared = [
             transport.subscribe(keys.status, self._on_status, history=False),
-            transport.subscribe(keys.feedback, self._feedback.take, history=False),
-            transport.subscribe(keys.result, self._on_result, history=False),
+            transport.subscribe(keys.feedback, self._on_feedback_sample, history=False),
+            transport.subscribe(keys.result, self._on_result_sample, history=False),
             transport.declare_alive(token_key(self.endpoint)),
             transport.watch_alive(token_pattern(Kind.ACTION_SERVER, self._name), self._on_presence),
         ]
@@ -325,6 +331,9 @@ class ActionClientPort:
         self._declared = []
         for entry in reversed(declared):
             entry.close()
+        self._closed = True
+        for server in list(self._in_process.values()):
+            server.leave(self)
 
     def explain_absence(self) -> str:
         return ""
@@ -345,7 +354,10 @@ class ActionClientPort:
             if wait
             else self._publishers[self._keys.goal, self._types.action_goal, AGAIN]
         )
-        goals.put(pack_goal(stamp_ns, goal_id, stamp_ns, body, token))
+        message = pack_goal(stamp_ns, goal_id, stamp_ns, body, token)
+        if wait and token in self._in_process and (near := in_process.servers.get(token)):
+            near.take_goal(Sample(self._keys.goal, message, self._goal_encoding, self._session))
+        goals.put(message)
 
     def send_cancel(self, goal_id: str, stamp_ns: int, *, wait: bool = True) -> None:
         cancels = self._publishers[self._keys.cancel, GoalID, GOAL if wait else AGAIN]
@@ -372,6 +384,14 @@ class ActionClientPort:
         )
 
     # -- messages ------------------------------------------------------------------------------
+
+    def _on_feedback_sample(self, sample: Sample) -> None:
+        if sample.source not in self._direct:
+            self._feedback.take(sample)
+
+    def _on_result_sample(self, sample: Sample) -> None:
+        if sample.source not in self._direct:
+            self.take_result(sample)
 
     # Feedback may wait in `_feedback` for the rest of a burst. To keep the order of messages, it is
     # handed on before any status, result or end of a server.
@@ -407,7 +427,7 @@ class ActionClientPort:
             else:
                 self._listener.on_feedback(entry, sample.payload[start:], sample.source)
 
-    def _on_result(self, sample: Sample) -> None:
+    def take_result(self, sample: Sample) -> None:
         if self._feedback.waiting or self._feedback.lock.locked():
             self._feedback.flush()
         if sample.encoding != self._encodings[1] and not self._readable.check(
@@ -447,13 +467,28 @@ class ActionClientPort:
         if server is None:
             return
         if not presence.alive:
+            self._note_in_process(presence.key, None)
             self._feedback.flush()
             self._listener.on_server_gone(server)
             return
         error = find_mismatch([server], self.endpoint)
         if error is not None:
             self._readable.report(f"{server.session} {server.type} {server.md5}", error)
+        else:
+            self._note_in_process(presence.key, in_process.servers.get(presence.key))
         self._listener.on_server(server, error)
+
+    def _note_in_process(self, token: str, server: in_process.ServerInProcess | None) -> None:
+        """Speak with the server of a token directly from now on; None: not any more."""
+        if server is not None:
+            self._in_process[token] = server
+        elif self._in_process.pop(token, None) is None:
+            return
+        self._direct = frozenset(each.session for each in self._in_process.values())
+        if server is not None:
+            server.join(self)
+            if self._closed:  # meanwhile
+                server.leave(self)
 
 
 class ActionServerPort:

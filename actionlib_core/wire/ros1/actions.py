@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from actionlib_core.exceptions import ActionlibError, InterfaceError, Ros1Error, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from actionlib_core.transport import Sample
+from actionlib_core.wire import in_process
 from actionlib_core.wire.actions import (
     ACK,
     AGAIN,
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from actionlib_core.clock import Timer
-    from actionlib_core.transport import Closable, PublisherPort, Quality, Query, Reply, Sample
+    from actionlib_core.transport import Closable, PublisherPort, Quality, Query, Reply
     from actionlib_core.wire.presence import Endpoint
     from actionlib_core.wire.ros1.answers import SystemState
     from actionlib_core.wire.ros1.definitions import Definitions
@@ -52,7 +54,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("actionlib_core")
 
 OVERTAKEN_S = 0.05
-STATUS_S = 0.005  # changes within so long are one list, and leave the way to a result that follows
+STATUS_S = 0.005  # changes within so long are one list
 NEXT_S = 2.0  # a server here that has left may be followed by another
 ACKNOWLEDGE_S = 5.0  # results: clients in ROS 1 take a goal that is no longer listed for lost
 GOAL_ID = Typed(GoalID._type, GoalID._md5sum)
@@ -302,6 +304,8 @@ class _Part:
 
     def __init__(self, server: ServerInRos, word: str, header: Header) -> None:
         typed = type_of(header, word)
+        # Long lists are slow to read, and in ROS 1 one comes right before a result: it goes first.
+        self.within = STATUS_S if word == "status" else 0.0
         self._server = server
         self._word = word
         self._node = header.get("callerid", "")
@@ -335,10 +339,11 @@ class _Shown:
         self._types = parts
         self._to_server = goals, cancels
         self._lock = threading.Lock()
-        self._latest: bytes | None = None  # status list that is about to be sent
         self._goals = GoalsOfServer()
-        keys = action_keys(self._name)
+        self._clients: dict[in_process.ClientInProcess, None] = {}  # those in this process
+        self._keys = keys = action_keys(self._name)
         transport = sides.node.transport
+        self.session = transport.session_id
         end = sides.node.endpoint(Kind.ACTION_SERVER, self._name, *typed)
         end = end._replace(node=sides.key(ros_node))
         self._own_key = token_key(with_age(end, self._clock.time_ns()))
@@ -351,39 +356,33 @@ class _Shown:
             transport.subscribe(keys.cancel, self._on_cancel, history=False),
             transport.subscribe(keys.ack, self._on_ack, history=False),
             transport.queryable(keys.result, self._on_query),
-            transport.declare_alive(self._own_key),
         ]
+        in_process.servers[self._own_key] = self
+        self._declared.append(transport.declare_alive(self._own_key))
 
     def close(self) -> None:
         """Show it no more: its clients' goals are LOST at once."""
+        in_process.servers.pop(self._own_key, None)
         for each in reversed(self._declared):
             each.close()
 
     # -- from ROS 1 ----------------------------------------------------------------------------
 
     def on_status(self, payload: bytes) -> None:
-        """Take a status list; it is read and sent soon, as long ones are slow to read."""
+        """Pass on a status list, but for those of an idle server, which say nothing."""
+        entries = unpack_statuses(payload)
         with self._lock:
-            waits, self._latest = self._latest, payload
-        if waits is None:
-            self._clock.call_later(STATUS_S, self._send_status)
-
-    def _send_status(self) -> None:
-        """Pass on the latest status list, but for those of an idle server, which say nothing."""
-        with self._lock:
-            payload, self._latest = self._latest, None
-            assert payload is not None
-            try:
-                news = self._goals.on_statuses(unpack_statuses(payload))
-            except ValueError as error:
-                self._sides.ros.report(f"{self._name}/status", Ros1Error(self._name, str(error)))
-                return
+            news = self._goals.on_statuses(entries)
         if news:
             with contextlib.suppress(TransportError):  # hidden meanwhile
                 self._status.put(payload)
 
     def on_feedback(self, payload: bytes) -> None:
         """Take feedback."""
+        if self._clients:
+            sample = self._sample("feedback", payload)
+            for client in list(self._clients):
+                client.take_feedback(sample)
         self._feedback.put(payload)
 
     def on_result(self, payload: bytes) -> None:
@@ -391,12 +390,40 @@ class _Shown:
         entry, _ = unpack_report(payload)
         with self._lock:
             self._goals.on_result(entry, payload, self._clock.now())
+        self._send_result(payload)
+
+    def _send_result(self, payload: bytes) -> None:
+        if self._clients:
+            sample = self._sample("result", payload)
+            for client in list(self._clients):
+                client.take_result(sample)
         self._result.put(payload)
+
+    def _sample(self, word: str, payload: bytes) -> Sample:
+        return Sample(getattr(self._keys, word), payload, self._types[word].encoding, self.session)
+
+    # -- from clients in this process ----------------------------------------------------------
+
+    def join(self, client: in_process.ClientInProcess) -> None:
+        """See `in_process.ServerInProcess`."""
+        self._clients[client] = None
+
+    def leave(self, client: in_process.ClientInProcess) -> None:
+        """See `in_process.ServerInProcess`."""
+        self._clients.pop(client, None)
+
+    def take_goal(self, sample: Sample) -> None:
+        """See `in_process.ServerInProcess`."""
+        self._pass_on(sample, copy_follows=True)
 
     # -- from clients here ---------------------------------------------------------------------
 
     def _on_goal(self, sample: Sample) -> None:
-        if self._sides.is_own(sample) or not self._sides.fits(sample, self._types["goal"]):
+        if not self._sides.is_own(sample):
+            self._pass_on(sample)
+
+    def _pass_on(self, sample: Sample, *, copy_follows: bool = False) -> None:
+        if not self._sides.fits(sample, self._types["goal"]):
             return
         try:
             frame, goal_id = unpack_frame(sample.payload), unpack_goal(sample.payload)[0]
@@ -409,10 +436,12 @@ class _Shown:
         with self._lock:
             verdict = self._goals.on_goal(goal_id)
             result = self._goals.result(goal_id)
+            if copy_follows:
+                self._goals.expect_copy(goal_id)
         if verdict is Verdict.PASS:
             self._to_server[0].put(sample.payload)
-        elif result is not None:
-            self._result.put(result)
+        elif verdict is Verdict.REPEAT_RESULT and result is not None:
+            self._send_result(result)
 
     def _on_cancel(self, sample: Sample) -> None:
         if not self._sides.is_own(sample) and self._sides.fits(sample, GOAL_ID):
@@ -695,6 +724,8 @@ class ServerHere:
 
 class _Client:
     """A publisher of goals or cancels in ROS 1."""
+
+    within = 0.0
 
     def __init__(self, server: ServerHere, word: str, header: Header) -> None:
         self._typed = type_of(header, word)

@@ -41,9 +41,17 @@ class GoalsOfServer:
         self._known = Recent(REMEMBERED)
         self._listed: dict[str, StatusEntry] = {}
         self._results: dict[str, tuple[float, bytes]] = {}
+        self._copies = Recent(REMEMBERED)
+
+    def expect_copy(self, goal_id: str) -> None:
+        """Take note that a goal that has come comes once more, over the network."""
+        self._copies.add(goal_id)
 
     def on_goal(self, goal_id: str) -> Verdict:
         """Take a goal from a client, which may be a repetition."""
+        if goal_id in self._copies:
+            del self._copies[goal_id]
+            return Verdict.DROP
         if goal_id in self._results:
             return Verdict.REPEAT_RESULT
         return Verdict.DROP if goal_id and goal_id in self._known else Verdict.PASS

@@ -42,6 +42,7 @@ HEADER_S = 5.0  # longest wait for the other side's connection header
 BUFFER = 16 << 20  # bytes that wait for a subscriber; beyond, the oldest messages are dropped
 FULL_S = 0.1
 MOST_CONNECTIONS = 2000  # each has a thread
+MOST_SKIPPED = 100
 READ_SIZE = 1 << 16
 LARGEST_READ = 1 << 20
 # A peer whose computer has gone is noticed after 11 s: 5 s of silence, then three questions.
@@ -154,6 +155,20 @@ class Connection:
         except ValueError as error:
             raise Ros1Error(self.peer, f"message {error}.") from error
         return self.read(length)
+
+    def read_latest(self, within: float) -> bytes | None:
+        """Return the last of the messages that come within so long [s]; see `read_frame`.
+
+        Of a peer that sends without end, `MOST_SKIPPED` are left out at most.
+        """
+        payload = self.read_frame()
+        if payload is not None:
+            self._clock.sleep(within)
+            for _ in range(MOST_SKIPPED):
+                if not (self._buffer or self._poll.poll(0)) or (later := self.read_frame()) is None:
+                    break
+                payload = later
+        return payload
 
     def read(self, size: int) -> bytes | None:
         """Return `size` bytes; None when the connection has ended; raises and blocks as above."""

@@ -14,6 +14,7 @@ import os
 import re
 import socket
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 from actionlib_core.clock._serial import report_thread_exception
@@ -52,7 +53,13 @@ PORT = 11311  # a master's by custom
 
 
 class Receiver(Protocol):
-    """What hears one publisher."""
+    """What hears one publisher.
+
+    Attributes:
+        within: Of the messages that come within so long [s] the last will do; 0.0: it takes all.
+    """
+
+    within: float
 
     def take(self, payload: bytes) -> None:
         """Take a message."""
@@ -185,8 +192,10 @@ class _Link:
             self._wait_until_counted(where, header)
             receiver = subscription.accept(header)
             node.forget_report(about)
+            within = receiver.within
+            read = partial(connection.read_latest, within) if within else connection.read_frame
             try:
-                while (payload := connection.read_frame()) is not None:
+                while (payload := read()) is not None:
                     receiver.take(payload)
             finally:
                 self.connection = None

@@ -79,6 +79,8 @@ class TopicBridge:
 class _FromRos:
     """One publisher in ROS 1, as it is here."""
 
+    within = 0.0
+
     def __init__(self, sides: Sides, key: str, typed: Typed, header: Header) -> None:
         latch = header.get("latching") == LATCHED
         quality = Quality(express=True, block=True, latch=latch)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
 import subprocess
+import sys
 import xmlrpc.client
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -173,3 +175,25 @@ def bridge(ros: Ros, node: Node):
     yield bridge
     for each in opened:
         each.close()
+
+
+@pytest.fixture
+def command(ros: Ros):
+    """`with command(...)` starts `smachpy bridge ros1`; gives the process and its node's name."""
+
+    @contextlib.contextmanager
+    def command(*options):
+        program = Path(sys.executable).parent / "smachpy"
+        with subprocess.Popen(
+            [program, "bridge", "ros1", "--master", ros.uri, *options],
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as child:
+            try:
+                line = child.stdout.readline()
+                assert "ready" in line
+                yield child, line.partition(":")[0]
+            finally:
+                child.kill()
+
+    return command

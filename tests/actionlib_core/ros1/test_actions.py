@@ -5,12 +5,14 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from collections import Counter
 
 import pytest
 
 from actionlib_core import SimpleActionClient, SimpleActionServer
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.node import Node
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
@@ -38,6 +40,58 @@ def test_goals_to_a_server_in_ros(ros, bridge):
     ended = [send(client, number) for number in range(GOALS)]
     assert ended == [(GoalStatus.SUCCEEDED, 2 * number) for number in range(GOALS)]
     assert client.get_goal_status_text() == "done by ROS 1"
+
+
+def test_goals_over_a_bridge_in_another_process(ros, command, node):
+    server = ros.start("action_server", "beyond", "beyond_worker")
+    with command("--action", "beyond"):
+        client = client_of("beyond")
+        ended = [send(client, number) for number in range(GOALS)]
+        assert ended == [(GoalStatus.SUCCEEDED, 2 * number) for number in range(GOALS)]
+        begun = node.clock.event()
+        client.send_goal(msg.TestGoal(-5), feedback_cb=lambda feedback: begun.set())
+        assert begun.wait(WAIT_S)
+        server.send_signal(signal.SIGKILL)
+        assert client.wait_for_result(WAIT_S)
+        assert client.get_state() == GoalStatus.LOST
+        assert "beyond_worker" in client.get_goal_status_text()
+
+
+def test_over_a_bridge_in_this_process_nothing_comes_twice_and_others_hear_all(ros, bridge, node):
+    recorder = ros.start("topics", "counter")
+    recorder.ask("record /direct/goal")
+    ros.start("action_server", "direct", "direct_worker")
+    bridge(actions=["direct"])
+    client = client_of("direct")
+    assert recorder.ask("connections /direct/goal") == "1"
+    feedback, seen = [], []
+    words = {"goal", "feedback", "result"}
+    heard = node.clock.event()
+
+    def see(sample):
+        seen.append(sample.key.rpartition("/")[2])
+        heard.set()
+
+    with Node("onlooker", clock=node.clock) as onlooker:
+        for word in words:
+            onlooker.transport.subscribe(f"direct/{word}", see)
+        sent = 0
+        while not words <= set(seen):  # until the onlooker is known everywhere
+            assert send(client, sent) == (GoalStatus.SUCCEEDED, 2 * sent)
+            sent += 1
+        before = Counter(seen)
+        for number in range(20):
+            client.send_goal(
+                msg.TestGoal(number), feedback_cb=lambda told: feedback.append(told.feedback)
+            )
+            assert client.wait_for_result(WAIT_S)
+        while any((Counter(seen) - before)[word] < 20 for word in words):
+            assert heard.wait(WAIT_S)
+            heard.clear()
+    # When this one has ended, the copies of those before it have come.
+    assert send(client, 99) == (GoalStatus.SUCCEEDED, 198)
+    assert feedback == list(range(20))
+    assert len(recorder.ask(f"heard /direct/goal {sent + 21}").split()) == sent + 21
 
 
 def test_a_server_in_ros_that_comes_later_gives_feedback_and_is_cancelled(ros, bridge, node):

@@ -127,6 +127,15 @@ def test_a_goal_is_passed_until_the_server_speaks_of_it():
     assert goals.on_goal("") is Verdict.PASS
 
 
+def test_the_copy_of_a_goal_is_dropped_once_even_after_the_result():
+    goals = GoalsOfServer()
+    assert goals.on_goal("g") is Verdict.PASS
+    goals.expect_copy("g")
+    goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=0.0)
+    assert goals.on_goal("g") is Verdict.DROP
+    assert goals.on_goal("g") is Verdict.REPEAT_RESULT
+
+
 def test_a_result_is_sent_again_until_it_is_acknowledged_or_old():
     goals = GoalsOfServer()
     goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=0.0)

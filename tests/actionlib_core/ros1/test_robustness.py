@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import socket
 import struct
-import subprocess
-import sys
 import xmlrpc.client
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -159,33 +155,16 @@ def test_two_bridges_do_not_carry_a_name_twice(ros, bridge, node):
     assert subscriber._ends.wait(carried, WAIT_S)
 
 
-@contextlib.contextmanager
-def command(ros, *options):
-    """The program `smachpy bridge ros1`, ready, and its node's name."""
-    program = Path(sys.executable).parent / "smachpy"
-    with subprocess.Popen(
-        [program, "bridge", "ros1", "--master", ros.uri, *options],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as child:
-        try:
-            line = child.stdout.readline()
-            assert "ready" in line
-            yield child, line.partition(":")[0]
-        finally:
-            child.kill()
-
-
-def test_the_command_ends_cleanly(ros):
-    with command(ros, "--topic", "/x", "--namespace", "r") as (child, name):
+def test_the_command_ends_cleanly(ros, command):
+    with command("--topic", "/x", "--namespace", "r") as (child, name):
         assert "/x" in ros.names_of(name)
         child.send_signal(signal.SIGTERM)
         assert child.wait(WAIT_S) == 0
         assert ros.names_of(name) == []
 
 
-def test_what_a_killed_bridge_has_left_is_unregistered_by_the_next(ros, bridge):
-    with command(ros, "--topic", "/left", "--action", "left") as (child, name):
+def test_what_a_killed_bridge_has_left_is_unregistered_by_the_next(ros, bridge, command):
+    with command("--topic", "/left", "--action", "left") as (child, name):
         child.kill()
         child.wait()
     assert "/left" in ros.names_of(name)

@@ -9,6 +9,7 @@ import pytest
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import Ros1Error
 from actionlib_core.wire.ros1 import links
+from actionlib_core.wire.ros1.frames import pack_frame
 from actionlib_core.wire.ros1.links import Connection, Listener
 from actionlib_core.wire.ros1.rpc import RpcServer, call
 
@@ -124,6 +125,19 @@ def test_waiting_until_all_has_been_taken_ends_with_the_connection(pair, clock):
     connection.close()
     connection.wait_idle(0.01)
     connection.put(b"to nobody")
+
+
+def test_of_messages_that_come_together_the_last_is_read(pair, monkeypatch):
+    connection, theirs = pair
+    theirs.sendall(b"".join(pack_frame(b"%d" % number) for number in range(10)))
+    assert connection.read_latest(0.01) == b"9"
+    monkeypatch.setattr(links, "MOST_SKIPPED", 3)
+    theirs.sendall(b"".join(pack_frame(b"%d" % number) for number in range(6)))
+    assert [connection.read_latest(0.01) for _ in range(2)] == [b"3", b"5"]
+    theirs.sendall(pack_frame(b"end"))
+    theirs.shutdown(socket.SHUT_WR)
+    assert connection.read_latest(0.01) == b"end"
+    assert connection.read_latest(0.01) is None
 
 
 def test_a_message_that_is_too_long_is_an_error(pair):
