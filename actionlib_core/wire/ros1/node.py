@@ -166,7 +166,9 @@ class _Link:
                 self._read(about)
                 pause = RETRY_FIRST_S
             except ActionlibError as error:
-                self._node.report(about, error)
+                if not self._subscription.closed:  # else we have ended the connection
+                    whole = isinstance(error, Ros1Error) and error.peer == self.uri
+                    self._node.report(self.uri if whole else about, error)
             except Exception:  # noqa: BLE001  a border: reported, and the publisher is tried again
                 report_thread_exception()
             if self._subscription.leave(self):
@@ -182,6 +184,7 @@ class _Link:
         where = read_tcpros(
             self.uri, call(self.uri, "requestTopic", node.name, topic, [["TCPROS"]])
         )
+        node.forget_report(self.uri)
         with Connection.open(*where, f"{topic} at {self.uri}", node.clock) as connection:
             self.connection = connection
             if subscription.closed:

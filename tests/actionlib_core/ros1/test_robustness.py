@@ -6,6 +6,8 @@ import signal
 import socket
 import struct
 import xmlrpc.client
+from contextlib import closing
+from functools import partial
 from urllib.parse import urlsplit
 
 import pytest
@@ -15,6 +17,7 @@ from actionlib_core.exceptions import InterfaceError, NameSetupError, Ros1Error
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.pubsub.topic import Subscriber
 from actionlib_core.wire.ros1.frames import pack_header
+from actionlib_core.wire.ros1.rpc import RpcServer
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
@@ -110,6 +113,54 @@ def test_a_publisher_that_sends_garbage_is_left_and_the_others_are_heard(ros, br
         _, heard = listen(node, "mixed")
         assert heard.wait(WAIT_S)
         ros.ask("unregisterPublisher", "/mixed", bad)
+
+
+class OddNode:
+    """A node that the master has as the publisher of topics, and what it does about connections."""
+
+    def __init__(self, ros, clock, topics, answer):
+        self._answer = answer
+        self._asked = dict.fromkeys(topics, 0)
+        self.twice = clock.event()
+        self._server = RpcServer("127.0.0.1", clock, {"requestTopic": self._on_request})
+        uri = f"http://127.0.0.1:{self._server.port}/"
+        self._end = [partial(ros.ask, "unregisterPublisher", topic, uri) for topic in topics]
+        for topic in topics:
+            ros.ask("registerPublisher", topic, "std_msgs/String", uri)
+
+    def _on_request(self, _caller, topic, _protocols):
+        self._asked[topic] += 1
+        if min(self._asked.values()) > 1:
+            self.twice.set()
+        return self._answer()
+
+    def close(self):
+        for unregister in self._end:
+            unregister()
+        self._server.close(WAIT_S)
+
+
+def test_a_node_that_cannot_be_had_is_told_once_for_all_its_topics(ros, bridge, node, caplog):
+    def refuse():
+        raise Ros1Error("odd", "about to leave")
+
+    topics = ["/odd_1", "/odd_2"]
+    with closing(OddNode(ros, node.clock, topics, refuse)) as odd:
+        bridge(topics=topics)
+        assert odd.twice.wait(WAIT_S)
+        assert len([text for text in caplog.messages if "about to leave" in text]) == 1
+
+
+def test_a_bridge_that_is_closed_while_it_connects_tells_no_error(ros, bridge, node, caplog):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        answer = ["TCPROS", *silent.getsockname()]
+        with closing(OddNode(ros, node.clock, ["/silent"], lambda: answer)):
+            made = bridge(topics=["/silent"])
+            peer, _ = silent.accept()
+            with peer:
+                assert peer.recv(4)  # its header is there, and it waits for ours
+                made.close()
+    assert caplog.messages == []
 
 
 def test_a_master_that_hangs_does_not_hold_the_end(own_ros, bridge, node):
