@@ -1,13 +1,12 @@
-"""What a running machine reports: one closed union of small immutable records.
+"""The events of a running machine: one closed union of small immutable records.
 
-Every event begins with the same three fields: `path` of the state it is about
-("/PATROL/DRIVE"), `t`, the clock's monotonic time [s], and `stamp_ns`, nanoseconds since the
-Unix epoch. Events are tuples, because a transition costs less than a microsecond and making a
-dataclass costs more than that.
+Every event begins with the same three fields: `path` of its state ("/PATROL/DRIVE"), `t`, the
+clock's monotonic time [s], and `stamp_ns`, nanoseconds since the Unix epoch. Events are tuples,
+because a transition takes less than a microsecond and making a dataclass takes more than that.
 
 The events of one run, in order, rebuild it: `Started` and `Finished` enclose it; `Entered` and
-`Left` enclose every state below the root, containers included. A state that raised has `Failed`
-in place of `Left`. When another process goes on with a run, its events begin with `Recovered`.
+`Left` enclose every state below the root, including containers. A state that raised has `Failed`
+instead of `Left`. If another process resumes the run, its events begin with `Recovered`.
 """
 
 from __future__ import annotations
@@ -40,16 +39,16 @@ class Started(NamedTuple):
 
 
 class Recovered(NamedTuple):
-    """Another process goes on with a durable run; in place of `Started`.
+    """Another process resumes a durable run; takes the place of `Started`.
 
-    What was under way goes on: records of a buffer have no `Entered` for it, so that those of all
-    processes, one after the other, are one run.
+    The records of an event buffer have no second `Entered` for states that were active, so that the
+    records of all processes, one after the other, form one run.
 
     Attributes:
         mission: Id of the mission.
         began_ns: When the run began [ns since the epoch].
-        outages: Pairs (from, to) [ns since the epoch] in which no process ran it, this one last.
-        active: Pairs (path, since when [ns since the epoch]) of the states that go on.
+        outages: Pairs (from, to) [ns since the epoch] in which no process ran it, the latest last.
+        active: Pairs (path, since when [ns since the epoch]) of the states that were active.
     """
 
     path: str
@@ -62,7 +61,7 @@ class Recovered(NamedTuple):
 
 
 class Finished(NamedTuple):
-    """A root container's run ended; `outcome` is None when it raised."""
+    """A root container's run ended; `outcome` is None if it raised."""
 
     path: str
     t: float
@@ -92,8 +91,8 @@ class Failed(NamedTuple):
 
     Attributes:
         error: "Type: message".
-        trace: Where: the innermost lines of the user's code, "file:line in function: source", the
-            last one raised; "" where no code of theirs is involved, and in older recordings.
+        trace: The innermost lines of the user's code in the traceback, "file:line in function:
+            source", the last one raised; "" if there are none, and in older recordings.
     """
 
     path: str
@@ -104,19 +103,19 @@ class Failed(NamedTuple):
 
 
 class PreemptRequested(NamedTuple):
-    """Somebody asked the state to stop.
+    """The state was asked to stop.
 
-    Below a container that was asked, every active state has such an event of its own, with the
-    same `source`, `by` and `why`: they tell where the wish came from first.
+    Below a container that was asked, every active state has its own event with the same `source`,
+    `by` and `why`: those of the first cause.
 
     Attributes:
-        source: Kind of its origin: one of `SOURCES`.
-        by: Who: the signal's name, the operator's or client's name, the path of the state (of a
-            concurrence's child that ended, of the state whose timeout passed, of the state that
-            asked), the action's name, the thread's name; "" when there is no more to say.
-        why: What happened, in words ("ended with 'low'", "cancel of goal desk-1-3.5"), or "".
-        grace: Time that the state has to stop [s] before it is abandoned; None for a container and
-            for a state without a limit.
+        source: The kind of origin: one of `SOURCES`.
+        by: The signal's name, the operator's or client's name, the path of a state (a concurrence's
+            child that ended, the state whose timeout passed, the state that asked), the action's
+            name, or the thread's name; "" if nothing more is known.
+        why: The reason in words ("ended with 'low'", "cancel of goal desk-1-3.5"), or "".
+        grace: Time that the state has to stop [s] before it is interrupted; None for a container
+            and for a state without a limit.
     """
 
     path: str
@@ -134,11 +133,11 @@ class PreemptRequested(NamedTuple):
 
 
 class PreemptServiced(NamedTuple):
-    """The state acknowledged its preempt: `service_preempt()`, or it ended with 'preempted'.
+    """The state serviced its request: it called `service_preempt()`, or ended with 'preempted'.
 
-    A state that was asked and has no such event still runs (and delays the preempt), has finished
-    its work, or was abandoned. The event comes before the state's `Left`; in between the state
-    cleans up.
+    A state that was asked and has no such event is still running (and delays the preempt), has
+    finished its work, or was interrupted. The event comes before the state's `Left`; in between the
+    state cleans up.
     """
 
     path: str
@@ -147,7 +146,11 @@ class PreemptServiced(NamedTuple):
 
 
 class Preempted(NamedTuple):
-    """A container ended because of a preempt; `label`: the child not started or not followed."""
+    """A container ended because of a preempt.
+
+    Attributes:
+        label: The child that was not started, or whose outcome was not followed; "" for none.
+    """
 
     path: str
     t: float
@@ -214,7 +217,7 @@ class UserdataWritten(NamedTuple):
 
 
 class Paused(NamedTuple):
-    """The machine stands still before `path`; `reason`: "pause", "step" or "breakpoint"."""
+    """The machine is paused before the state at `path`; `reason`: "pause", "step", "breakpoint"."""
 
     path: str
     t: float
@@ -223,7 +226,7 @@ class Paused(NamedTuple):
 
 
 class Resumed(NamedTuple):
-    """The machine goes on with the state at `path`, or without it if it was called off."""
+    """The machine continues with the state at `path`, or without it if that was called off."""
 
     path: str
     t: float
@@ -253,7 +256,8 @@ class Fired(NamedTuple):
 
     Attributes:
         transition: Its id.
-        marking: Ids of the places that hold tokens afterwards, a place with two tokens twice.
+        marking: Ids of the places that hold tokens afterwards; a place with two tokens is in it
+            twice.
     """
 
     path: str
@@ -264,13 +268,13 @@ class Fired(NamedTuple):
 
 
 class HeldBack(NamedTuple):
-    """The plan at `path` waits: these transitions have their tokens, and their guards are false.
+    """The plan at `path` waits: these transitions have their tokens, but their guards are false.
 
     Attributes:
         transitions: Ids.
         guards: Their guards, in the same order, as text.
-        truths: What the names in each guard are worth, in the same order: "low is true, there is
-            false"; "" when that is not known.
+        truths: The values of the names in each guard, in the same order: "low is true, there is
+            false"; "" if they are not known.
     """
 
     path: str
@@ -286,9 +290,9 @@ class QuestionAsked(NamedTuple):
 
     Attributes:
         text: The question.
-        answers: What may be answered.
-        words: What to write on their buttons, in the same order.
-        default: The outcome when nobody answers.
+        answers: The possible answers.
+        words: The texts of their buttons, in the same order.
+        default: The outcome if nobody answers.
         patience: Time for an answer [s].
         service: Full name of the service that takes the answer (`smachpy.states.questions`).
         has_picture: The service has a picture to show.
@@ -307,11 +311,11 @@ class QuestionAsked(NamedTuple):
 
 
 class QuestionAnswered(NamedTuple):
-    """A question has its answer.
+    """A question was answered, or nobody answered it in time.
 
     Attributes:
         answer: The outcome.
-        by: Who gave it; "": nobody did in time.
+        by: Who gave it; "" if nobody answered in time.
     """
 
     path: str
@@ -399,47 +403,47 @@ SOURCES: dict[str, str] = {
     "test": "test",
     "program": "program",
 }
-"""Kinds of origins of a preempt (`PreemptRequested.source`) -> what to call them.
+"""Kinds of origins of a preempt (`PreemptRequested.source`) -> their names for people.
 
-signal: a signal, Ctrl-C too. shutdown: `actionlib_core.shutdown` or the shutdown check. operator:
-`machine.control`, here or over the network. timeout: the state's, or that of a state around it.
-concurrence: the end of a child. plan: the firing of a transition.
-action: a client's cancel, a newer goal or the server's stop, by
-`ActionServerWrapper`. state: code that a state or callback ran. test: the test kit. program: all
-else; `by` is the thread, or what `request_preempt(by=...)` said.
+signal: a signal, including Ctrl-C. shutdown: `actionlib_core.shutdown` or the shutdown check.
+operator: `machine.control`, here or over the network. timeout: that of the state or of a state
+around it. concurrence: the end of a child. plan: the firing of a transition. action: a client's
+cancel, a newer goal or the stop of the server, by `ActionServerWrapper`. state: code of a state or
+callback. test: the test kit. program: anything else; `by` is the thread, or the argument of
+`request_preempt(by=...)`.
 """
 
 NUMBERS = frozenset({"seq", "dropped"})
-"""What a buffer adds to a record: the event's number, and how many events are missing before it."""
+"""Fields that a buffer adds to a record: its number, and how many events are missing before it."""
 
 _BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
 
 
 def asker_text(source: str, by: str, why: str) -> str:
-    """Return who asked for a preempt, in one phrase for people ("timeout of /P/DRIVE: 5 s")."""
+    """Return the origin of a preempt as one phrase for people ("timeout of /P/DRIVE: 5 s")."""
     who = f"{SOURCES.get(source, source)} {by}".strip()
     return f"{who}: {why}" if why else who
 
 
 def answered_text(answer: str, by: str) -> str:
-    """Return how a question was answered, in one phrase for people."""
+    """Return the answer to a question as one phrase for people."""
     return f"answered {answer} by {by}" if by else f"nobody answered: {answer}"
 
 
 def recovered_text(outages: Sequence[Sequence[int]]) -> str:
-    """Return that a run goes on after the last of its outages, in one phrase for people."""
+    """Return, as one phrase for people, that a run was resumed after the last of its outages."""
     seconds = (outages[-1][1] - outages[-1][0]) / 1e9 if outages else 0.0
     return f"goes on after an outage of {span_text(seconds)}"
 
 
 def outages_text(outages: Sequence[Sequence[int]]) -> str:
-    """Return how often and how long no process ran a mission: "2, 3 min 20"; "" for never."""
+    """Return the number of a mission's outages and their sum: "2, 3 min 20"; "" for none."""
     seconds = sum(end - begin for begin, end in outages) / 1e9
     return f"{len(outages)}, {span_text(seconds)}" if outages else ""
 
 
 def span_text(seconds: float) -> str:
-    """Return a span of time as people say it: "3.2 s", "75 s", "3 min 20", "2 h 05"."""
+    """Return a duration for people: "3.2 s", "75 s", "3 min 20", "2 h 05"."""
     if seconds < 10:  # noqa: PLR2004
         return f"{seconds:.1f} s"
     whole = int(seconds)
@@ -452,8 +456,9 @@ def span_text(seconds: float) -> str:
 def to_record(event: Event) -> dict[str, Any]:
     """Return `event` as a dict of its fields and its `kind`, for JSON.
 
-    Messages become `{"$msg": type, "fields": {...}}`; other values that JSON does not know are
-    replaced by their `repr`, and those that are too long to look at are cut or named by their size.
+    Messages become `{"$msg": type, "fields": {...}}`. Other values that JSON does not have are
+    replaced by their `repr`, and values that are too long for display are cut, or replaced by their
+    size.
     """
     record: dict[str, Any] = {"kind": type(event).__name__}
     room = Room()
@@ -463,7 +468,7 @@ def to_record(event: Event) -> dict[str, Any]:
 
 
 def record_text(record: dict[str, Any]) -> str:
-    """Return a record as JSON; what JSON does not take is replaced, the record is never lost."""
+    """Return a record as JSON. Values that JSON refuses are replaced: no record is ever lost."""
     try:
         return json.dumps(record)
     except (TypeError, ValueError, RecursionError):
@@ -474,17 +479,17 @@ def was_cut(text: str, size: int) -> bool:
     """Return whether a text in a record may be the beginning of a longer one.
 
     Args:
-        text: As it is in the record.
-        size: Characters that the whole record has as JSON; texts of a long one are cut shorter.
+        text: The text in the record.
+        size: Length of the whole record as JSON; in a long record, texts are cut shorter.
     """
     return text.endswith("\u2026") and (len(text) > LONGEST_TEXT or size >= MOST_TEXT)
 
 
 def from_record(record: dict[str, Any]) -> Event:
-    """Rebuild the event of a `to_record` dict; the numbers of a buffer in it are passed over.
+    """Rebuild the event of a `to_record` dict; the fields that a buffer has added are ignored.
 
     Raises:
-        ValueError: `kind` names no event, or a field is missing or unknown.
+        ValueError: `kind` is not the name of an event, or a field is missing or unknown.
     """
     fields = {key: v for key, v in record.items() if key not in NUMBERS}
     name = fields.pop("kind", None)
@@ -512,7 +517,7 @@ def _plain(value: Any, room: Room, depth: int = 0) -> Any:
         return _cut(value, room)
     try:
         shown = _container(value, room, depth) if depth < DEEPEST else None
-    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+    except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
         return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
     return _cut(text_of(value, room), room) if shown is None else shown
 
@@ -524,7 +529,7 @@ def _cut(text: str, room: Room) -> str:
 
 
 def _container(value: Any, room: Room, depth: int) -> Any:
-    """What is inside, None when it is no container or too long."""
+    """Return the JSON form of a container; None if `value` is none, or is too long."""
     if isinstance(value, (list, tuple, dict)):
         if len(value) > min(LONGEST_LIST, room.items):
             return None
@@ -540,7 +545,7 @@ def _container(value: Any, room: Room, depth: int) -> Any:
 
 
 def _fields_of(value: Any, room: Room, depth: int) -> Any:
-    """A message, or a ROS time or duration, by its fields; None when it is none."""
+    """Return the fields of a message, or of a ROS time or duration; None for anything else."""
     if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
         fields = {name: getattr(value, name, None) for name in value.__slots__}
         return {"$msg": str(value._type), "fields": _plain(fields, room, depth + 1)}

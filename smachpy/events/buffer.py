@@ -1,13 +1,13 @@
-"""A machine's events taken down now and read later: the way to hear of it that costs it least.
+"""Event buffers: a machine's events are kept now and read later, at the least cost to the machine.
 
     buffer = machine.event_buffer()
     machine.execute()
     for record in buffer.read():
         ...
 
-A listener (`Container.subscribe`) is called at each event and holds the machine up; a buffer takes
-half a microsecond for a transition and builds its records when somebody reads them, in another
-thread if you like. Recordings and the feed of viewers are made of it.
+A listener (`Container.subscribe`) is called at each event and blocks the machine. A buffer takes
+half a microsecond for a transition; it builds the records when they are read, for instance in
+another thread. Recordings and the feed of viewers use buffers.
 """
 
 from __future__ import annotations
@@ -38,11 +38,12 @@ if TYPE_CHECKING:
 __all__ = ["EventBuffer"]
 
 LONGEST = 100_000
-"""So many entries wait for a reader; an entry is an event, or a transition of two."""
+"""Number of entries that wait for a reader. An entry is one event, or a transition: two events."""
 
 SLOTS = 5
-"""An entry is so many elements of a flat list, because a tuple for each would cost the machine more
-than all the rest, mostly in Python's garbage collector. `list.extend` is one atomic step.
+"""Number of elements of an entry. Entries lie in one flat list: a tuple for each would cost the
+machine more than everything else, mostly in Python's garbage collector. `list.extend` is atomic, so
+the machine takes no lock.
 
     time [s], path of the container, step that ended or None, its outcome, step that begins or None
     None, event or record or a note (`_Begin`, `_Dropped`), None, None, None
@@ -51,30 +52,30 @@ than all the rest, mostly in Python's garbage collector. `list.extend` is one at
 NOTHING = (None, None, None)
 
 _CHANGING: tuple[type, ...] = (UserdataWritten, GoalSent, GoalFeedback, GoalDone)
-"""Events with values that may change later: they become records at once."""
+"""Events with values that the user may change later: they become records at once."""
 
 SLACK = 2_000
-"""So many entries more may be there before they are thinned out again."""
+"""Number of entries above the limit before they are thinned out again."""
 
-_new = tuple.__new__  # an event without its class's own `__new__`, which costs more than the rest
-_ROUNDS = 256  # so many transitions between two looks at the limit
-_SAME_NS = 1_000_000  # a wall clock that goes back by less than this was only read inexactly
+_new = tuple.__new__  # the `__new__` of a NamedTuple takes longer than everything else here
+_ROUNDS = 256  # transitions between two checks of the limit
+_SAME_NS = 1_000_000  # smaller steps back of the wall clock are errors of its reading
 
 
 class _Begin(NamedTuple):
-    """Note: the buffer's machine has this path from here on."""
+    """A note in the entries: from here on the buffer's machine has this path."""
 
     path: str
 
 
 class _Dropped(NamedTuple):
-    """Note: so many events were dropped here."""
+    """A note in the entries: this number of events was dropped here."""
 
     events: int
 
 
 class Buffered(Protocol):
-    """What a buffer needs of its container."""
+    """The part of a container that a buffer uses."""
 
     def _smachpy_add_buffer(self, buffer: EventBuffer) -> None: ...
     def _smachpy_remove_buffer(self, buffer: EventBuffer) -> None: ...
@@ -85,15 +86,16 @@ class EventBuffer:
 
     Args:
         machine: The container.
-        on_news: Called when there is something to read, once until `read` has found nothing more;
-            in the thread of the machine, which it holds up: let it wake a thread that reads.
-        limit: So many entries wait as they are; when they are not read, those that come then are
-            thinned out (`thin`): what is kept still says what goes on in the end. `read` shows it
-            by gaps in `seq`.
-        name: What to call the machine in the records, "/SM_ROOT"; "" leaves its own path.
+        on_news: Called when there is something to read, and not again until `read` has found
+            nothing more. It is called in the machine's thread and blocks it: only wake a thread
+            that reads.
+        limit: Number of entries that are kept in full. If they are not read, later ones are thinned
+            out (`thin`), so that what is kept still shows what is active in the end. Gaps in `seq`
+            show it.
+        name: Path of the machine in the records, "/SM_ROOT"; "" keeps its own.
 
     Attributes:
-        dropped: So many events were dropped, until now.
+        dropped: Number of events dropped so far.
 
     Threads: the machine's threads write; `read` may be called from any thread, one at a time.
     """
@@ -118,7 +120,7 @@ class EventBuffer:
         self._on_news = on_news
         self._name = name
         self._read_path = ""
-        self._goes_on: set[str] = set()  # states of an earlier process that were not entered yet
+        self._resumed: set[str] = set()  # states that an earlier process had entered
         self._lock = threading.Lock()
         self._seq = 0
         self._clock: Clock | None = None
@@ -126,20 +128,21 @@ class EventBuffer:
         self._last_ns = 0
 
     def close(self) -> None:
-        """Take nothing more down; what is there can still be read. A second call does nothing."""
+        """Stop taking events; those in the buffer can still be read. May be called twice."""
         self._machine._smachpy_remove_buffer(self)
 
     def read(self) -> list[dict[str, Any]]:
         """Return the records (`smachpy.events.to_record`) since the last call, in order.
 
-        Each has `seq`, the number of the event on this buffer, from 1; dropped events count. The
-        first after a gap has `dropped`, so many are missing before it.
+        Each has `seq`, its number in this buffer from 1; dropped events are counted. The first one
+        after a gap has `dropped`, the number of events that are missing before it.
         """
         with self._lock:
             found = self._take_all()
             if not found:
                 self.quiet = True
-                # Whoever writes appends first and looks at `quiet` then: one sees the other.
+                # A writer appends first and reads `quiet` then; here it is the other way round. So
+                # an entry that comes now is found here, or its writer calls `on_news`.
                 found = self._take_all()
                 if not found:
                     return []
@@ -153,14 +156,14 @@ class EventBuffer:
                 if not self._is_known(record)
             ]
 
-    # -- for the machinery ---------------------------------------------------------------------
+    # -- writing, called by the machine --------------------------------------------------------
 
     def take(self, event: Event) -> None:
-        """Take an event down."""
+        """Append an event."""
         self.put((None, to_record(event) if isinstance(event, _CHANGING) else event, *NOTHING))
 
     def put(self, entry: tuple[Any, ...]) -> None:
-        """Append an entry, see `SLOTS`, and say so."""
+        """Append an entry (see `SLOTS`) and notify the reader."""
         entries = self._entries
         entries.extend(entry)
         if len(entries) >= self._full:
@@ -169,34 +172,35 @@ class EventBuffer:
             self.ring()
 
     def room(self) -> tuple[Iterator[None], Callable[[tuple[Any, ...]], object]]:
-        """Return how often to append before asking again, and what to append with."""
+        """Return an iterator over the free entries, and the function that appends one."""
         if self._full <= len(self._entries):
             self._thin()
         free = (self._full - len(self._entries)) // SLOTS
         return repeat(None, max(1, min(free, _ROUNDS))), self._entries.extend
 
     def _thin(self) -> None:
-        """Drop what can be missed of what came after the limit."""
+        """Thin out the entries above the limit."""
         with self._cut:
             tail = self._entries[self._most :]
             if self._most + len(tail) < self._full:
-                return  # somebody else has made room
+                return  # the reader, or another thread of the machine, has made room
             thinned, dropped = thin(tail)
             self._entries[self._most : self._most + len(tail)] = thinned
             self.dropped += dropped
+            # At least as much room again as was kept, so that thinning out stays rare.
             self._full = self._most + len(thinned) + max(SLACK * SLOTS, len(thinned))
 
     def ring(self) -> None:
-        """Say that there is something to read."""
+        """Notify the reader."""
         self.quiet = False
         if self._on_news is not None:
             try:
                 self._on_news()
-            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+            except Exception as error:  # noqa: BLE001  the user's: logged, the machine goes on
                 log.log_exception(f"buffer of {self.path}: on_news raised {error!r}", error)
 
     def begin(self, path: str, clock: Clock) -> None:
-        """Note where the machine runs and by which clock."""
+        """Note the machine's path and clock at the start of a run."""
         self._clock = clock
         if path != self.path:
             self.path = path
@@ -205,10 +209,14 @@ class EventBuffer:
     # -- reading -------------------------------------------------------------------------------
 
     def _set_clock(self) -> None:
-        """Find out how wall time follows from the clock's monotonic time now."""
+        """Measure the offset of the wall clock from the monotonic clock.
+
+        Entries have the monotonic time only: one look at a clock for each transition is enough.
+        """
         clock = self._clock
         if clock is None:
             return
+        # Of three readings the fastest is the most exact one.
         tries = []
         for _ in range(3):
             before, stamp, after = clock.now(), clock.time_ns(), clock.now()
@@ -247,14 +255,14 @@ class EventBuffer:
             yield {"kind": "Entered", "path": path, "t": t, "stamp_ns": stamp}
 
     def _is_known(self, record: dict[str, Any]) -> bool:
-        """Tell whether a record says that a state begins that an earlier process has begun."""
+        """Return whether this is the `Entered` of a state that an earlier process had entered."""
         kind, path = record["kind"], record["path"]
         if kind == "Recovered":
-            self._goes_on = {path for path, _ in record["active"]}
-        if not self._goes_on or kind not in {"Entered", "Left", "Failed"}:
+            self._resumed = {path for path, _ in record["active"]}
+        if not self._resumed or kind not in {"Entered", "Left", "Failed"}:
             return False
-        known = path in self._goes_on
-        self._goes_on.discard(path)
+        known = path in self._resumed
+        self._resumed.discard(path)
         return known and kind == "Entered"
 
     def _number(self, record: dict[str, Any]) -> dict[str, Any]:
@@ -274,9 +282,9 @@ class EventBuffer:
 
 
 class RawEventBuffer(EventBuffer):
-    """A buffer that gives the events themselves, for a reader in the same process.
+    """A buffer of the events themselves, for a reader in the same process.
 
-    It never drops any; the values in them are the machine's own, as a listener gets them.
+    It never drops any. The values in them are the machine's own objects, as for a listener.
 
     Args:
         machine: The container.
@@ -287,7 +295,7 @@ class RawEventBuffer(EventBuffer):
         machine._smachpy_add_buffer(self)
 
     def take(self, event: Event) -> None:
-        """Take an event down."""
+        """Append an event."""
         self._entries.extend((None, event, *NOTHING))
 
     def events(self) -> list[Event]:
@@ -297,7 +305,8 @@ class RawEventBuffer(EventBuffer):
             found = iter(self._take_all())
             events: list[Event] = []
             last, stamp = None, 0
-            base = step = path = None  # what began last is mostly what ends next
+            # The step that began last mostly ends next, so its path is kept.
+            base = step = path = None
             for t, what, left, outcome, entered in zip(*[found] * SLOTS, strict=True):
                 if t is None:
                     if type(what) is not _Begin:
@@ -325,14 +334,17 @@ _WITHIN = {
     "GoalFeedback": "goal of ",
     "UserdataWritten": "userdata of ",
 }
-"""Kind -> what comes before the path in the name of what it is about."""
+"""Kind -> prefix of the path in the key under which `thin` keeps events of this kind."""
 
 
 class _Kept:
-    """Places of the events of one state, or of its goals, that are kept.
+    """The places of the events of one state, or of its goals, that are kept.
 
-    `first` is the end of a visit that had begun before the others, `opened` and `closed` are those
-    of the newest visit, `within` is what was said since.
+    Attributes:
+        first: The end of a visit that had begun before all others; -1 for none.
+        opened: The begin of the newest visit.
+        closed: Its end.
+        within: Slot -> the newest event of that slot since then.
     """
 
     __slots__ = ("closed", "first", "opened", "within")
@@ -354,18 +366,21 @@ class _Kept:
 
 
 def thin(entries: Sequence[Any]) -> tuple[list[Any], int]:
-    """Return the entries that are kept, with notes of what is missing, and how many events are.
+    """Drop the events between the oldest and the newest visit of each state.
 
-    Of every state the end of the visit that was going on, the newest visit, and what was said since
-    then; of every key of userdata the newest value; the newest goal. With those, in order, whoever
-    reads knows what goes on now, and the visits that they see are whole; only the ones between are
-    missing.
+    Kept are, for every state, the end of the visit that was active at the beginning, the newest
+    visit, and the newest events of each kind since then; for every key of userdata the newest
+    value; and the newest goal. A reader of these, in order, knows what is active now and sees whole
+    visits; only those in between are missing.
 
     Args:
         entries: Elements, see `SLOTS`; they may have been thinned out before.
+
+    Returns:
+        The elements that are kept, with notes of the gaps, and the number of dropped events.
     """
     found: defaultdict[str, _Kept] = defaultdict(_Kept)
-    newest = -1  # is kept whatever it is: a gap is seen by what follows it
+    newest = -1  # always kept: a gap is shown by the event that follows it
     # The place of an event is twice the number of its entry, one more if the entry has two.
     for place, (t, what, left, _, entered) in zip(count(0, 2), _each(entries), strict=False):
         if t is not None:
@@ -388,7 +403,7 @@ def _each(entries: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
 
 
 def _find(what: Any, place: int, found: dict[str, _Kept]) -> None:
-    """Note the place of an event or record."""
+    """Add the place of an event or record to `found`."""
     if type(what) is dict:
         kind, path = what["kind"], what["path"]
     else:
@@ -404,8 +419,8 @@ def _find(what: Any, place: int, found: dict[str, _Kept]) -> None:
 
 def _without_the_rest(entries: Sequence[Any], kept: set[int]) -> tuple[list[Any], int]:
     thinned: list[Any] = []
-    begun: list[Any] = []  # a note that what is kept next needs
-    dropped = missing = 0  # missing: since the last that is kept
+    begun: list[Any] = []  # the last `_Begin` note, needed by the next entry that is kept
+    dropped = missing = 0  # missing: since the last entry that is kept
     for place, entry in zip(count(0, 2), _each(entries), strict=False):
         t, what, left, outcome, entered = entry
         if t is None and isinstance(what, _Begin):

@@ -1,12 +1,13 @@
-"""An operator's hand on a running machine: pause, step, breakpoint, jump, force, preempt.
+"""The operator's control of a running machine: pause, step, breakpoint, jump, force, preempt.
 
     machine.control.pause()
     machine.control.step()
     machine.control.force_outcome("/PATROL/DRIVE", "succeeded")
     machine.control.resume()
 
-A pause holds the machine before the next state; what runs goes on, goals included (`keep`), or is
-preempted and runs again after the resume (`cancel`). Costs nothing while it is not used.
+A pause stops the machine before the next state. The states that are running continue, including
+their goals (`keep`), or are preempted and run again after the resume (`cancel`). A machine whose
+control is not used pays nothing for it.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Running: TypeAlias = Literal["keep", "cancel"]
 
 
 class ControlError(SmachError):
-    """A command names a state that does not run, or that does not exist.
+    """A command names a state that is not running or does not exist.
 
     Attributes:
         path: The path of the command.
@@ -53,9 +54,9 @@ class ControlError(SmachError):
 
 
 class Control:
-    """Commands for one machine; made by `Container.control` of the root.
+    """The commands for one machine; made by `Container.control` of the root.
 
-    Threads: every command may come from any thread and does not wait for the machine.
+    Threads: a command may come from any thread, and does not wait for the machine.
     """
 
     def __init__(self, machine: Container) -> None:
@@ -72,10 +73,10 @@ class Control:
         """Call `listener` after every change of `is_paused()` or `breakpoints()`.
 
         Returns:
-            A function that ends it.
+            A function that removes the listener.
 
-        Threads: called in the thread of the change, the machine's own at a breakpoint, which it
-            holds up: let it wake a thread that works. What it raises is logged.
+        Threads: called in the thread of the change; at a breakpoint that is the machine's own,
+            which it blocks: only wake another thread. An exception that it raises is logged.
         """
         with self._lock:
             self._listeners = (*self._listeners, listener)
@@ -89,11 +90,11 @@ class Control:
     # -- commands ------------------------------------------------------------------------------
 
     def pause(self, *, running: Running = "keep") -> None:
-        """Hold the machine before the next state.
+        """Stop the machine before the next state.
 
         Args:
-            running: What happens to the states that run, and to their goals: "keep" lets them
-                end; "cancel" preempts them, and they run again from their start after `resume`.
+            running: What happens to the running states and their goals: "keep" lets them end;
+                "cancel" preempts them, and they run again from their start after `resume`.
         """
         self._watch()
         self._pause()
@@ -104,34 +105,34 @@ class Control:
                         ask_child(frame, step, Override(label=step.label))
 
     def resume(self) -> None:
-        """Let the machine go on."""
+        """Continue after a pause."""
         with self._lock:
             changed, self._paused = self._paused, False
             self._steps = 0
             waiting = list(self._waiting.values())
         for event in waiting:
             event.set()
-        if changed:
-            self._tell()
+        if changed:  # the listeners are called without the lock
+            self._call_listeners()
 
     def step(self) -> None:
-        """Let one state run, then pause again."""
+        """Run one state, then pause again."""
         self._watch()
         with self._lock:
             changed, self._paused = not self._paused, True
             self._steps += 1
-            waiting = list(self._waiting.values())[:1]
+            waiting = list(self._waiting.values())[:1]  # one of several branches
         for event in waiting:
             event.set()
         if changed:
-            self._tell()
+            self._call_listeners()
 
     def is_paused(self) -> bool:
-        """Tell whether the machine is held, or will be before its next state."""
+        """Return whether the machine is paused, or will be before its next state."""
         return self._paused
 
     def waiting(self) -> tuple[str, ...]:
-        """Return the paths of the states that a pause holds back."""
+        """Return the paths of the states before which the machine waits."""
         with self._lock:
             return tuple(self._waiting)
 
@@ -140,13 +141,13 @@ class Control:
         self._watch()
         with self._lock:
             self._breakpoints.add((path, outcome))
-        self._tell()
+        self._call_listeners()
 
     def remove_breakpoint(self, path: str, outcome: str | None = None) -> None:
-        """Forget a breakpoint."""
+        """Remove a breakpoint."""
         with self._lock:
             self._breakpoints.discard((path, outcome))
-        self._tell()
+        self._call_listeners()
 
     def breakpoints(self) -> tuple[tuple[str, str | None], ...]:
         """Return the breakpoints as pairs (path, outcome)."""
@@ -154,14 +155,15 @@ class Control:
             return tuple(sorted(self._breakpoints, key=str))
 
     def jump(self, path: str) -> None:
-        """Preempt what runs beside the state at `path`, and go on there.
+        """Preempt the active child of the state's container, and continue with the state at `path`.
 
         Raises:
-            ControlError: its container does not run, is no state machine, or has no such child.
+            ControlError: its container is not running, is not a state machine, or has no such
+                child.
         """
         above, _, label = path.rpartition("/")
         frame = self._frame_at(above, path)
-        is_machine = hasattr(frame.data, "transitions")
+        is_machine = hasattr(frame.data, "transitions")  # `events` imports no containers
         if label not in frame.container.get_children() or not is_machine:
             known = sorted(frame.container.get_children())
             raise ControlError(path, f"no jump there; children: {known}", self.active())
@@ -169,10 +171,10 @@ class Control:
             self._stop_at(frame, frame.step, path, Override(label=label))
 
     def force_outcome(self, path: str, outcome: str) -> None:
-        """Preempt the active state at `path`; whatever it returns, it ends with `outcome`.
+        """Preempt the active state at `path`; it ends with `outcome`, whatever it returns.
 
         Raises:
-            ControlError: it does not run, or has no such outcome.
+            ControlError: it is not running, or has no such outcome.
         """
         frame, step = self._step_at(path)
         outcomes = step.state._smachpy.outcomes
@@ -186,10 +188,10 @@ class Control:
             self._stop_at(frame, step, path, Override(outcome=outcome))
 
     def preempt(self, path: str) -> None:
-        """Preempt the state or sub-machine at `path`; its container follows its outcome.
+        """Preempt the state or container at `path`; the container above follows its outcome.
 
         Raises:
-            ControlError: it does not run.
+            ControlError: it is not running.
         """
         with asking("operator", "", f"preempt of {path}"):
             if path == self._path():
@@ -199,10 +201,10 @@ class Control:
             self._stop_at(frame, step, path, None)
 
     def active(self) -> tuple[str, ...]:
-        """Return the paths of all states that run, containers first."""
+        """Return the paths of all running states, containers first."""
         return tuple(f"{frame.path}/{step.label}" for frame, step in self._active())
 
-    # -- for the machinery ---------------------------------------------------------------------
+    # -- called by the machine -----------------------------------------------------------------
 
     def attach(self, run: Run) -> None:
         """Control a new run."""
@@ -212,9 +214,9 @@ class Control:
             run.watched = run.careful = True
 
     def pass_gate(self, frame: Frame, step: Step) -> None:
-        """Hold the machine before `step` while it is paused.
+        """Wait before `step` while the machine is paused.
 
-        Blocks: until a command lets it go on, or a preempt comes.
+        Blocks: until a command lets the step run, or a preempt arrives.
         """
         path = f"{frame.path}/{step.label}"
         if (path, None) in self._breakpoints:
@@ -229,13 +231,13 @@ class Control:
     def hold(
         self, frame: Frame, path: str, reason: str, *, until: Callable[[], bool] | None = None
     ) -> None:
-        """Pause, and hold the state at `path`, which runs, until an operator says what to do.
+        """Pause, and block the running state at `path` until an operator decides.
 
         Args:
             frame: Where it runs.
             path: Its path.
-            reason: Why, for the event.
-            until: Looked at after `release`, too: whether it need not be held any more.
+            reason: The reason for the event.
+            until: Called after `release`; returns whether the state may continue.
 
         Blocks: as `pass_gate`.
         """
@@ -244,7 +246,7 @@ class Control:
         self._hold(frame, path, reason, until)
 
     def release(self, path: str) -> None:
-        """Let the state at `path` look again whether it is called off, if a pause holds it back."""
+        """Wake the state at `path`, if it waits, to check whether it was called off."""
         event = self._waiting.get(path)
         if event is not None:
             event.set()
@@ -258,13 +260,13 @@ class Control:
         with self._lock:
             changed, self._paused = not self._paused, True
         if changed:
-            self._tell()
+            self._call_listeners()
 
-    def _tell(self) -> None:
+    def _call_listeners(self) -> None:
         for listener in self._listeners:
             try:
                 listener()
-            except Exception as error:  # noqa: BLE001  a border: reported, the machine goes on
+            except Exception as error:  # noqa: BLE001  the user's: logged, the machine goes on
                 log.log_exception(f"{self._path()}: on_change raised {error!r}", error)
 
     def _take_step(self) -> bool:
@@ -281,6 +283,7 @@ class Control:
         with self._lock:
             self._waiting[path] = event
         container = frame.container
+        # Registered before the first look at the flags below: a preempt sets the event.
         forget = on_preempt(container, event.set)
         frame.emit(Paused, reason)
         try:
@@ -308,7 +311,7 @@ class Control:
             run.control = self
         if run is not None:
             run.watched = run.careful = True
-            SUBSCRIPTIONS.version = object()
+            SUBSCRIPTIONS.version = object()  # a loop that runs now must notice the flags
 
     # -- finding -------------------------------------------------------------------------------
 
@@ -348,13 +351,13 @@ class Control:
 
 
 def _frame_of(state: Child) -> Frame | None:
-    """Return the frame of a container that runs; None for other states."""
+    """Return the frame of a running container; None for any other state."""
     data = state._smachpy
     return data.frame if isinstance(data, ContainerData) else None
 
 
 def _walk(frame: Frame) -> Iterator[tuple[Frame, Step]]:
-    """Yield (frame, step) for all that runs below `frame`."""
+    """Yield (frame, step) for every running state below `frame`."""
     for branch in frame.running():
         step = branch.step
         if step is None:

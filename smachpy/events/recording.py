@@ -1,14 +1,14 @@
-"""One run, one file: JSON lines, appended as it happens, so that a crash leaves a readable file.
+"""Recordings: one run in one file of JSON lines, appended during the run, readable after a crash.
 
 The first line is the header: `format` "smachpy-run", `version`, `machine` (a
-`smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `RunState` before
-the first event, or null; of a durable mission also `run`, which names this run of it: the process
-that goes on with the mission goes on with the file, or writes another one of the same `run`. Every
-further line is an event (`smachpy.events.to_record`) with a number `seq`. Where events are missing
-it jumps, and the next event has their number, `dropped`; what goes on in the end is told all the
-same (`events.buffer`). A last line that was cut off by a crash is left out when reading.
+`smachpy.introspection.StateRecord`), `stamp_ns` and `base`, the `RunState` before the first event,
+or null. A durable mission also has `run`, the name of its run: the process that resumes the mission
+continues the file, or writes another file with the same `run`. Every further line is an event
+(`smachpy.events.to_record`) with a number `seq`. Where events are missing, `seq` has a gap and the
+next event has their number, `dropped`; the last visit of each state is never missing
+(`events.buffer`). A last line that a crash has cut off is ignored when reading.
 
-Lines of kind "Observed" are no events of the machine: they hold what the robot's topics told
+Lines of kind "Observed" are not events of the machine but data of the robot's topics
 (`smachpy.network.observations`).
 """
 
@@ -43,13 +43,13 @@ OBSERVED = "Observed"
 TYPES = "Types"
 """Kind of the records that hold definitions of the mission's own goal types."""
 WAITING_OBSERVED = 1_000
-"""So many records of the robot's topics wait to be written; of more, the oldest are left out."""
+"""Number of records of the robot's topics that wait to be written; then the oldest are dropped."""
 
 WAITING_EVENTS = 100_000
-"""So many entries wait to be written: when the disk hangs, or the machine is faster than its events
-become text. Further ones are thinned out and counted."""
+"""Number of entries that wait to be written while the disk hangs, or while the machine is faster
+than the writer. Further ones are thinned out and counted."""
 
-CLOSE_S = 2.0
+CLOSE_S = 2.0  # time to write what waits [s]; a disk that hangs must not hang the program's end
 
 _FIELDS = {"kind": str, "path": str, "stamp_ns": int}
 _TEXTS = frozenset(
@@ -66,7 +66,7 @@ _MALFORMED = (
     ArithmeticError,
     RecursionError,
 )
-"""What JSON of another shape raises where it is read."""
+"""Exceptions raised when reading JSON of an unexpected structure."""
 
 
 class RecordingError(SmachError):
@@ -89,13 +89,13 @@ class Recording:
         path: The file.
         record: The machine.
         stamp_ns: When the recording began.
-        base: What happened before, None when it began with the run.
+        base: The state of the run at its beginning; None if it began with the run.
         events: The records.
         cut: Whether the file ends in the middle of a line.
-        observed: What the robot's topics told meanwhile, numbered from 1 in `n`.
-        made_ns: When it really began; `stamp_ns` is another date if the mission's time was virtual.
+        observed: Records of the robot's topics, numbered from 1 in `n`.
+        made_ns: When it was really made; `stamp_ns` differs if the mission's time was virtual.
         definitions: Texts of the mission's own message types, as `interface_texts` returns them.
-        run: Names the run of a durable mission, which may be in several files; "" for others.
+        run: Name of the run of a durable mission, which may be in several files; else "".
     """
 
     path: Path
@@ -111,11 +111,11 @@ class Recording:
 
     @property
     def dropped(self) -> int:
-        """So many events are missing between those that are there."""
+        """Number of events that are missing between the recorded ones."""
         return sum(event.get("dropped", 0) for event in self.events)
 
     def history(self) -> dict[str, Any]:
-        """Return it in the shape in which servers tell their history (`smachpy.network.feed`)."""
+        """Return it in the form of a server's history (`smachpy.network.feed`)."""
         return {
             "epoch": f"file {self.path.name} {self.stamp_ns}",
             "description": asdict(self.record),
@@ -132,17 +132,17 @@ class Recorder:
     """Writes the events of a machine to a file; a context manager.
 
     Args:
-        path: The file; it must not exist yet, unless it is of the durable run that `machine` goes
-            on with: then the rest of the run is appended.
+        path: The file. It must not exist yet, unless it holds the durable run that `machine`
+            resumes: then the rest of the run is appended.
         machine: The machine.
-        run: Names the durable run, `smachpy.durable.recorder.Recorder.run`; "" for others.
+        run: Name of the durable run, `smachpy.durable.recorder.Recorder.run`; else "".
 
     Attributes:
         path: The file.
-        earlier: The records that were in the file.
+        earlier: The records that were already in the file.
 
     Raises:
-        RecordingError: the file exists or cannot be made, or what is in it cannot be read.
+        RecordingError: the file exists, cannot be made, or its content cannot be read.
 
     Threads: the machine never waits for the disk; another thread writes.
     """
@@ -171,11 +171,11 @@ class Recorder:
         except OSError as error:
             raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
         self._observed: deque[dict[str, Any]] = deque(maxlen=WAITING_OBSERVED)
-        self._types: set[str] = set()  # of goals, whose definitions were looked for
+        self._types: set[str] = set()  # goal types whose definitions were looked up
         self._buffer = machine.event_buffer(self._on_news, limit=WAITING_EVENTS)
 
     def _continued(self) -> TextIO:
-        """Open the file behind its last whole line: what was cut off is gone."""
+        """Open the file to append after its last complete line; the rest is removed."""
         self.earlier = read_recording(self.path).events
         with self.path.open("rb+") as file:
             kept = file.read().rfind(b"\n") + 1
@@ -189,7 +189,7 @@ class Recorder:
         self.close()
 
     def close(self) -> None:
-        """Write what waits and close the file; a second call does nothing.
+        """Write the waiting records and close the file; may be called twice.
 
         Blocks: 2 s at most.
         """
@@ -219,11 +219,11 @@ class Recorder:
 
     @property
     def dropped(self) -> int:
-        """So many events were not written: there were too many at once, or the disk failed."""
+        """Number of events that were not written: too many at once, or the disk failed."""
         return self._buffer.dropped + self._unwritten
 
     def observe(self, record: dict[str, Any]) -> None:
-        """Write what a robot's topic told, a record of `RobotTopics`; nothing after `close`."""
+        """Write a record of `RobotTopics`; does nothing after `close`."""
         if not self._closed:
             self._observed.append(record)
             self._on_news()
@@ -232,9 +232,9 @@ class Recorder:
         self._executor.submit(self._write)
 
     def _write(self) -> None:
-        """Write what was taken down, until there is no more."""
+        """Write records until none are left."""
         while records := [*self._buffer.read(), *self._take_observed()]:
-            if self._failed:
+            if self._failed:  # still read, so that the buffer does not fill up
                 self._unwritten += len(records)
                 continue
             try:
@@ -246,7 +246,7 @@ class Recorder:
                 self._fail(error)
 
     def _new_types(self, records: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-        """Yield the definitions of goals' types that come for the first time."""
+        """Yield the definitions of goal types that appear for the first time."""
         for record in records:
             goal = record.get("goal") if record["kind"] == "GoalSent" else None
             name = goal.get("$msg") if isinstance(goal, dict) else None
@@ -266,14 +266,14 @@ class Recorder:
 
 
 def interface_texts(goal: str) -> dict[str, str]:
-    """Return the texts of an action's goal, result and feedback, each with all types in it.
+    """Return the definitions of an action's goal, result and feedback, with all types they use.
 
     Args:
         goal: The goal's type, "my_msgs/TurnGoal".
 
     Returns:
-        The texts by type, as rosbag writes them; nothing for types of ROS that are
-        known everywhere, and for what is no goal.
+        Type -> text, as rosbag writes them. Empty for types of ROS, which are known everywhere, and
+        if `goal` is not a goal type.
     """
     package = goal.partition("/")[0]
     if not goal.endswith("Goal") or (BUNDLED / package).is_dir():
@@ -293,7 +293,7 @@ def header_line(
     made_ns: int | None = None,
     run: str = "",
 ) -> str:
-    """Return the first line of a file; `made_ns` is the real date where time is virtual."""
+    """Return the first line of a file; `made_ns` is the real date if time is virtual."""
     header: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -318,7 +318,7 @@ def recording_lines(
     base: dict[str, Any] | None,
     observed: Iterable[dict[str, Any]] = (),
 ) -> Iterator[str]:
-    """Yield the lines of a file that holds these events, and what the robot's topics told."""
+    """Yield the lines of a file with these events and records of the robot's topics."""
     stamp_ns = events[0]["stamp_ns"] if events else 0
     yield header_line(record, stamp_ns, base)
     by_time = heapq.merge(_numbered(events), observed, key=itemgetter("stamp_ns"))
@@ -326,7 +326,7 @@ def recording_lines(
 
 
 def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The events with numbers from 1, which count those that are missing too."""
+    """Yield the events numbered from 1; missing events are counted."""
     seq = 0
     for event in events:
         seq += 1 + event.get("dropped", 0)
@@ -337,7 +337,7 @@ def read_recording(path: str | Path) -> Recording:
     """Read a file.
 
     Raises:
-        RecordingError: it cannot be read, or a line before the last is no event; names the line.
+        RecordingError: it cannot be read, or a line before the last is not an event; with the line.
     """
     path = Path(path)
     try:
@@ -345,7 +345,7 @@ def read_recording(path: str | Path) -> Recording:
     except OSError as error:
         raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
     recording = _read_header(path, lines[0])
-    whole = lines[1:-1]  # what follows the last line's end was cut off, or is empty
+    whole = lines[1:-1]  # the text after the last newline is empty, or was cut off
     recording.cut = bool(lines[-1]) and len(lines) > 1
     records = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
     recording.events = list(
@@ -383,7 +383,7 @@ def _read_header(path: Path, line: str) -> Recording:
 
 
 def run_of(path: Path) -> str:
-    """Return what names the durable run that a file holds; "" when it is none, or no recording."""
+    """Return the name of the durable run in a file; "" for other runs and other files."""
     try:
         with path.open("rb") as file:
             return _read_header(path, file.readline().decode("utf-8", "replace")).run
@@ -431,7 +431,7 @@ def _check_recovered(event: dict[str, Any]) -> None:
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[Path]:
-    """Return the files that are named, and those in the folders that are named, sorted.
+    """Return the given files, and the recordings in the given folders, sorted.
 
     Raises:
         RecordingError: there is no such file or folder.
@@ -448,14 +448,14 @@ def find_recordings(places: Iterable[str | Path]) -> list[Path]:
 
 
 def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
-    """Yield the files that are named, and those in the folders that are named, sorted.
+    """Yield the recordings in the given files and folders, sorted.
 
-    Each is read when it is asked for. What is in a folder and is no recording is named in the log
-    and left out. Files of a folder that hold parts of one durable run, as several computers wrote
-    them, are one recording, with the path of the first part.
+    Each is read when it is needed. A file in a folder that is not a recording is logged and
+    skipped. Files of a folder with parts of one durable run, written by several computers, are
+    yielded as one recording with the path of the first part.
 
     Raises:
-        RecordingError: there is no such file or folder, or a file that is named cannot be read.
+        RecordingError: there is no such file or folder, or a given file cannot be read.
     """
     for place in places:
         paths = find_recordings([place])
@@ -477,7 +477,7 @@ def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
 
 
 def joined(parts: Sequence[Recording]) -> Recording:
-    """Return the recordings of one durable run as one; its machine is that of the last one."""
+    """Join the recordings of one durable run; the machine is that of the last one."""
     ordered = sorted(parts, key=lambda part: part.stamp_ns)
     last = ordered[-1]
     observed = [one for part in ordered for one in part.observed]

@@ -1,7 +1,9 @@
-"""The current state of a run, computed from the records of its events.
+"""The current state of a run, folded from the records of its events.
 
-A `RunState` is plain JSON data, so that it can be sent to a viewer that joins in the middle of a
-run, or serve as a keyframe of a recording. It keeps counts and the newest facts, not the events.
+A `RunState` is plain JSON data: it is sent to a viewer that joins in the middle of a run, and
+serves as a keyframe of a recording. It keeps counts and the newest facts, not the events. The page
+folds the same events in JavaScript (`viz/web/js/core/fold.js`); both are tested on the same
+fixtures.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 RAISED = "exception"
-"""Stands for the outcome of a state that raised."""
+"""The outcome shown for a state that raised."""
 
 _NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": None}
 
@@ -24,7 +26,7 @@ CUT_SHORT = "a new run began before it ended"
 """Text of a LOST goal whose run was cut short."""
 
 NOT_RECORDED = "its end was not recorded"
-"""Text of a LOST goal that ended while no process wrote it down."""
+"""Text of a LOST goal that ended during an outage."""
 
 ENDED_GOALS = 20
 """Number of ended goals that are kept."""
@@ -35,24 +37,25 @@ class RunState:
 
     Attributes:
         data: The facts. Times are nanoseconds since the Unix epoch.
-            run: number of runs begun; started, ended, outcome: of the newest run; outages: pairs
-            [from, to] in which no process ran it, absent when there were none;
-            states: by path: visits, since (None while it does not run), left (when it last ended),
-            outcome, outcomes (times each), seconds (in finished visits), error, preempt (when it
-            was asked to stop), asked (by whom: `source`, `by`, `why` and `grace` of the
-            PreemptRequested), serviced (when it serviced the preempt), abandoned (when its grace
-            was over); these four are None while it is not asked; attempt, item (of an iterator),
-            waits (why it is held back), question (of its newest visit, if it has asked one: `text`,
-            `answers`, `words`, `default`, `patience`, `service` and `has_picture` of the
-            QuestionAsked, `asked`, when, and `answer`, `by` and `answered` of the
-            QuestionAnswered, None until then); of a plan that has fired, since it was entered:
-            marking (ids of the places that hold tokens, one with two twice), fired (id of its
-            newest transition), held (while it waits: id of a transition -> why its guard is false);
+            run: number of runs so far; started, ended, outcome: of the newest run; outages: pairs
+            [from, to] in which no process ran it, absent if there were none;
+            states: by path: visits, since (None while it is not running), left (when it last
+            ended), outcome, outcomes (outcome -> count), seconds (in finished visits), error,
+            preempt (when it was asked to stop), asked (`source`, `by`, `why` and `grace` of the
+            PreemptRequested), serviced (when it serviced the request), abandoned (when its grace
+            was over); these four are None until it is asked; attempt, item (of an iterator), waits
+            (the reason of a pause before it), question (of its newest visit, if it has asked one:
+            `text`, `answers`, `words`, `default`, `patience`, `service` and `has_picture` of the
+            QuestionAsked; `asked`, the time; and `answer`, `by` and `answered` of the
+            QuestionAnswered, None until then); of a plan that has fired since it was entered:
+            marking (ids of the places that hold tokens; one with two tokens is in it twice), fired
+            (id of its newest transition), held (while it waits: id of a transition -> why its guard
+            is false);
             goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
             result, ended; userdata: by "container key": key, value, writer, at, container;
-            dropped: number of events that are missing, by which counts are too low; absent when 0.
+            dropped: number of missing events, by which counts are too low; absent if 0.
 
-    Threads: one at a time.
+    Threads: not thread-safe.
     """
 
     def __init__(self, data: dict[str, Any] | None = None) -> None:
@@ -90,7 +93,7 @@ class RunState:
         }
 
     def fold(self, record: dict[str, Any]) -> None:
-        """Fold one record; kinds that change nothing are ignored."""
+        """Apply one record; kinds that change nothing are ignored."""
         if "dropped" in record:
             self.data["dropped"] = self.data.get("dropped", 0) + record["dropped"]
         fold = self._fold.get(record["kind"])
@@ -98,7 +101,7 @@ class RunState:
             fold(record)
 
     def active(self) -> list[str]:
-        """Return the paths of what runs."""
+        """Return the paths of the running states."""
         states = self.data["states"]
         return [path for path, state in states.items() if state["since"] is not None]
 
@@ -121,18 +124,24 @@ class RunState:
         self.data["run"] += 1
         self.data.update(started=record["stamp_ns"], ended=None, outcome=None)
         self.data.pop("outages", None)
-        # What an earlier run of this root left open was cut short: nothing will say that it ended.
+        # States and goals of an earlier run of this root that are still open were cut short: no
+        # event will end them.
         root, below = record["path"], f"{record['path']}/"
         for path, state in self.data["states"].items():
             if path == root or path.startswith(below):
                 state.update(since=None, waits=None, **_NOT_ASKED)
         for goal in self.data["goals"].values():
-            if goal["ended"] is None and goal["path"].startswith(below):  # GoalDone may come late
+            if goal["ended"] is None and goal["path"].startswith(
+                below
+            ):  # a late GoalDone corrects it
                 goal.update(status="LOST", text=CUT_SHORT, ended=record["stamp_ns"])
         self._on_entered(record)
 
     def _on_recovered(self, record: dict[str, Any]) -> None:
-        """What is known of the run goes on; how what else ran has ended was not recorded."""
+        """Keep the states that are active in the resumed run, and end all others.
+
+        How the others ended was not recorded.
+        """
         known, stamp = self.data["started"] is not None, record["stamp_ns"]
         if not known:
             self.data.update(run=self.data["run"] + 1, started=record["began_ns"])
@@ -143,7 +152,9 @@ class RunState:
                 state.update(since=None, left=stamp, waits=None, **_NOT_ASKED)
         for path, since in active.items():
             state = self._state(path)
-            if state["since"] is None and state.get("left", -1) >= since:  # the process's own end
+            # The process that ended has preempted its states and recorded that as their end, but in
+            # the mission they are still active.
+            if state["since"] is None and state.get("left", -1) >= since:
                 _reopen(state, since)
             elif state["since"] is None:
                 state["visits"] += 1
@@ -190,7 +201,7 @@ class RunState:
             state[fact] = record["stamp_ns"]
 
     def holding_up(self) -> list[str]:
-        """Return the paths of the leaves that were asked to stop and still run."""
+        """Return the paths of the leaves that were asked to stop and are still running."""
         asked = [
             path
             for path, state in self.data["states"].items()
@@ -204,7 +215,7 @@ class RunState:
 
     def _on_held_back(self, record: dict[str, Any]) -> None:
         guards = [f"{guard} is false" for guard in record["guards"]]
-        truths = record.get("truths") or guards  # recordings of before have none
+        truths = record.get("truths") or guards  # older recordings have none
         pairs = zip(record["transitions"], truths, guards, strict=False)
         self._set(record, held={number: truth or guard for number, truth, guard in pairs})
 
@@ -219,7 +230,7 @@ class RunState:
             question.update(answer=record["answer"], by=record["by"], answered=record["stamp_ns"])
 
     def questions(self) -> dict[str, dict[str, Any]]:
-        """Return path -> question of those that wait for an answer, the oldest first."""
+        """Return path -> question of the questions without an answer, the oldest first."""
         found = [
             (path, state["question"])
             for path, state in self.data["states"].items()
@@ -232,7 +243,7 @@ class RunState:
     def _on_userdata(self, record: dict[str, Any]) -> None:
         container = record["path"].rpartition("/")[0] or record["path"]
         userdata, name = self.data["userdata"], f"{container} {record['key']}"
-        userdata.pop(name, None)  # what was written last stands last
+        userdata.pop(name, None)  # so that the newest write is the last item
         userdata[name] = {
             "key": record["key"],
             "value": record["value"],
@@ -265,7 +276,7 @@ class RunState:
         goal = self.data["goals"].get(record["goal_id"])
         if goal is not None:
             goal["feedback"] = record["feedback"]
-            if "progress" in record:  # a viewer's reading of it
+            if "progress" in record:  # added by a viewer that understands the feedback
                 goal["progress"] = record["progress"]
             if goal["first_feedback"] is None:
                 goal["first_feedback"] = record["feedback"]
@@ -282,7 +293,7 @@ class RunState:
 
 
 def _reopen(state: dict[str, Any], since: int) -> None:
-    """Take the last end of a state back: it has not ended."""
+    """Undo the last end of a state, which has not really ended."""
     state["seconds"] = max(0.0, state["seconds"] - (state["left"] - since) / 1e9)
     outcome, outcomes = state["outcome"], state["outcomes"]
     outcomes[outcome] -= 1

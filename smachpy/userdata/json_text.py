@@ -1,15 +1,15 @@
-"""Userdata as JSON text: what introspection sends instead of pickles.
+"""Userdata as JSON text; introspection sends it instead of SMACH's pickles.
 
-Reading it builds data only: numbers, texts, containers, ROS times and messages. No class is
-looked up by name except message types, so a text from the network runs no code.
+Reading it builds data only: numbers, texts, containers, ROS times and messages. No class is looked
+up by name except message types, so a text from the network cannot run code.
 
-Python values that JSON does not have are objects with one key that begins with `$`:
+Python values that JSON does not have become objects with one key that begins with `$`:
 
     {"$tuple": [...]}  {"$set": [...]}  {"$bytes": "base64"}  {"$float": "nan" | "inf" | "-inf"}
     {"$time": [secs, nsecs]}  {"$duration": [secs, nsecs]}
     {"$msg": "pkg/Type", "fields": {...}}       a message
     {"$items": [[key, value], ...]}             a dict whose keys are not plain texts
-    {"$repr": "text"}                           a value of which only the text is sent
+    {"$repr": "text"}                           any other value: only its text is sent
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _SIZED = (str, bytes, bytearray, list, tuple, dict, set, frozenset)
 
 
 def dumps(values: Mapping[str, Any], *, longest: int | None = None) -> str:
-    """Return `values` as JSON text; what has no JSON form becomes a `$repr`.
+    """Return `values` as JSON text; values without a JSON form become a `$repr`.
 
     Args:
-        values: By name.
+        values: Name -> value.
         longest: Texts, bytes and containers with more elements become a `$repr` of their size, for
-            showing; None: everything is written.
+            display; None to write everything.
     """
     encoded = {key: _encode(value, longest, 0) for key, value in values.items()}
     return json.dumps(encoded, allow_nan=False)
@@ -48,8 +48,8 @@ def loads(text: str) -> dict[str, Any]:
     """Rebuild the values of a `dumps` text; "" is an empty dict.
 
     Raises:
-        ValueError: The text is no JSON object, or a value in it cannot be rebuilt: a `$repr`, an
-            unknown message type, fields that do not fit. Names the place.
+        ValueError: The text is not a JSON object, or a value in it cannot be rebuilt: a `$repr`, an
+            unknown message type, wrong fields. The text names the place.
     """
     if not text:
         return {}
@@ -63,12 +63,12 @@ def loads(text: str) -> dict[str, Any]:
 
 
 def find_lost(values: Mapping[str, Any]) -> list[str]:
-    """Return the keys whose values `dumps` cannot carry over, in order."""
+    """Return, in order, the keys of values that `dumps` cannot represent."""
     return [key for key, value in values.items() if '{"$repr"' in dumps({"_": value})]
 
 
 def _encode(value: Any, longest: int | None, depth: int) -> Any:
-    """Return what JSON knows in place of a value; `longest` as in `dumps`."""
+    """Return the JSON form of a value; `longest` as in `dumps`."""
     if value is None or isinstance(value, bool):
         return value
     if longest is not None and isinstance(value, _SIZED) and len(value) > longest:
@@ -81,7 +81,7 @@ def _encode(value: Any, longest: int | None, depth: int) -> Any:
             if isinstance(value, kind):
                 return encode(value, inside)
         if hasattr(value, "_md5sum") and hasattr(value, "to_dict"):
-            with contextlib.suppress(ActionlibError):  # a field holds what it cannot carry: show it
+            with contextlib.suppress(ActionlibError):  # a field has an invalid value: send its repr
                 return {"$msg": value._type, "fields": inside(value.to_dict())}
     return {"$repr": _repr(value)}
 
@@ -108,7 +108,7 @@ _ENCODERS: tuple[tuple[Any, Callable[[Any, Callable[[Any], Any]], Any]], ...] = 
 def _repr(value: Any) -> str:
     try:
         return repr(value)
-    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+    except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
         return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
 
 

@@ -1,4 +1,4 @@
-"""Classes whose instances a journal keeps: `smachpy.register_type`."""
+"""Classes whose instances can be kept in a journal: `smachpy.register_type`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_CONSTRUCTOR: Final = "its constructor takes more than its fields"
 
 @dataclasses.dataclass(frozen=True)
 class RegisteredType:
-    """A class, and how its instances become values that can be kept, where they are none."""
+    """A class, and the functions that convert its instances, if it needs them."""
 
     kind: type
     to_data: Callable[[Any], Any] | None = None
@@ -36,21 +36,21 @@ def register_type(
     to_data: Callable[[Any], Any] | None = None,
     from_data: Callable[[Any], Any] | None = None,
 ) -> C:
-    """Let journals keep the instances of a class; also a decorator.
+    """Allow instances of a class in journals; also usable as a decorator.
 
-    Dataclasses, named tuples and enums need no more than that, and bring along those of the same
-    kinds that their fields are annotated with. A subclass is another class.
+    Dataclasses, named tuples and enums need no functions; the dataclasses, named tuples and enums
+    in the annotations of their fields are registered too. A subclass must be registered itself.
 
     Args:
-        kind: The class; it must be registered before the mission runs, at each start.
-        to_data: Of other classes: makes an instance a value that can be kept.
-        from_data: The reverse.
+        kind: The class; register it at each start, before the mission runs.
+        to_data: For any other class: converts an instance to a value that can be kept.
+        from_data: Converts it back.
 
     Returns:
         `kind`.
 
     Raises:
-        InvalidStateError: it is no class, or one that needs both functions.
+        InvalidStateError: `kind` is not a class, or it needs both functions.
     """
     if not isinstance(kind, type):
         raise InvalidStateError(f"register_type: got {kind!r}; expected a class.")
@@ -72,7 +72,7 @@ def register_type(
 
 
 def register_annotations(kind: type) -> None:
-    """Register what the fields of a class are annotated with, as far as it registers by itself.
+    """Register the classes in the annotations of a class, if they need no functions.
 
     Args:
         kind: A dataclass, a TypedDict or another class; its annotations may be nested,
@@ -80,7 +80,7 @@ def register_annotations(kind: type) -> None:
     """
     try:
         hints = typing.get_type_hints(kind)
-    except Exception:  # noqa: BLE001  a name that only type checkers see: that field is left out
+    except Exception:  # noqa: BLE001  a name imported under TYPE_CHECKING: nothing is registered
         hints = {}
     for hint in hints.values():
         _register_hint(hint)
@@ -98,7 +98,7 @@ def _register_hint(hint: Any) -> None:
 
 
 def problem_of(kind: type) -> str | None:
-    """Say why a class needs functions of its own, None when it does not."""
+    """Return why a class needs `to_data` and `from_data`; None if it does not."""
     if issubclass(kind, enum.Enum) or is_named_tuple(kind):
         return None
     if not dataclasses.is_dataclass(kind):
@@ -109,7 +109,7 @@ def problem_of(kind: type) -> str | None:
 
 
 def is_named_tuple(kind: type) -> bool:
-    """Tell whether a class is a named tuple."""
+    """Return whether a class is a named tuple."""
     return issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 

@@ -3,7 +3,8 @@
 The view of a list, dict or set is an instance of a subclass that holds read-only elements and whose
 mutating methods raise. The view of an object is an instance of a subclass that shares the object's
 attributes and returns them read-only, so that its methods, operators and `isinstance` work. Objects
-of classes that cannot be subclassed so (locks, files, functions, modules) are returned as they are.
+of classes that do not allow such a subclass (locks, files, functions, modules) are returned as they
+are.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ ATOMS: frozenset[type] = frozenset(
 
 
 def read_only(value: Any, key: str = "") -> Any:
-    """Return a read-only view of `value`, or `value` itself when it needs none.
+    """Return a read-only view of `value`, or `value` itself if it needs none.
 
     Args:
-        value: Anything.
-        key: The userdata key that it, or what it is part of, was read from; for errors.
+        value: Any value.
+        key: The userdata key from which it, or the value around it, was read; for error texts.
     """
     kind = type(value)
     if kind in ATOMS:
@@ -47,10 +48,10 @@ def read_only(value: Any, key: str = "") -> Any:
 
 
 def still_shows(view: Any, value: Any) -> bool:
-    """Tell whether `view`, made by `read_only(value)` earlier, shows what is in `value` now.
+    """Return whether `view`, made by `read_only(value)`, still has the content of `value`.
 
-    To look takes a fifth of the time that making a view of nested lists does. Views that keep
-    something of their own that cannot be compared so (sets, slots) are never taken for true.
+    For nested lists, the comparison takes a fifth of the time of making a view. For views with
+    copies that cannot be compared by identity (sets, slots), the answer is always False.
     """
     if view is value:
         return type(value) in ATOMS
@@ -80,7 +81,7 @@ def _object_still_shows(_view: Any, _value: Any) -> bool:
 
 
 def writable(value: Any) -> Any:
-    """Undo `read_only`, also inside lists, tuples, sets and dicts; others come back as they are."""
+    """Undo `read_only`, also inside lists, tuples, sets and dicts; others are unchanged."""
     kind = type(value)
     if kind in ATOMS:
         return value
@@ -115,10 +116,10 @@ class _View:
 
 
 def _refuser(base: type, method: str) -> Callable[..., Any]:
-    """Return what stands in a view for a method of `base` that changes the object.
+    """Return the method that replaces, in a view, a method of `base` that changes the object.
 
-    SMACH let a state change lists and dicts: where its slips are accepted, the original and the
-    view are changed.
+    SMACH allowed a state to change lists and dicts. Where that is accepted (programs for ROS 1),
+    the method changes both the original and the view.
     """
 
     def refuse(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -162,7 +163,7 @@ _CHANGES: dict[type, tuple[str, ...]] = {
 
 @functools.lru_cache(maxsize=1024)
 def _maker(kind: type) -> Callable[[Any, str], Any] | None:
-    """Return the function that makes a view of an instance of `kind`, or None for none."""
+    """Return the function that makes a view of an instance of `kind`; None if it needs no view."""
     if issubclass(kind, (_View, type, enum.Enum, BaseException, frozenset)):
         return None
     if kind.__module__ == "numpy" and kind.__name__ == "ndarray":
@@ -172,7 +173,9 @@ def _maker(kind: type) -> Callable[[Any, str], Any] | None:
             return _tuple_view
         return _named_tuple_view if hasattr(kind, "_make") else None
     base = next((base for base in _CHANGES if issubclass(kind, base)), None)
-    if base is None and not kind.__flags__ & _HEAP_TYPE:  # a class of C: a handle
+    # A class implemented in C without known methods, such as a lock or a file: what would change it
+    # is not known.
+    if base is None and not kind.__flags__ & _HEAP_TYPE:
         return None
     return _view_maker(kind, base)
 
@@ -202,7 +205,7 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | No
     new: Any = object.__new__ if base is None else base.__new__
     try:
         new(view_class)
-    except TypeError:  # made in C: only its own constructor makes instances
+    except TypeError:  # implemented in C: only its own constructor makes instances
         return None
     slots = _slots_of(kind)
     has_dict = kind.__dictoffset__ != 0
@@ -224,7 +227,7 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | No
 
 
 def _view_class(kind: type, base: type | None) -> Any:
-    """Return the class of views of `kind`; None when it cannot be subclassed."""
+    """Return the class of the views of `kind`; None if it cannot be subclassed."""
     getter: Any = kind.__getattribute__
 
     def __getattribute__(self: Any, name: str) -> Any:  # noqa: N807
@@ -253,12 +256,12 @@ def _view_class(kind: type, base: type | None) -> Any:
         }
     try:
         return types.new_class(kind.__name__, (kind, _View), exec_body=lambda ns: ns.update(body))
-    except TypeError:  # a final class, or a metaclass with demands of its own
+    except TypeError:  # a final class, or a metaclass with its own rules
         return None
 
 
 def _comparer(kind: type, base: type | None) -> Callable[[Any, Any], bool] | None:
-    """Return the function that compares a view of `kind` with what it shows; None: it cannot."""
+    """Return the function that compares a view of `kind` with its original; None if impossible."""
     if kind is list:
         return _list_still_shows
     if kind is dict:
@@ -267,7 +270,9 @@ def _comparer(kind: type, base: type | None) -> Callable[[Any, Any], bool] | Non
 
 
 def _fill(base: type, view: Any, value: Any, key: str) -> None:
-    """Give a new view of a built-in container its read-only elements."""
+    """Fill a new view of a built-in container with read-only elements."""
+    # The base class's own methods: those of a subclass of the user's may do anything, and those of
+    # the view raise.
     if isinstance(value, OrderedDict):
         for name, item in value.items():
             OrderedDict.__setitem__(view, name, read_only(item, key))
@@ -286,7 +291,7 @@ def _fill(base: type, view: Any, value: Any, key: str) -> None:
 
 
 def _reduce(self: Any, protocol: Any) -> Any:
-    """Copy and pickle as the original: a copy may be changed."""
+    """Copy and pickle like the original: a copy of a view may be changed."""
     return self._smach_original.__reduce_ex__(protocol)
 
 

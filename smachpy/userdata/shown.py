@@ -1,8 +1,8 @@
 """The text of a value for display: its `repr`, unless that would take too long.
 
-`repr` has no limit, so the parts of the value are counted first. Known are Python's containers,
-messages, dataclasses, namespaces and exceptions, and everything that has a length; the `__repr__`
-of any other class is called without a check.
+`repr` has no limit, so the parts of the value are counted first. That works for Python's
+containers, messages, dataclasses, namespaces and exceptions, and for anything with a length; the
+`__repr__` of any other class is called without a check.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ MOST_TEXT = 100_000
 WIDEST_INT = 1_024  # bits
 """Limits of values in a record, which are for display, not for computing.
 
-The first three hold for each part, the next two for a whole record, so that making one takes some
+The first three apply to each part, the next two to a whole record, so that making one takes a few
 milliseconds at most.
 """
 
-_MOST_READ = 4 * LONGEST_TEXT  # characters that a `repr` may be made of, of which most are cut
+_MOST_READ = 4 * LONGEST_TEXT  # characters in the parts of a `repr`, which is then cut
 _DEEPEST_REPR = 100
 _SMALL = frozenset({type(None), bool, float, complex, range, type})
 _MAPPINGS = (dict, UserDict, MappingProxyType)
@@ -37,7 +37,7 @@ _LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, It
 
 
 class Room:
-    """How much may still be put into a record."""
+    """The remaining room in a record."""
 
     __slots__ = ("items", "text")
 
@@ -47,10 +47,10 @@ class Room:
 
 
 def text_of(value: Any, room: Room, depth: int = 0) -> str:
-    """Return `repr(value)`, or a text with only the sizes of the parts that are too large.
+    """Return `repr(value)`, or a text with only the sizes of parts that are too large.
 
-    It may be longer than the room for text: the caller cuts it. Every part that was visited is
-    taken from the room for items. If the value's own code raises, the text says so.
+    It may be longer than the room for text: the caller cuts it. Each visited part reduces the room
+    for items. If the value's own code raises, the text says so.
     """
     try:
         left = Room(room.items, min(room.text, _MOST_READ))
@@ -58,12 +58,12 @@ def text_of(value: Any, room: Room, depth: int = 0) -> str:
         spent = room.items - max(left.items, 0)
         room.items -= spent if fits else spent // 4  # counting costs less than formatting
         return repr(value) if fits else _outline(value, room, depth)
-    except Exception as error:  # noqa: BLE001  foreign code: its failure is what there is to show
+    except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
         return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
 
 
 def _fits(value: Any, left: Room, above: set[int]) -> bool:
-    """Return whether the `repr` is short enough; take its parts from `left`."""
+    """Return whether the `repr` is short enough; subtract its parts from `left`."""
     kind: Any = type(value)
     if kind in _SMALL or kind.__repr__ is object.__repr__:
         return True
@@ -94,7 +94,7 @@ def _size(value: Any) -> int | None:
         return None
     try:
         return len(value)
-    except Exception:  # noqa: BLE001  foreign code: an array of no dimensions has no length
+    except Exception:  # noqa: BLE001  the user's code; also a numpy array without dimensions
         return None
 
 
@@ -124,7 +124,7 @@ def _fields(value: Any) -> list[tuple[str, Any]] | None:
 
 
 def _outline(value: Any, room: Room, depth: int) -> str:
-    """Return the text of a value that does not fit: its few named parts, else its size."""
+    """Return the text of a value that does not fit: its parts if there are few, else its size."""
     kind: Any = type(value)
     if isinstance(value, int):
         return f"<int of {value.bit_length()} bits>"
@@ -146,7 +146,7 @@ def _outline(value: Any, room: Room, depth: int) -> str:
 def _joined(
     before: str, pairs: Iterable[tuple[str, Any]], after: str, room: Room, depth: int
 ) -> str:
-    """Join the parts' texts, up to the longest text of a record."""
+    """Join the texts of the parts, until the longest text of a record is reached."""
     parts, length = [], 0
     for name, part in pairs:
         parts.append(name + text_of(part, room, depth + 1))

@@ -34,7 +34,7 @@ class Fields:
             )
 
     def defaults(self) -> dict[str, Any]:
-        """Return the fields that have a default, with it; factories are called."""
+        """Return field -> default, for the fields that have one; default factories are called."""
         if not dataclasses.is_dataclass(self.kind):
             return {
                 name: getattr(self.kind, name) for name in self.types if name in vars(self.kind)
@@ -48,7 +48,7 @@ class Fields:
         return found
 
     def check(self, key: str, value: Any) -> None:
-        """Check that `key` may hold `value`.
+        """Check that the field `key` may have `value`.
 
         Raises:
             UserDataKeyError: the type has no such field.
@@ -66,7 +66,7 @@ class Fields:
 
 
 class CheckedDict(dict[str, Any]):
-    """The values of typed userdata; every write is checked."""
+    """The values of typed userdata; checks every write."""
 
     def __init__(self, fields: Fields) -> None:
         self.fields = fields
@@ -78,7 +78,7 @@ class CheckedDict(dict[str, Any]):
         super().__setitem__(key, value)
 
     def reset(self) -> None:
-        """Go back to the defaults; constants stay."""
+        """Restore the defaults; constants stay."""
         constants = {key: value for key, value in self.items() if "." in key}
         self.clear()
         self.update(self.fields.defaults() | constants)
@@ -88,7 +88,7 @@ _MISSING = object()
 
 
 def _fits(value: Any, wanted: Any) -> bool:
-    """Tell whether `value` is of the annotated type, as far as can be told without looking in."""
+    """Return whether `value` has the annotated type; the elements of containers are not checked."""
     origin = typing.get_origin(wanted)
     arguments = typing.get_args(wanted)
     if origin is typing.Union or origin is types.UnionType:
@@ -102,4 +102,4 @@ def _fits(value: Any, wanted: Any) -> bool:
         return True
     if typing.is_typeddict(kind):
         return isinstance(value, dict)
-    return isinstance(value, (int, float) if kind is float else kind)
+    return isinstance(value, (int, float) if kind is float else kind)  # as for type checkers

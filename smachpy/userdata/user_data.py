@@ -1,7 +1,8 @@
-"""Data that states hand on: `UserData`, and `Remapper`, a state's window into it.
+"""Values shared by states: `UserData`, and `Remapper`, a state's window into it.
 
-A state reads the keys it declared as input and writes those it declared as output; anything else
-raises `UserDataKeyError`. A value whose key is input only arrives read-only (`get_const`).
+A state reads the keys that it declares as input and writes those that it declares as output;
+anything else raises `UserDataKeyError`. The value of a key that is only input is read-only
+(`get_const`).
 """
 
 from __future__ import annotations
@@ -36,12 +37,12 @@ class UserData:
         object.__setattr__(self, "_data", {})
 
     def update(self, other_userdata: UserData | Remapper | Mapping[str, Any]) -> None:
-        """Take over all values of `other_userdata`."""
+        """Set all values of `other_userdata` here."""
         for key in other_userdata.keys():  # noqa: SIM118  UserData is no mapping
             self._data[key] = other_userdata[key]
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return shallow copies of the values of `keys`, under their names left of `remapping`."""
+        """Return shallow copies of the values of `keys`, under the left names in `remapping`."""
         back = {theirs: ours for ours, theirs in dict(remapping).items()}
         found = UserData()
         for key in keys:
@@ -52,14 +53,14 @@ class UserData:
     def merge(
         self, ud: UserData | Remapper, keys: Iterable[str], remapping: Mapping[str, str]
     ) -> None:
-        """Take over the values of `keys` from `ud`, under their names right of `remapping`."""
+        """Set the values of `keys` from `ud`, under the right names in `remapping`."""
         names = dict(remapping)
         for key in keys:
             if key in ud:
                 self._data[names.get(key, key)] = ud[key]
 
     def keys(self) -> list[str]:
-        """Return the names that have a value."""
+        """Return the keys that have a value."""
         return list(self._data)
 
     def __getitem__(self, key: str) -> Any:
@@ -134,7 +135,7 @@ def typed_userdata(kind: type) -> UserData:
 
 
 def reset(userdata: UserData) -> None:
-    """Forget all values; typed userdata goes back to its defaults. Constants stay."""
+    """Remove all values; typed userdata gets its defaults back. Constants ("LABEL.key") stay."""
     data = userdata._data  # noqa: SLF001  its own module
     if isinstance(data, CheckedDict):
         data.reset()
@@ -150,15 +151,15 @@ def _rebuild(data: dict[str, Any], kind: type | None = None) -> UserData:
 
 
 def data_of(userdata: UserData) -> dict[str, Any]:
-    """Return the dict that holds the values of `userdata`, for the library alone.
+    """Return the dict behind `userdata`, for the library only.
 
-    A copy of it, `dict(data_of(ud))`, is one step: no key vanishes meanwhile.
+    The copy `dict(data_of(ud))` is atomic: other threads cannot change the keys meanwhile.
     """
     return userdata._data  # noqa: SLF001  its own module
 
 
 class Remapper:
-    """A state's window into the userdata of its container: declared keys only, under its names.
+    """A state's window into the userdata of its container: the declared keys, under its own names.
 
     Args:
         ud: The container's userdata.
@@ -172,7 +173,7 @@ class Remapper:
     _data: MutableMapping[str, Any] | Remapper
     _input: dict[str, str]
     _output: dict[str, str]
-    _views: dict[str, Any]  # key -> the view of a list or dict that was handed out last
+    _views: dict[str, Any]  # key -> the last read-only view of a list or dict
 
     def __init__(
         self,
@@ -194,7 +195,7 @@ class Remapper:
             self[key] = other_userdata[key]
 
     def keys(self) -> list[str]:
-        """Return the readable keys that have a value, under their names here."""
+        """Return the input keys that have a value, under their names here."""
         data = self._data
         return [key for key, name in self._input.items() if name in data]
 
@@ -213,7 +214,7 @@ class Remapper:
         return read_only(value, key)
 
     def _view_of(self, key: str, value: Any) -> Any:
-        """Return the view of last time if it still shows what is there, else a new one."""
+        """Return the previous view if it is still valid, else a new one."""
         view = self._views.get(key)
         if view is None or not still_shows(view, value):
             view = self._views[key] = read_only(value, key)
@@ -225,9 +226,10 @@ class Remapper:
         except KeyError:
             self._refuse_write(key)
             return
+        # A state may write a value that it has read as a view; the next one must get the original.
         self._data[name] = item if type(item) in ATOMS else writable(item)
 
-    __getattr__ = __getitem__  # the same rules, and no second call on the way
+    __getattr__ = __getitem__  # the same rules, without a second call
 
     def __setattr__(self, name: str, value: Any) -> None:
         try:
@@ -262,7 +264,7 @@ class Remapper:
         raise UserDataKeyError(key, problem, declared, path=current_path()) from None
 
     def _refuse_write(self, key: str) -> None:
-        """Raise; where SMACH's slips are accepted, drop the write as SMACH did."""
+        """Raise an error; in programs for ROS 1 drop the write instead, as SMACH did."""
         declared = sorted(self._output)
         problem = (
             f"userdata key written but not declared: got {key!r}; declared output keys: "
@@ -273,14 +275,14 @@ class Remapper:
 
 
 def revoke(window: Remapper) -> None:
-    """Cut a window off: its state was left behind and may not write any more."""
+    """Cut off a window whose state was left behind: from now on it writes to a copy."""
     object.__setattr__(window, "_data", _copy_of(window._data))  # noqa: SLF001  its own module
 
 
 def _copy_of(data: MutableMapping[str, Any] | Remapper) -> dict[str, Any]:
-    """Return the values of `data`, into which other threads may be writing."""
+    """Copy the values of `data` while other threads may write to it."""
     if isinstance(data, dict):
-        return dict(data)  # one step of the interpreter
+        return dict(data)  # atomic
     found = {}
     for key in data.keys():  # noqa: SIM118  a Remapper, whose keys are its own
         with contextlib.suppress(KeyError):  # deleted meanwhile
@@ -289,10 +291,10 @@ def _copy_of(data: MutableMapping[str, Any] | Remapper) -> dict[str, Any]:
 
 
 def get_const(obj: Any) -> Any:
-    """Return `obj` so that it cannot be changed: itself if immutable, else a read-only view.
+    """Return `obj` if it is immutable, else a read-only view of it.
 
     The view is an instance of the object's own class: `isinstance`, methods, `len`, iteration and
-    `==` work; what would change it raises `ReadOnlyError`.
+    `==` work; a change raises `ReadOnlyError`.
     """
     return read_only(obj)
 
