@@ -28,40 +28,41 @@ __all__ = ["ActionServerWrapper"]
 
 
 class ActionServerWrapper:
-    """Runs a container for each goal of an action; it is no state itself.
+    """Runs a container for each goal of an action. It is not a state itself.
 
-    The goal is put into userdata before a run, the result is read from it afterwards. Feedback is
-    sent whenever the container's feedback key, or a key of `feedback_slots_map`, was written or has
-    changed at a transition. A cancel, or a newer goal, preempts the container.
+    The goal is written to the userdata before a run, and the result is read from it afterwards.
+    Feedback is sent whenever the container's feedback key, or a key of `feedback_slots_map`, is
+    written, or has changed at a transition. A cancel or a newer goal preempts the container.
 
     Args:
         server_name: Name of the action.
         action_spec: Its class (XAction).
-        wrapped_container: What runs. It declares the keys below that it uses.
+        wrapped_container: The container to run. It declares the keys below that it uses.
         succeeded_outcomes: Its outcomes that mean SUCCEEDED.
-        aborted_outcomes: Those that mean ABORTED, as all do that are in no list; but 'preempted'
-            means PREEMPTED then, if the goal was to be preempted.
-        preempted_outcomes: Those that mean PREEMPTED.
-        goal_key: Gets the goal (XGoal).
-        feedback_key: Feedback (XFeedback); begins as an empty one with each goal.
-        result_key: Result (XResult); begins as an empty one with each goal.
+        aborted_outcomes: Its outcomes that mean ABORTED. An outcome in no list means ABORTED too,
+            except 'preempted' if the goal was asked to stop: that means PREEMPTED.
+        preempted_outcomes: Its outcomes that mean PREEMPTED.
+        goal_key: Key that gets the goal (XGoal).
+        feedback_key: Key of the feedback (XFeedback), which is empty at the start of each goal.
+        result_key: Key of the result (XResult), which is empty at the start of each goal.
         goal_slots_map: Field of the goal -> key that gets it.
-        feedback_slots_map: Field of the feedback -> key that it is read from.
-        result_slots_map: Field of the result -> key that it is read from.
-        expand_goal_slots: Put every field of the goal into the key of its name.
-        pack_result_slots: Read every field of the result from the key of its name, if it is there.
-        node: Where the server is; the current node when None.
-        policy: What a new goal does while one runs; see `SimpleActionServer`.
-        on_client_lost: What happens to the goal of a client that died; likewise.
+        feedback_slots_map: Field of the feedback -> key from which it is read.
+        result_slots_map: Field of the result -> key from which it is read.
+        expand_goal_slots: Write every field of the goal to the key of the same name.
+        pack_result_slots: Read every field of the result from the key of the same name, if it has
+            a value.
+        node: Node of the server; None for the current node.
+        policy: What happens to a new goal while one runs; see `SimpleActionServer`.
+        on_client_lost: What happens to the goal of a client that died; see there, too.
 
     Attributes:
         wrapped_container: See above.
-        userdata: What the container's input keys are copied from and its output keys to.
+        userdata: The values from which input keys are copied and to which output keys are.
 
     Raises:
-        ActionException: `action_spec` is no action class.
+        ActionException: `action_spec` is not an action class.
         InvalidStateError: outcomes or fields do not exist or are listed twice, or an argument has
-            another type; all at once.
+            a wrong type; all problems at once.
 
     Threads: the container runs in the server's thread, one goal after the other.
     """
@@ -164,10 +165,10 @@ class ActionServerWrapper:
                         f"{did_you_mean(slot, known)}"
                     )
 
-    # -- life ----------------------------------------------------------------------------------
+    # -- start and stop ------------------------------------------------------------------------
 
     def run_server(self) -> None:
-        """Offer the action; returns at once.
+        """Start the server; returns at once.
 
         Raises:
             ServerConflictError: the name has a server already.
@@ -179,7 +180,7 @@ class ActionServerWrapper:
         log.loginfo(f"action server '{self.__server_name}' offers a machine")
 
     def stop(self) -> None:
-        """Preempt what runs and take the offer back; a second call does nothing.
+        """Preempt the running goal and stop the server; may be called twice.
 
         Blocks: as `SimpleActionServer.stop`.
         """
@@ -198,11 +199,12 @@ class ActionServerWrapper:
     def execute_cb(self, goal: Any) -> None:
         """Run the container for `goal`; the action server calls it.
 
-        What the container raises goes through: the goal is ABORTED with its text.
+        An exception of the container is passed on; the server then answers ABORTED with its text.
 
         Blocks: until the container has ended.
         """
         server = self.__action_server
+        # Under the lock, so that `preempt_cb` either finds the goal executing or is seen here.
         with self.__lock:
             if server.is_preempt_requested():
                 early = True
@@ -214,7 +216,7 @@ class ActionServerWrapper:
         try:
             outcome = self.__run(goal)
         finally:
-            with self.__lock:  # a preempt that comes too late does not stay for the next goal
+            with self.__lock:  # a late preempt must not hit the next goal
                 self.__executing = False
                 self.wrapped_container.recall_preempt()
         result = self.__make_result()
@@ -227,7 +229,7 @@ class ActionServerWrapper:
             server.set_aborted(result, text)
 
     def __means_preempted(self, outcome: str) -> bool:
-        """Tell whether to answer PREEMPTED; unlisted, 'preempted' is, when asked for."""
+        """Return whether to answer PREEMPTED with this outcome; see `aborted_outcomes`."""
         if outcome in self.__outcomes["preempted_outcomes"]:
             return True
         asked = outcome == "preempted" and self.__action_server.is_preempt_requested()
@@ -246,7 +248,7 @@ class ActionServerWrapper:
 
     def __fill_userdata(self, goal: Any) -> None:
         userdata = self.userdata
-        if self.__pack_result_slots:  # what an earlier goal left must not become a result
+        if self.__pack_result_slots:  # values of an earlier goal must not become a result
             for slot in self.__types.result.__slots__:
                 if slot in userdata:
                     del userdata[slot]
@@ -272,13 +274,16 @@ class ActionServerWrapper:
 
     def preempt_cb(self) -> None:
         """Preempt the container; the action server calls it."""
-        with self.__lock:  # so that it never hits the run of the next goal; nothing here waits
+        with self.__lock:  # so that it never preempts the run of the next goal; nothing blocks here
             if self.__executing and self.__action_server.is_preempt_requested():
                 with asking("action", self.__server_name, self.__why()):
                     request_soon(self.wrapped_container)
 
     def __why(self) -> str:
-        """Say whether a cancel or a newer goal asks; goal ids begin with the client's name."""
+        """Return the reason of the preempt: a cancel or a newer goal.
+
+        Its goal id begins with the client's name, so it also tells who asked.
+        """
         newer, current = self.__action_server.next_goal, self.__action_server.current_goal
         if newer is not None:
             return f"newer goal {newer.get_goal_id().id}"
@@ -299,10 +304,10 @@ class ActionServerWrapper:
         self.__publish_change(userdata)
 
     def publish_feedback(self, userdata: UserData) -> None:
-        """Send the feedback that is in `userdata`.
+        """Send the feedback in `userdata`.
 
         Raises:
-            ActionException: its value is no XFeedback.
+            ActionException: its value is not an XFeedback.
             FieldError: a field of it has a wrong type.
         """
         feedback = self.__make_feedback(userdata)
@@ -325,7 +330,8 @@ class ActionServerWrapper:
             self.publish_feedback(userdata)
 
     def __on_event(self, event: Event) -> None:
-        """Send feedback that a state of the container itself has written, at once."""
+        """Send feedback at once when a child of the container writes it."""
+        # Depth 2, "/ROOT/CHILD": deeper states write to the userdata of another container.
         if isinstance(event, UserdataWritten) and event.path.count("/") == 2:  # noqa: PLR2004
             keys = {self.__feedback_key, *self.__feedback_slots_map.values()}
             if event.key in keys and self.__executing:
@@ -333,7 +339,7 @@ class ActionServerWrapper:
 
 
 def _is_used(container: Container, key: str) -> bool:
-    """Tell whether a child of `container` reads or writes `key`."""
+    """Return whether a child of `container` reads or writes `key`."""
     for label, child in container.get_children().items():
         names = container._smachpy.remappings.get(label, {})
         keys = {*child.get_registered_input_keys(), *child.get_registered_output_keys()}

@@ -1,4 +1,4 @@
-"""`ConditionState`: look at a condition until it is true."""
+"""`ConditionState`: check a condition until it is true."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.actions.interface import adopt_interface
-from smachpy.actions.wakeup import Wakeup
+from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.machines.names import name_of
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
@@ -26,23 +26,24 @@ _SHORTEST_POLL_S = 0.001
 
 
 class ConditionState(State):
-    """Calls a function until it says yes. Outcomes: 'true', 'false', 'preempted'.
+    """Calls a function until it returns a true value. Outcomes: 'true', 'false', 'preempted'.
 
     Args:
         cond_cb: Called as `cond_cb(userdata)`; a true value ends the state with 'true'. Its
             `cb_interface` is added.
         input_keys: Userdata keys that it reads.
         poll_rate: Time between two checks [s], at least 1 ms.
-        timeout: 'false' after so long [s]; None: no limit.
-        max_checks: 'false' after so many checks; -1: no limit. 0 looks once, as 1 does.
-        wake_on: Topics as pairs (name, message class): a message on one of them causes a check at
-            once. With `poll_rate=None` nothing else does, past the first check.
-        node: Where to listen; the current node when None.
+        timeout: Time after which it ends with 'false' [s]; None for no limit.
+        max_checks: Number of checks after which it ends with 'false'; -1 for no limit. 0 checks
+            once, like 1.
+        wake_on: Topics as pairs (name, message class): each message causes a check at once. With
+            `poll_rate=None` only messages do, after the first check.
+        node: Node that subscribes to them; None for the current node.
         **options: See `StateOptions`.
 
     Raises:
-        InvalidStateError: an argument is wrong, or nothing would ever cause a check; all problems
-            at once.
+        InvalidStateError: an argument is wrong, or nothing would ever cause a second check; all
+            problems at once.
     """
 
     _smachpy_kind: ClassVar[Kind] = "condition"
@@ -84,9 +85,9 @@ class ConditionState(State):
         adopt_interface(self, cond_cb, outcomes=False)
 
     def execute(self, ud: Any) -> str:
-        """Check until it is true, time is up, enough was checked, or a preempt.
+        """Check until the condition is true, a limit is reached, or a preempt arrives.
 
-        What the condition raises goes through.
+        An exception of the condition is passed on.
 
         Blocks: see above.
         """
@@ -100,9 +101,8 @@ class ConditionState(State):
         until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
         checks = 0
         while True:
-            wake.clear()
-            if self.preempt_requested():
-                self.service_preempt()
+            wake.clear()  # first, so that a message that comes during the check causes another one
+            if answer_preempt(self):
                 return "preempted"
             if checks and until is not None and clock.now() >= until:
                 return "false"
@@ -129,7 +129,8 @@ class ConditionState(State):
 def _listen(
     topic: str, msg_type: Any, wake: Wakeup, node: Node | None
 ) -> contextlib.AbstractContextManager[object]:
-    """Wake the state for each message; conditions that need no topic need no network either."""
+    """Return a subscriber that wakes the state for each message."""
+    # Imported here: a condition without topics needs no network.
     from actionlib_core.pubsub.topic import Subscriber
 
     return Subscriber(topic, msg_type, lambda _message: wake.set(), node=node)

@@ -1,11 +1,11 @@
-"""One goal of an action state: when to cancel it, when to give it up, which outcome it means.
+"""One goal of an action state: when to cancel or abandon it, and which outcome follows.
 
     RUNNING --preempt, failure, exec_timeout--> CANCELLING --goal's end, preempt_timeout--> ENDED
        |                                                                                      ^
        +------------------------------------- goal's end -------------------------------------+
 
-`GoalRun` decides: time is an argument there, and nothing waits. `GoalExchange` sends the goal,
-watches it and carries the decisions out, so that no goal is left behind by accident.
+`GoalRun` decides; it gets the time as an argument and never waits. `GoalExchange` sends the goal,
+watches it and carries out the decisions, so that no goal keeps running by accident.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ PREEMPTED = "preempted"
 OUTCOMES = (SUCCEEDED, ABORTED, PREEMPTED)
 
 INTERRUPTED = "a callback of the state did not return; nobody waits for the goal any more"
-STOPPED_S = 0.2  # a goal that this state has cancelled is over: so much longer for its feedback
+STOPPED_S = 0.2  # time for the rest of the feedback after this state has cancelled the goal [s]
 STOPPED = frozenset({"PREEMPTED", "RECALLED", "LOST"})
 
 
 class Step(enum.Enum):
-    """What the shell has to do now."""
+    """What `GoalExchange` has to do now."""
 
     WAIT = enum.auto()
     CANCEL = enum.auto()
@@ -47,22 +47,23 @@ class Step(enum.Enum):
 
 
 class GoalRun:
-    """What happened to the goal of one execution.
+    """The state of the goal of one execution.
 
     Args:
-        exec_timeout: The goal is cancelled so long [s] after a server took it; None: no limit.
-        preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned; None:
+        exec_timeout: Time after which the goal is cancelled, from its acceptance by a server [s];
+            None for no limit.
+        preempt_timeout: Time that a cancelled goal has to end before it is abandoned [s]; None for
             no limit.
 
     Attributes:
-        taken_at: When a server took it [s]; None: none has.
-        preempted: A preempt was asked for while the goal ran.
+        taken_at: When a server accepted it [s]; None before.
+        preempted: The state was asked to stop while the goal ran.
         timed_out: `exec_timeout` passed while the goal ran.
-        status: Name of the goal status it ended with; "" while it runs, "LOST" when abandoned.
-        text: What the server, or the client for it, said about that.
-        abandoned: The goal was given up; it may still run on the server.
+        status: Name of its final goal status; "" while it runs, "LOST" if it was abandoned.
+        text: The text of the server, or of the client in its place, about the end.
+        abandoned: The state no longer waits for the goal; it may still run on the server.
 
-    Threads: none of its own, no lock; the owner calls it from one thread.
+    Threads: not thread-safe.
     """
 
     __slots__ = (
@@ -94,41 +95,42 @@ class GoalRun:
 
     @property
     def deadline(self) -> float | None:
-        """When `step` has something to do though nothing happens [s]; None: never."""
+        """When `step` must be called even if nothing happens [s]; None for never."""
         return self._deadline
 
     def left(self, now: float) -> float:
-        """Return what is left of `exec_timeout` [s]; infinity without one or before it begins."""
+        """Return the rest of `exec_timeout` [s]; infinity if there is none or it has not begun."""
         if self.exec_timeout is None or self.taken_at is None:
             return math.inf
         return max(0.0, self.taken_at + self.exec_timeout - now)
 
     def on_taken(self, at: float) -> None:
-        """Note when a server took the goal [s]; from then on `exec_timeout` counts."""
+        """Record when a server accepted the goal [s]; `exec_timeout` begins at that moment."""
         if self.taken_at is None:
             self.taken_at = at
             if self.exec_timeout is not None and not self.cancelling:
                 self._deadline = at + self.exec_timeout
 
     def on_preempt(self) -> None:
-        """Note that the state is to stop."""
+        """Record that the state was asked to stop."""
         if not self.status:
             self.preempted = True
 
     def on_failure(self) -> None:
-        """Note that a callback raised: the goal is to be cancelled, without a preempt."""
+        """Record that a callback raised: the goal must be cancelled, although nobody asked."""
         if not self.status:
             self._failed = True
 
     def on_end(self, status: str, text: str) -> None:
-        """Note that the goal ended, with the name of a final goal status."""
+        """Record that the goal ended, with the name of a final goal status."""
         if not self.status:
             self.status, self.text = status, text
 
     def step(self, now: float) -> Step:
-        """Return what to do; to be called after every event and at `deadline`."""
+        """Return what to do now; call it after every event and at `deadline`."""
         if self.status:
             return Step.FINISH
+        # One deadline: that of `exec_timeout` first, after the cancel that of `preempt_timeout`.
         late = self._deadline is not None and now >= self._deadline
         asked = self.preempted or self._failed
         if not self.cancelling and (asked or late):
@@ -151,9 +153,8 @@ class GoalRun:
         """The outcome of the state, once the goal has ended.
 
         Source:
-            smach_ros: a goal that somebody else stopped is 'aborted'; only a preempt from above
-            makes 'preempted'. A goal that was recalled or lost after that preempt is 'preempted'
-            too.
+            smach_ros: a goal that somebody else stopped is 'aborted'; only a preempt of this state
+            leads to 'preempted'. So does a goal that was recalled or lost after that preempt.
         """
         if self.status == "SUCCEEDED":
             return SUCCEEDED
@@ -163,7 +164,7 @@ class GoalRun:
 
     @property
     def reason(self) -> str:
-        """Why it is 'aborted' or 'preempted', in words."""
+        """The reason of 'aborted' or 'preempted', for people."""
         words = [self.status]
         if self.timed_out:
             words.append(f"cancelled after exec_timeout={self.exec_timeout:g} s")
@@ -173,32 +174,33 @@ class GoalRun:
 
 
 class GoalExchange:
-    """Carries out what `GoalRun` decides about one goal.
+    """Carries out the decisions of a `GoalRun` about one goal.
 
-    The state's thread does it. While that thread is in a callback or a listener, which may take its
-    time, `hurry` lets another thread cancel the goal.
+    This happens in the state's thread. While that thread is inside a callback or a listener, which
+    may block, `hurry` lets another thread cancel the goal.
 
     Args:
         client: Sends the goal.
-        wake: What the state's thread waits on.
-        scope: Where the events go; None outside any machine.
-        run: The decisions.
-        preempt_requested: Whether the state is to stop; any thread may ask.
-        on_late: Called when `exec_timeout` is over while the state's thread is in foreign code,
+        wake: The event on which the state's thread waits.
+        scope: Publishes the events; None outside of any machine.
+        run: Makes the decisions.
+        preempt_requested: Returns whether the state must stop; called in any thread.
+        on_late: Called when `exec_timeout` passes while the state's thread is in the user's code;
             maybe more than once, in any thread.
-        wants_feedback: Somebody besides the listeners wants the feedback: without either, feedback
-            does not wake the state's thread.
-        frame: Where the state runs; a journal of its run hears of the goal before anybody does.
+        wants_feedback: The state itself needs the feedback. If neither it nor a listener does,
+            feedback does not wake the state's thread.
+        frame: Where the state runs. The journal of a durable run records the goal before it is sent
+            or published.
 
     Attributes:
         run: See above.
-        accepted: The server has begun with the goal.
-        result: The result message once it is there, else None.
-        unanswered: No server has said a word about the goal.
+        accepted: The server has started the goal.
+        result: The result message once it has arrived, else None.
+        unanswered: No server has acknowledged the goal.
         adopted: An earlier process has sent it.
 
-    Threads: everything belongs to the state's thread, apart from `hurry` and from what the client
-        tells: that is only noted, under the client's lock.
+    Threads: all methods belong to the state's thread except `hurry` and the callbacks of the
+        client, which run under the client's lock and only set flags.
     """
 
     def __init__(
@@ -228,7 +230,7 @@ class GoalExchange:
         self._kept_result: Any = None
         self._handle: ClientGoalHandle | None = None
         self._lock = threading.Lock()  # guards `run` and the timer
-        self._inside = False  # the state's thread is in foreign code, or about to be
+        self._inside = False  # the state's thread is in the user's code, or about to be
         self._timer: Timer | None = None
         self._timer_due: float | None = None
 
@@ -251,7 +253,7 @@ class GoalExchange:
         return self._handle is not None and not self._handle.goal.acknowledged
 
     def send(self, goal: Any, *, ack_timeout: float | None) -> None:
-        """Send `goal`; when no server takes it within `ack_timeout` [s] it is LOST.
+        """Send `goal`; it is LOST if no server acknowledges it within `ack_timeout` [s].
 
         Raises:
             ActionException, FieldError: the goal is not of the action's type.
@@ -264,20 +266,22 @@ class GoalExchange:
         self._begin(handle, goal)
 
     def adopt(self, kept: Any, *, ack_timeout: float | None) -> None:
-        """Follow a goal that an earlier process has sent, as `send` does a new one.
+        """Follow a goal that an earlier process has sent.
 
         Args:
-            kept: What the journal knows of it.
-            ack_timeout: When no server knows of it within so long [s] it is LOST.
+            kept: Its record in the journal.
+            ack_timeout: It is LOST if no server knows it within this time [s].
         """
         self.adopted = True
         if kept["taken_ns"] is not None:
+            # `exec_timeout` counts from the acceptance, the outage included. The journal has wall
+            # time, because the monotonic clock of another process means nothing here.
             clock = self._wake.clock
             self.run.on_taken(clock.now() - (clock.time_ns() - kept["taken_ns"]) / 1e9)
             self._is_taken_kept = True
-        if kept["status"]:  # it had ended
+        if kept["status"]:  # it had ended before the outage
             self.goal_id = kept["id"]
-            if self._preempt_requested():  # as it was when the goal was stopped
+            if self._preempt_requested():
                 self.run.on_preempt()
             self.run.on_end(kept["status"], kept["text"])
             self._kept_result = kept["result"]
@@ -297,28 +301,30 @@ class GoalExchange:
         self._inside = False
 
     def call_off(self, goal_id: str) -> None:
-        """Let the server recall a goal that it does not know, should it still come."""
+        """Let the server recall a goal that it does not know, in case it still arrives."""
         self._client.manager.port.send_cancel(goal_id, 0)
 
     def follow(self, on_feedback: Callable[[Any], object]) -> None:
         """Wait until the goal has ended or is abandoned.
 
         Args:
-            on_feedback: Called with each feedback message, in this thread. When it raises, the goal
-                is cancelled, its end awaited, and the exception goes on. What it has not got soon
-                after the goal's end is dropped and reported.
+            on_feedback: Called with each feedback message, in this thread. If it raises, the goal
+                is cancelled, and the exception is raised after its end. Messages that are still
+                waiting a short time after the end are dropped and reported.
 
-        Blocks: until then; a preempt or `exec_timeout` bounds it by `preempt_timeout`, and by the
-            one call of `on_feedback` that is under way.
+        Blocks: until then; after a preempt or `exec_timeout`, at most `preempt_timeout` and the
+            current call of `on_feedback`.
         """
         handle = self._handle
         assert handle is not None
         failure: Exception | None = None
         while True:
             self._wake.clear()
-            over = handle.goal.over  # before the feedback: what was sent before the end is seen
+            # Read before the feedback: if the goal is over, all its feedback has arrived.
+            over = handle.goal.over
             feedback = handle.take_feedback()
-            self._inside = feedback is not None  # from here on `hurry` acts if this thread is busy
+            # Set before `_act`: what becomes due after that is done by `hurry` in another thread.
+            self._inside = feedback is not None
             step = self._act()
             self._keep_taken(handle)
             if step is not Step.WAIT:
@@ -332,7 +338,7 @@ class GoalExchange:
                 except Interruption:
                     self._emit(GoalDone, self.goal_id, self.run.status or "LOST", INTERRUPTED, None)
                     raise
-                except Exception as error:  # noqa: BLE001  raised again when the goal has ended
+                except Exception as error:  # noqa: BLE001  raised below, after the goal's end
                     failure = error
                     self.run.on_failure()
                 if self.run.cancelling:
@@ -350,7 +356,7 @@ class GoalExchange:
             raise failure
 
     def _keep_taken(self, handle: ClientGoalHandle) -> None:
-        """Write, once, that a server has the goal."""
+        """Write to the journal, once, that a server has the goal."""
         if self._is_taken_kept or not handle.goal.acknowledged:
             return
         if self._journal is not None and self._frame is not None:
@@ -358,11 +364,14 @@ class GoalExchange:
             self._journal.goal_taken(self._frame, self.goal_id)
 
     def _keep_end(self, handle: ClientGoalHandle) -> None:
-        """Write how the goal ended; only then may the server forget it."""
+        """Write the goal's end to the journal; only then acknowledge it to the server.
+
+        If this process ends in between, the next one gets the result from the server again.
+        """
         handle.keeps_result = False
         run = self.run
         if run.status == "LOST" and self.unanswered:
-            return  # what follows is decided after this, and again by a process that goes on
+            return  # a resumed process must decide again what to do about it
         if self._journal is not None and self._frame is not None:
             facts = (self.goal_id, run.status, run.text, self.result)
             self._journal.goal_done(self._frame, *facts, preempted=run.preempted)
@@ -370,23 +379,25 @@ class GoalExchange:
                 handle.acknowledge()
 
     def cancel(self) -> None:
-        """Ask the server to end the goal, if it was sent and has not ended."""
+        """Cancel the goal, if it was sent and has not ended."""
         handle = self._handle
         if handle is not None and not handle.goal.over:
             handle.cancel()
 
     def close(self) -> None:
-        """Let no other thread act for the state any more."""
+        """Stop other threads from acting for the state."""
         self._inside = False
         with self._lock:
             if self._timer is not None:
                 self._timer.cancel()
 
     def hurry(self) -> None:
-        """Do what is due now although the state's thread is in foreign code.
+        """Do what is due although the state's thread is in the user's code.
 
         Threads: any, also in a signal handler; never waits.
         """
+        # In another thread: the caller may hold the run's lock, or have interrupted a lock's
+        # holder.
         if self._inside:
             self._wake.clock.spawn(self._act_if_busy, name=f"goal of {self._client.ns}")
 
@@ -395,7 +406,7 @@ class GoalExchange:
             self._act()
 
     def _act(self) -> Step:
-        """Do what is due, and see to it that somebody does what will be; return the last step."""
+        """Do what is due, set a timer for what will be, and return the last step."""
         handle = self._handle
         assert handle is not None
         clock = self._wake.clock
@@ -405,7 +416,7 @@ class GoalExchange:
             if handle.goal.acknowledged:
                 self.run.on_taken(clock.now())
             if handle.goal.over and not self.run.status:
-                step = Step.WAIT  # for the feedback that came before the end
+                step = Step.WAIT  # `follow` handles the rest of the feedback first
             else:
                 step = self.run.step(clock.now())
             if step is Step.CANCEL:
@@ -420,7 +431,7 @@ class GoalExchange:
                     self._timer.cancel()
                 self._timer = clock.call_later(due - clock.now(), self.hurry)
                 self._timer_due = due
-        if late and self._on_late is not None:
+        if late and self._on_late is not None:  # takes the run's lock, so not under this one
             self._on_late()
         return step
 
@@ -434,7 +445,7 @@ class GoalExchange:
         if self._wants_feedback or watched:
             self._wake.set()
         elif self._handle is not None:
-            self._handle.take_feedback()
+            self._handle.take_feedback()  # nobody needs it
 
     def _emit(self, kind: Any, *fields: Any) -> None:
         if self._scope is not None:

@@ -1,4 +1,4 @@
-"""Callbacks that declare outcomes and keys, and the states that take them over."""
+"""Callbacks that declare outcomes and keys, and the states that adopt them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class UntimedOptions(TypedDict, total=False):
-    """`smachpy.machines.state.StateOptions` for states that have a timeout of their own."""
+    """`smachpy.machines.state.StateOptions` for states with their own argument `timeout`."""
 
     preempt_timeout: Grace
     retry: RetrySpec
@@ -23,12 +23,12 @@ class UntimedOptions(TypedDict, total=False):
 
 
 def adopt_interface(state: State, callback: object, *, outcomes: bool = True) -> None:
-    """Add the keys, and the outcomes too, that `callback` declared with `cb_interface`.
+    """Add the keys and outcomes that `callback` declares with `cb_interface`.
 
     Args:
-        state: Gets them.
-        callback: May be None: nothing to do.
-        outcomes: Whether it chooses the state's outcome.
+        state: The state that gets them.
+        callback: The callback, or None.
+        outcomes: Whether to add the outcomes: the callback chooses the state's outcome.
     """
     interface: Any = callback
     if has_smach_interface(callback):

@@ -1,4 +1,4 @@
-"""Messages made from userdata, and messages handed on to it: what the talking states share."""
+"""Messages made from userdata and written to it, for action and service states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class UserCallback:
-    """A function of the user's with the arguments that follow ours."""
+    """A user's function with its own extra arguments."""
 
     function: Callable[..., Any] | None
     args: tuple[Any, ...]
@@ -35,15 +35,15 @@ class UserCallback:
         args: Iterable[Any],
         kwargs: Mapping[str, Any] | None,
     ) -> UserCallback:
-        """Check the function and take over its arguments; later changes of those do not matter.
+        """Check the function and copy its extra arguments.
 
         Args:
-            problems: Gets what is wrong.
-            name: The argument that the function was given as.
-            ours: What it is called with, before its own arguments.
+            problems: Gets the problems.
+            name: Name of the argument by which the function was given.
+            ours: Names of the arguments that come before the extra ones.
             function: The function, or None.
-            args: Its own arguments.
-            kwargs: Its own keyword arguments.
+            args: Its extra arguments.
+            kwargs: Its extra keyword arguments.
         """
         more = problems.values(f"{name}_args", args)
         named = problems.mapping(f"{name}_kwargs", kwargs, "name -> value")
@@ -52,7 +52,7 @@ class UserCallback:
         return cls(function, more, named)
 
     def __call__(self, *ours: Any) -> Any:
-        """Call it; None when there is none."""
+        """Call the function; return None if there is none."""
         if self.function is None:
             return None
         return self.function(*ours, *self.args, **self.kwargs)
@@ -60,13 +60,13 @@ class UserCallback:
 
 @dataclass(frozen=True, slots=True)
 class Outgoing:
-    """What a state sends: a given message or that of a key, then fields, then a callback.
+    """Builds the message that a state sends: from a message or key, then fields, then a callback.
 
     Attributes:
-        name: What it is, for names of arguments: "goal", "request".
+        name: Prefix of the arguments' names: "goal", "request".
         message_class: Its class.
-        given: The message to begin with, or None.
-        key: Userdata key of the message to begin with, or None.
+        given: The initial message, or None.
+        key: Userdata key of the initial message, or None.
         slots: Fields that are set from userdata keys of the same name.
         callback: Called with userdata and message; may return another message.
     """
@@ -79,7 +79,7 @@ class Outgoing:
     callback: UserCallback
 
     def problems(self) -> list[str]:
-        """Return what is wrong with the arguments."""
+        """Return the problems of the arguments."""
         problems = _slot_problems(self.name, self.slots, self.message_class)
         if self.given is not None and not isinstance(self.given, self.message_class):
             expected = self.message_class._type
@@ -90,11 +90,14 @@ class Outgoing:
 
     def declare(self, state: State) -> None:
         """Register the keys that are read."""
+        # The outcomes of this callback are not the state's: it only changes the message.
         state.register_input_keys([*([] if self.key is None else [self.key]), *self.slots])
         adopt_interface(state, self.callback.function, outcomes=False)
 
     def build(self, ud: Any) -> Any:
-        """Return the message of this run; nothing in it is shared with userdata or other runs."""
+        """Return the message of this run, which shares nothing with userdata or other runs."""
+        # Deep copies: a later write to userdata, or a callback that changes its argument, must not
+        # change the state's template or a message that is being sent.
         if self.key is not None:
             message = copy.deepcopy(writable(ud[self.key]))
         elif self.given is not None:
@@ -111,14 +114,14 @@ class Outgoing:
 
 @dataclass(frozen=True, slots=True)
 class Incoming:
-    """What a state receives: into a key, fields into keys of the same name, to a callback.
+    """Stores the message that a state receives: in a key, and its fields in keys of their names.
 
     Attributes:
-        name: What it is, for names of arguments: "result", "response".
+        name: Prefix of the arguments' names: "result", "response".
         message_class: Its class.
         key: Userdata key that gets the message, or None.
         slots: Fields that are written to userdata keys of the same name.
-        callback: Chooses the outcome, maybe.
+        callback: Called with it; may return the outcome.
     """
 
     name: str
@@ -128,11 +131,11 @@ class Incoming:
     callback: UserCallback
 
     def problems(self) -> list[str]:
-        """Return what is wrong with the arguments."""
+        """Return the problems of the arguments."""
         return _slot_problems(self.name, self.slots, self.message_class)
 
     def declare(self, state: State) -> None:
-        """Register the keys that are written, and what the callback declared."""
+        """Register the keys that are written, and the interface of the callback."""
         state.register_output_keys([*([] if self.key is None else [self.key]), *self.slots])
         adopt_interface(state, self.callback.function)
 

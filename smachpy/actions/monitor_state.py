@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from actionlib_core.pubsub.topic import NotingSubscriber
 from smachpy import log
 from smachpy.actions.interface import adopt_interface
-from smachpy.actions.wakeup import Wakeup
+from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.events import CallbackFailed
 from smachpy.machines.names import name_of
 from smachpy.machines.problems import Problems
@@ -30,22 +30,22 @@ __all__ = ["MonitorState"]
 class MonitorState(State):
     """Checks the messages of a topic. Outcomes: 'valid', 'invalid', 'preempted'.
 
-    The condition runs in the thread that runs the state, once per message, in order. It may take
-    its time: messages that come meanwhile wait.
+    The condition runs in the state's thread, once per message, in order. It may be slow: messages
+    that arrive meanwhile wait.
 
     Args:
         topic: Name of the topic.
         msg_type: Class of its messages.
-        cond_cb: Called as `cond_cb(userdata, message)`. The first false answer ends the state with
+        cond_cb: Called as `cond_cb(userdata, message)`. The first false value ends the state with
             'invalid'; so does an exception, which is logged and reported as `CallbackFailed`. Its
             `cb_interface` is added.
-        max_checks: 'valid' after so many true answers; -1: no limit.
+        max_checks: Number of true values after which it ends with 'valid'; -1 for no limit.
         input_keys: Userdata keys that it reads.
         output_keys: Userdata keys that it writes.
-        timeout: `timeout_outcome` after so long [s]; None: no limit.
-        timeout_outcome: Outcome then; registered if there is a timeout.
-        latest: Of several messages that wait, check only the newest.
-        node: Where to listen; the current node when None.
+        timeout: Time after which it ends with `timeout_outcome` [s]; None for no limit.
+        timeout_outcome: Outcome after a timeout; registered if there is one.
+        latest: If several messages wait, check only the newest.
+        node: Node that subscribes; None for the current node.
         **options: See `smachpy.machines.state.StateOptions`.
 
     Raises:
@@ -90,7 +90,7 @@ class MonitorState(State):
         adopt_interface(self, cond_cb, outcomes=False)
 
     def execute(self, ud: Any) -> str:
-        """Check messages until one is bad, enough are good, time is up, or a preempt.
+        """Check messages until one is invalid, a limit is reached, or a preempt arrives.
 
         Blocks: see above.
         """
@@ -110,9 +110,8 @@ class MonitorState(State):
         until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
         good = 0
         while True:
-            wake.clear()
-            if self.preempt_requested():
-                self.service_preempt()
+            wake.clear()  # first, so that nothing that happens after these checks is missed
+            if answer_preempt(self):
                 return "preempted"
             if until is not None and clock.now() >= until:
                 return self.__timeout_outcome
@@ -128,7 +127,7 @@ class MonitorState(State):
     def __check(self, ud: Any, message: Any) -> bool:
         try:
             return bool(self.__cond_cb(ud, message))
-        except Exception as error:  # noqa: BLE001  SMACH's rule: a broken check is not passed
+        except Exception as error:  # noqa: BLE001  as in SMACH: a check that raises has failed
             text = f"{type(error).__name__}: {error}"
             scope = current_scope()
             where = f"MonitorState {self.__topic!r}" if scope is None else scope.path

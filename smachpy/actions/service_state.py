@@ -15,7 +15,7 @@ from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import CALL_TIMEOUT_S, ServiceProxy
 from smachpy import log
 from smachpy.actions.messages import Incoming, Outgoing, UserCallback
-from smachpy.actions.wakeup import Wakeup
+from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
 from smachpy.run.frame import current_scope
@@ -40,17 +40,17 @@ _TIMED_OUT = (ServiceTimeoutError, ServiceUnavailableError, WaitTimeoutError)
 class ServiceState(State):
     """Calls a service once. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
-    The request is made of `request` or `request_key`, then `request_slots`, then `request_cb`, anew
-    for each run. 'aborted' means: no server, a server that died, or a handler that raised; the
+    Each run builds a new request from `request` or `request_key`, then `request_slots`, then
+    `request_cb`. 'aborted' means: no server, a server that died, or a handler that raised; the
     reason is logged.
 
     Args:
         service_name: Name of the service.
         service_spec: Its class.
-        request: The request, or what the slots and the callback begin with.
+        request: The request, or the initial one for the slots and the callback.
         request_cb: Called as `request_cb(userdata, request, *request_cb_args,
             **request_cb_kwargs)`; changes the request or returns another. Its `cb_interface` is
-            added, as that of `response_cb`.
+            added, like that of `response_cb`.
         request_cb_args: Arguments for it.
         request_cb_kwargs: Keyword arguments for it.
         request_key: Userdata key that holds the request.
@@ -64,10 +64,10 @@ class ServiceState(State):
         input_keys: More keys to read, for the callbacks.
         output_keys: More keys to write, for the callbacks.
         outcomes: More outcomes, for `response_cb`.
-        timeout: `timeout_outcome` when there is no answer after so long [s], waiting for the server
-            included; None: no limit.
-        timeout_outcome: Outcome then.
-        node: Where the client is; the current node when None.
+        timeout: Time after which it ends with `timeout_outcome` [s], including the wait for the
+            server; None for no limit.
+        timeout_outcome: Outcome after a timeout.
+        node: Node of the client; None for the current node.
         **options: See `smachpy.machines.state.StateOptions`.
 
     Raises:
@@ -151,38 +151,40 @@ class ServiceState(State):
     def execute(self, ud: Any) -> str:
         """Call the service.
 
-        What a callback raises goes through.
+        An exception of a callback is passed on.
 
         Raises:
             FieldError: a field of the request has a wrong type.
             TypeMismatchError: the server is of another type.
 
-        Blocks: until the answer, `timeout` or a preempt; the server may go on with a call that was
-            left.
+        Blocks: until the answer, `timeout` or a preempt. After a preempt the server may continue
+            with the call.
         """
         with Wakeup(self) as wake:
-            if self.__is_preempted():
+            if answer_preempt(self):
                 return "preempted"
-            request = self.__request.build(ud)
-            if self.__is_preempted():
+            request = self.__request.build(ud)  # may block in the user's callback
+            if answer_preempt(self):
                 return "preempted"
             call = _Call(self.__get_proxy(), request, self.__timeout_s, wake)
             try:
                 while not (call.over or self.preempt_requested()):
                     wake.wait_until()
                     wake.clear()
-            except BaseException:  # KeyboardInterrupt and the like: nobody waits for the answer
+            except (
+                BaseException
+            ):  # such as KeyboardInterrupt: do not leave the call's thread behind
                 self.__drop_proxy()
                 raise
         if not call.over:
-            self.__drop_proxy()
+            self.__drop_proxy()  # ends the call with an error, so the join is short
             call.task.join()
-            if self.__is_preempted():
+            if answer_preempt(self):
                 return "preempted"
         return self.__finish(ud, call)
 
     def __finish(self, ud: Any, call: _Call) -> str:
-        if call.error is not None and (self.__is_preempted() or is_shutdown()):
+        if call.error is not None and (answer_preempt(self) or is_shutdown()):
             return "preempted"
         if isinstance(call.error, (ServiceException, WaitTimeoutError)):
             scope = current_scope()
@@ -195,14 +197,8 @@ class ServiceState(State):
         chosen = self.__response.callback(ud, call.response)
         return "succeeded" if chosen is None else chosen
 
-    def __is_preempted(self) -> bool:
-        if not self.preempt_requested():
-            return False
-        self.service_preempt()
-        return True
-
     def __get_proxy(self) -> ServiceProxy:
-        """Return the proxy on the node in force, made when there is none yet."""
+        """Return the proxy on the node; make one if there is none, or the node has changed."""
         node = self.__node if self.__node is not None else get_node()
         proxy = self.__proxy
         if proxy is None or proxy.node is not node or node.closed:
@@ -213,7 +209,7 @@ class ServiceState(State):
         return proxy
 
     def __drop_proxy(self) -> None:
-        """Leave the service; a call that is under way ends with an error at once."""
+        """Close the proxy; a running call ends with an error at once."""
         proxy, self.__proxy = self.__proxy, None
         if proxy is not None:
             proxy.close()
@@ -228,7 +224,7 @@ class ServiceState(State):
 
 
 def _as_request(service_spec: Any, given: Any) -> Any:
-    """Return a request made of a plain value, as rospy made one for programs for ROS 1."""
+    """In programs for ROS 1, convert a plain value to a request, as rospy does."""
     kind = service_spec._request_class
     if given is None or isinstance(given, kind) or not kind.__slots__ or not accepting():
         return given
@@ -236,12 +232,12 @@ def _as_request(service_spec: Any, given: Any) -> Any:
 
 
 class _Call:
-    """A call in a thread of its own, so that a preempt can end the state before the answer.
+    """A call in its own thread, so that a preempt can end the state before the answer.
 
     Attributes:
         over: It has returned or raised.
-        response: What it returned.
-        error: What it raised.
+        response: Its result.
+        error: The exception that it raised.
     """
 
     def __init__(
@@ -261,10 +257,10 @@ class _Call:
         start = clock.now()
         try:
             proxy.wait_for_service(self._timeout_s)
-            if self._timeout_s is not None:
+            if self._timeout_s is not None:  # one timeout for the wait and the call together
                 proxy.timeout = max(0.0, self._timeout_s - (clock.now() - start))
             self.response = proxy.call(self._request)
-        except BaseException as error:  # noqa: BLE001  the thread's border: raised in the state's
+        except BaseException as error:  # noqa: BLE001  raised in the state's thread
             self.error = error
         finally:
             self.over = True

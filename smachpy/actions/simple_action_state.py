@@ -13,7 +13,7 @@ from smachpy import log
 from smachpy.actions.goal_run import ABORTED, OUTCOMES, PREEMPTED, STOPPED, GoalExchange, GoalRun
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.messages import Incoming, Outgoing, UserCallback
-from smachpy.actions.wakeup import Wakeup
+from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.context import current_frame
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import Shown, State, get_options
@@ -35,25 +35,26 @@ if TYPE_CHECKING:
 __all__ = ["ActionStateOptions", "SimpleActionState"]
 
 SHORTEST_ACK_S = 1.0
-"""A server that is there is given this long to answer, however short `server_wait_timeout` is."""
+"""Lower limit of `server_wait_timeout`: time for the acknowledgement of a running server [s]."""
 
 ASKED_AGAIN_S = 5.0
-"""After a resume, what had asked a state to stop has this long to ask again [s]."""
+"""Time after a resume for whoever had asked the state to stop to ask again [s]."""
 
 MARGIN_S = 5.0
 INHERITED_MARGIN_S = 1.0
-"""The machine leaves the state's thread behind only so long after the goal was abandoned [s].
+"""Time from the moment when the goal is abandoned to the interruption of the state [s].
 
-That is for callbacks that hang; the goal is abandoned, and the state ends, without it. The second
-holds when the grace is a container's, which is to be exceeded by little.
+The state normally ends when its goal is abandoned; the interruption is only for callbacks that
+block. The second value is for a grace set by a container, which must not be exceeded by much.
 """
 
 DEFAULT_PREEMPT_S = float("60")
-"""Told from a 60.0 of the caller by its identity: that one is more than a default."""
+"""The default of `preempt_timeout`. Recognised by identity, because SMACH's signature has 60.0: a
+60.0 given by the caller takes precedence over the container's, the default does not."""
 
 
 class ActionStateOptions(TypedDict, total=False):
-    """`StateOptions` without `preempt_timeout`, which is an argument here."""
+    """`StateOptions` without `preempt_timeout`, which is an argument of its own here."""
 
     timeout: float | None
     timeout_outcome: str
@@ -69,25 +70,25 @@ class ActionStateOptions(TypedDict, total=False):
 class SimpleActionState(State):
     """Sends a goal and waits for its end. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
-    The goal is made of `goal` or `goal_key`, then `goal_slots`, then `goal_cb`, anew for each run.
-    All callbacks run in the thread that runs the state, hold no lock, and may raise: a goal that is
-    under way is cancelled first.
+    Each run builds a new goal from `goal` or `goal_key`, then `goal_slots`, then `goal_cb`. All
+    callbacks run in the state's thread, without a lock. They may raise: a running goal is cancelled
+    first.
 
-    'preempted' answers a preempt of this state: a goal that somebody else stopped is 'aborted', as
-    is one that the server aborted, rejected or lost. The reason is logged and in the event
-    `smachpy.events.GoalDone`.
+    The outcome is 'preempted' only after a preempt of this state. A goal stopped by somebody else
+    is 'aborted', like one that the server aborted, rejected or lost. The reason is logged and in
+    the event `smachpy.events.GoalDone`.
 
     Args:
         action_name: Name of the action.
         action_spec: Its class (XAction).
-        goal: The goal (XGoal), or what the slots and the callback begin with.
+        goal: The goal (XGoal), or the initial one for the slots and the callback.
         goal_key: Userdata key that holds the goal.
         goal_slots: Names of goal fields that are set from userdata keys of the same name.
         goal_cb: Called as `goal_cb(userdata, goal, *goal_cb_args, **goal_cb_kwargs)`; changes the
-            goal or returns another. Its `cb_interface` is added, as those of the other callbacks.
+            goal or returns another. Its `cb_interface` is added, like those of the other callbacks.
         goal_cb_args: Arguments for it.
         goal_cb_kwargs: Keyword arguments for it.
-        result_key: Userdata key that gets the result (XResult), if one came.
+        result_key: Userdata key that gets the result (XResult), if one arrives.
         result_slots: Names of result fields that are written to userdata keys of the same name.
         result_cb: Called as `result_cb(userdata, status, result, *result_cb_args,
             **result_cb_kwargs)` once a goal that was sent has ended; `status` is a number of
@@ -98,25 +99,26 @@ class SimpleActionState(State):
         input_keys: More keys to read, for the callbacks.
         output_keys: More keys to write, for the callbacks.
         outcomes: More outcomes, for `result_cb`.
-        exec_timeout: A goal that has not ended so long [s] after a server took it is cancelled, and
-            the outcome is 'aborted'; None: no limit. A callback that still runs `preempt_timeout`
-            and a few seconds later is interrupted (docs/preemption.md), with that outcome too.
-        preempt_timeout: A cancelled goal that has not ended after so long [s] is abandoned and
-            reported; it may still run on the server. None: no limit. Left out, a container's
-            `preempt_timeout` holds if it is shorter.
-        server_wait_timeout: 'aborted' when no server has taken the goal after so long [s]; None: no
-            limit. Under one second counts as one second.
+        exec_timeout: Time that the goal has to end, from its acceptance by a server [s]. After that
+            it is cancelled, and the outcome is 'aborted'; None for no limit. A callback that still
+            runs `preempt_timeout` and a few seconds later is interrupted (docs/preemption.md), with
+            the same outcome.
+        preempt_timeout: Time that a cancelled goal has to end [s]. After that it is abandoned and
+            reported; it may still run on the server. None for no limit. If it is not given, a
+            container's `preempt_timeout` is used if that is shorter.
+        server_wait_timeout: Time for a server to accept the goal [s], at least one second; after
+            that the outcome is 'aborted'. None for no limit.
         feedback_cb: Called as `feedback_cb(userdata, feedback)` for each XFeedback. While it runs,
-            a preempt and `exec_timeout` cancel the goal all the same. When it is slower than the
-            feedback, up to 100,000 messages wait and the oldest are dropped; what still waits at
-            the goal's end is dropped after a call that takes longer than 0.5 s or, when this state
-            has cancelled the goal, after 0.2 s. The log says how many.
+            a preempt or `exec_timeout` still cancels the goal. If it is slower than the feedback,
+            up to 100,000 messages wait, and the oldest are dropped. Messages that are still waiting
+            at the goal's end are dropped after a call that takes longer than 0.5 s or, if this
+            state has cancelled the goal, after 0.2 s. The log says how many.
         feedback_key: Userdata key that gets each XFeedback.
-        node: Where the client is; the current node when None.
+        node: Node of the client; None for the current node.
         **options: See `smachpy.machines.state.StateOptions`.
 
     Raises:
-        ActionException: `action_spec` is no action class.
+        ActionException: `action_spec` is not an action class.
         InvalidStateError: an argument does not fit the action; all problems at once.
     """
 
@@ -208,14 +210,14 @@ class SimpleActionState(State):
     def execute(self, ud: Any) -> str:
         """Send the goal and wait for its end.
 
-        What a callback raises goes through, once the goal has ended.
+        An exception of a callback is passed on after the goal has ended.
 
         Raises:
             FieldError: a field of the goal has a wrong type.
             TypeMismatchError: the action's server is of another type.
 
-        Blocks: until the goal has ended: all three timeouts together at most; a preempt
-            cancels the goal at once.
+        Blocks: until the goal has ended, at most all three timeouts together; a preempt cancels the
+            goal at once.
         """
         frame: Frame | None = current_frame()
         if frame is None or self.__exec_s is None:
@@ -235,7 +237,10 @@ class SimpleActionState(State):
         return outcome
 
     def __execute(self, ud: Any, limit: Timeout | None) -> str:
-        """Do it; when `exec_timeout` is over while foreign code runs, `limit` is told."""
+        """Send or resume the goal, and wait for its end.
+
+        `limit` asks the state to stop if `exec_timeout` passes while the user's code runs.
+        """
         frame: Frame | None = current_frame()
         journal = None if frame is None else frame.run.journal
         kept = None if journal is None or frame is None else journal.goal_of(frame)
@@ -247,20 +252,23 @@ class SimpleActionState(State):
         return PREEMPTED if exchange is None else self.__finish(ud, exchange)
 
     def __resume(self, ud: Any, limit: Timeout | None, frame: Frame, kept: Any) -> str | None:
-        """Follow the goal that an earlier process has sent; None: a new one is to be sent."""
+        """Follow the goal that an earlier process has sent; None: send a new one."""
         journal = frame.run.journal
         assert journal is not None
         if kept.get("preempted") and not kept["stopped"]:
-            # It had ended because its state was asked to stop. Who asked goes on, too, and asks
-            # again: a concurrence, say, when all its children are back.
+            # It had ended because its state was asked to stop. Whoever asked is resumed too and
+            # asks again: a concurrence, for instance, once all its children have been entered.
             State.wait_preempt(self, ASKED_AGAIN_S)
         exchange = self.__exchange_goal(ud, limit, frame, kept)
         assert exchange is not None
         status = exchange.run.status
         if kept["stopped"] and status in STOPPED and not self._preempt_requested:
-            return None  # the end of that process had stopped it
+            return None  # only the end of that process had stopped it
+        # The usual case: a server knows the goal, or its end was recorded, or it must stop anyway.
         if not exchange.unanswered or kept["status"] or self._preempt_requested:
             return self.__finish(ud, exchange)
+        # No server knows the goal: it may have been done or not. Cancel it, should it still arrive;
+        # then `resume` decides, else `idempotent`; a goal that was never accepted is sent again.
         exchange.call_off(kept["id"])
         options = get_options(self)
         if options.resume is not None:
@@ -273,13 +281,13 @@ class SimpleActionState(State):
     def __exchange_goal(
         self, ud: Any, limit: Timeout | None, frame: Frame | None, kept: Any
     ) -> GoalExchange | None:
-        """Send a goal, or follow the one that was `kept`, to its end; None: it was called off."""
+        """Send a goal, or follow the `kept` one, until its end; None if preempted before that."""
         with Wakeup(self) as wake:
-            if kept is None and self.__is_preempted():
+            if kept is None and answer_preempt(self):
                 return None
-            goal = self.__goal.build(ud) if kept is None else None
+            goal = self.__goal.build(ud) if kept is None else None  # may block in a callback
             client = self.__get_client()
-            if kept is None and self.__is_preempted():
+            if kept is None and answer_preempt(self):
                 return None
             own = self._smachpy.options.preempt_timeout
             grace = _shorter(inherited_grace(current_frame())) if own == "inherit" else own
@@ -287,6 +295,7 @@ class SimpleActionState(State):
             wanted = self.__feedback_cb is not None or self.__feedback_key is not None
 
             def is_asked() -> bool:
+                # A request of `exec_timeout` alone is not a preempt: its outcome is 'aborted'.
                 return self._preempt_requested and (limit is None or not limit.is_alone())
 
             exchange = GoalExchange(
@@ -308,18 +317,19 @@ class SimpleActionState(State):
                     exchange.send(goal, ack_timeout=wait_s)
                 else:
                     exchange.adopt(kept, ack_timeout=wait_s)
-                if not run.status:  # else it had ended before the resume
+                if not run.status:  # else it had ended in the earlier process
                     exchange.follow(lambda feedback: self.__on_feedback(ud, feedback))
-            except (
-                BaseException
-            ) as error:  # KeyboardInterrupt and the like: nobody waits for it now
+            except BaseException as error:
+                # Nobody waits for the goal now. In a durable run it goes on if the process is
+                # ending (KeyboardInterrupt, SystemExit): the next process follows it.
                 if frame is None or frame.run.journal is None or _is_of_run(error):
                     exchange.cancel()
                 raise
             finally:
                 forget()
                 exchange.close()
-            if limit is not None and not run.preempted:  # for `result_cb`
+            # The rest of `exec_timeout` is for `result_cb`.
+            if limit is not None and not run.preempted:
                 limit.start(run.left(wake.clock.now()))
         return exchange
 
@@ -330,14 +340,8 @@ class SimpleActionState(State):
             return goal + (MARGIN_S if goal == DEFAULT_PREEMPT_S else INHERITED_MARGIN_S)
         return None if own is None else float(own) + MARGIN_S
 
-    def __is_preempted(self) -> bool:
-        if not self.preempt_requested():
-            return False
-        self.service_preempt()
-        return True
-
     def __get_client(self) -> ActionClient[Any]:
-        """Return the client on the node in force, which all states of the action share."""
+        """Return the client on the node, which all states of the action share."""
         node = self.__node if self.__node is not None else get_node()
         action = self.__types.action
         key = ("action client", node.resolve(self.__action_name, "action name"), action)
@@ -350,9 +354,10 @@ class SimpleActionState(State):
             self.__feedback_cb(ud, feedback)
 
     def __finish(self, ud: Any, exchange: GoalExchange) -> str:
-        """Hand the result on and choose the outcome."""
+        """Store the result and choose the outcome."""
         run, result = exchange.run, exchange.result
-        if run.outcome == PREEMPTED:  # else the goal was done first, and the preempt is still due
+        # Otherwise the goal ended by itself first: the request stays, and the machine ends by it.
+        if run.outcome == PREEMPTED:
             self.service_preempt()
         if result is not None:
             self.__result.store(ud, result)
@@ -386,7 +391,7 @@ class SimpleActionState(State):
     # -- for pictures and for SMACH ------------------------------------------------------------
 
     def __get_status(self) -> int:
-        """Return which of the five constants holds."""
+        """Return the constant of the present status."""
         constants, exchange = SimpleActionState, self.__exchange
         if exchange is None:
             return constants.INACTIVE
@@ -414,12 +419,12 @@ class SimpleActionState(State):
 
 
 def _is_of_run(error: BaseException) -> bool:
-    """Tell whether an exception ends the state, not the process: goals may be followed later."""
+    """Return whether an exception ends the state, and not the process."""
     return isinstance(error, (Exception, Interruption))
 
 
 def _shorter(inherited: Grace) -> float:
-    """Return the shorter of the default and what the containers say."""
+    """Return the shorter one of the default and the containers' grace."""
     if inherited is None or isinstance(inherited, str):
         return DEFAULT_PREEMPT_S
     return min(DEFAULT_PREEMPT_S, inherited)

@@ -1,4 +1,4 @@
-"""What a state waits on while it runs: one flag that a preempt and any other news may set."""
+"""The event on which a state waits while it runs: set by a preempt and by anything else."""
 
 from __future__ import annotations
 
@@ -13,13 +13,21 @@ if TYPE_CHECKING:
     from smachpy.machines.state import State
 
 
+def answer_preempt(state: State) -> bool:
+    """Service a request to `state`, if there is one; return whether there was."""
+    if not state.preempt_requested():
+        return False
+    state.service_preempt()
+    return True
+
+
 class Wakeup:
-    """Wakes the thread that runs `state` for a preempt, for `set` and at a deadline.
+    """Wakes the state's thread at a preempt, at `set` and at a deadline; a context manager.
 
-    The loop around it loses nothing when it clears first, then looks at everything that may have
-    happened, then waits. Used as a context manager; on leaving it the state is left alone.
+    A loop misses nothing if it first clears it, then checks everything that may have happened, and
+    then waits.
 
-    Threads: `set` from any thread, callback or signal handler; the rest by the state's thread.
+    Threads: `set` from any thread, callback or signal handler; the rest in the state's thread.
     """
 
     __slots__ = ("_event", "_forget", "_state", "clock")
@@ -37,15 +45,15 @@ class Wakeup:
         self._forget()
 
     def set(self) -> None:
-        """Wake the state; remembered until `clear`."""
+        """Wake the state; stays set until `clear`."""
         self._event.set()
 
     def clear(self) -> None:
-        """Forget what was said; look at everything after this, not before."""
+        """Reset it; check everything after this call, not before."""
         self._event.clear()
 
     def wait_until(self, *deadlines: float | None) -> None:
-        """Wait for news or the first of the deadlines [s, clock]; None is no deadline.
+        """Wait until it is set, or until the first deadline [s, clock]; None is no deadline.
 
         Blocks: see above.
         """
