@@ -1,4 +1,4 @@
-"""`IntrospectionClient`: find machines on the network, watch them, choose where they begin."""
+"""`IntrospectionClient`: find machines on the network, watch them, set their initial states."""
 
 from __future__ import annotations
 
@@ -43,23 +43,23 @@ if TYPE_CHECKING:
 __all__ = ["IntrospectionClient"]
 
 ANSWER_S = 5.0
-"""How long a server has to answer when the caller does not say."""
+"""Default time for a server to answer [s]."""
 
 
 class IntrospectionClient:
     """Talks to introspection servers.
 
     Args:
-        node: Where; the current node when None.
+        node: The node to use; None for the current node.
     """
 
     def __init__(self, *, node: Node | None = None) -> None:
         self._node = node
 
     def get_servers(self, *, timeout: float = 1.0) -> list[str]:
-        """Return the names of the introspection servers that are there, sorted.
+        """Return the names of the introspection servers on the network, sorted.
 
-        Blocks: until the network has answered, `timeout` [s] at most.
+        Blocks: until the network has answered, at most `timeout` [s].
         """
         transport = self._get_node().transport
         names = {
@@ -83,16 +83,16 @@ class IntrospectionClient:
             path: Path of the container.
             initial_states: Labels.
             initial_userdata: Values to set.
-            timeout: Longest wait for the server's answer [s]; None: 5 s.
+            timeout: Longest wait for the server's answer [s]; None for 5 s.
 
         Returns:
-            Whether the server has done it; why it has not is logged.
+            Whether the server has done it; a refusal is logged with its reason.
 
         Raises:
-            InvalidStateError: an argument has another type, or there is userdata that JSON cannot
-                carry over; all is named.
+            InvalidStateError: an argument has a wrong type, or JSON cannot represent some of the
+                userdata; with all problems.
 
-        Blocks: until the answer, `timeout` at most.
+        Blocks: until the answer, at most `timeout`.
         """
         problems = Problems(f"{server}: {path}")
         problems.word("server", server)
@@ -115,13 +115,13 @@ class IntrospectionClient:
         answers: list[str] = []
 
         def take(status: Any) -> None:
-            if status.info.startswith(request):  # else news, or an answer to somebody else
+            if status.info.startswith(request):  # else a usual status, or an answer to others
                 answers.append(status.info.removeprefix(request))
                 answered.set()
 
         with (
             Subscriber(server + STATUS_TOPIC, SmachContainerStatus, take, node=node),
-            Publisher(  # latched: the server gets it when the network has connected the two
+            Publisher(  # latched: the server gets it even if the network connects the two later
                 server + INIT_TOPIC, SmachContainerInitialStatusCmd, latch=True, node=node
             ) as commands,
         ):
@@ -138,7 +138,7 @@ class IntrospectionClient:
         Raises:
             SmachError: there is no such server, or it does not answer.
 
-        Blocks: until the answer, `timeout` [s] at most.
+        Blocks: until the answer, at most `timeout` [s].
         """
         topic = server + DESCRIPTION_TOPIC
         try:
@@ -160,10 +160,10 @@ class IntrospectionClient:
         of events that the server could not send in time.
 
         Returns:
-            A function that ends it.
+            A function that ends the subscription.
 
         Raises:
-            InvalidStateError: `listener` cannot be called so.
+            InvalidStateError: `listener` cannot be called in this way.
 
         Threads: the listener runs in a thread of the node's clock.
         """

@@ -1,18 +1,18 @@
-"""The machine as a whole on the network: its structure, its events and their history.
+"""A machine on the network as a whole: its structure, its events and their history.
 
     <server>/smach/description   `smachpy.introspection.StateRecord`, latched      std_msgs/String
     <server>/smach/events        `smachpy.events` with sequence numbers `seq`      std_msgs/String
-    <server>/smach/observed      what the robot's topics tell (`observations`)     std_msgs/String
+    <server>/smach/observed      data of the robot's topics (`observations`)       std_msgs/String
     <server>/smach/history       the run so far, for viewers that join late     std_srvs/Trigger
     <server>/smach/value         a userdata value in full (`smachpy.network.values`)
 
 The history is a JSON object: `epoch` (an id that changes when the machine's server restarts),
-`session` (id of the network session, which tells two servers of one name apart), `run` (names a
-durable run, which another process may have begun; "" for others), `description`,
-`problems` (found by `smachpy.checks`), `base` (a `RunState` of the events that are no longer kept),
-`events` (the newest, as they were sent), `observed` (what the robot's topics told, of late, as sent
-on <server>/smach/observed), `control` (paused and breakpoints; null if the server takes no
-commands), `now` (the server's time, nanoseconds since the Unix epoch).
+`session` (id of the network session, which distinguishes two servers of one name), `run` (name of a
+durable run, which another process may have begun; else ""), `description`, `problems` (found by
+`smachpy.checks`), `base` (a `RunState` of the events that are no longer kept), `events` (the newest
+ones, as they were sent), `observed` (the newest records of <server>/smach/observed), `control`
+(paused and breakpoints; null if the server takes no commands), `now` (the server's time,
+nanoseconds since the Unix epoch).
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ OBSERVED_TOPIC = "/smach/observed"
 HISTORY_SERVICE = "/smach/history"
 
 QUEUED_EVENTS = 20_000
-"""Limit of the buffer: beyond it events are thinned out, which shows as gaps in `seq`."""
+"""Limit of the buffer; beyond it events are thinned out, which leaves gaps in `seq`."""
 
 KEPT_EVENTS = 5_000
-"""Events kept for viewers that join late, and events that may wait to be sent."""
+"""Number of events kept for viewers that join late, and number that may wait to be sent."""
 
 KEPT_BYTES = 8_000_000
 """Limit of both in bytes of text."""
@@ -65,17 +65,17 @@ _BEGINS = frozenset({Started.__name__, Recovered.__name__})
 class Feed:
     """Sends the description and the events of a machine, and keeps the newest events.
 
-    The machine only appends its events to a buffer; another thread encodes and sends them, so that
+    The machine only appends its events to a buffer. Another thread encodes and sends them, so that
     the machine never waits for the network.
 
     Args:
         server_name: First part of the topics' names.
-        machine: What is shown.
-        path: What to call it.
-        node: Where to send.
+        machine: The machine to show.
+        path: Its path for viewers.
+        node: Node that sends.
         control: The server of commands; None if the machine takes none.
-        robot: Tells what the robot's topics say; None listens to those below `node`'s name space.
-        earlier: Records of what another process did of the run that this one goes on with.
+        robot: Provides the data of the robot's topics; None for those in `node`'s namespace.
+        earlier: Records of earlier processes of the durable run that this one resumes.
         on_paths: Called with path -> kind of its newest event, for the events that were just sent.
     """
 
@@ -117,10 +117,11 @@ class Feed:
         self._node = node
         self._clock = current_clock()  # the machine's, by which its events are stamped
         self._values = serve_values(server_name, machine, path, node)
-        self._is_open = False  # the history may be asked for before the events are offered
+        # A viewer may ask for the history as soon as its service exists, before all is set up.
+        self._is_open = False
         self._buffer = machine.event_buffer(self._on_news, limit=QUEUED_EVENTS, name=path)
         self._robot = RobotTopics(node) if robot is None else robot
-        self._deaf: Callable[[], None] | None = None  # ends the listening to the robot
+        self._stop_listening: Callable[[], None] | None = None  # to the robot's topics
         self._watchers: set[str] = set()
         self._observed = Publisher(server_name + OBSERVED_TOPIC, String, node=node)
         self._presence = node.transport.watch_alive(
@@ -129,15 +130,14 @@ class Feed:
         self._history = Service(
             server_name + HISTORY_SERVICE, Trigger, self._answer, node=node, alone=False
         )
-        self._events = Publisher(
-            server_name + EVENTS_TOPIC, String, node=node
-        )  # viewers find machines by it
+        # Last, because viewers find machines by this topic.
+        self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)
         self._is_open = True
 
     def close(self) -> None:
-        """Send the events that still wait, then leave the topics.
+        """Send the waiting events, then leave the topics.
 
-        Blocks: 2 s at most.
+        Blocks: at most 2 s.
         """
         self._presence.close()
         self._watchers.clear()
@@ -146,7 +146,7 @@ class Feed:
         self._on_news()
         if not self._executor.join(STOP_S):
             with self._lock:
-                self._queue.clear()  # the network is stuck: give up
+                self._queue.clear()  # the network does not take them
             self._executor.join(STOP_S)
         self._descriptions.unregister()
         self._history.close()
@@ -155,7 +155,7 @@ class Feed:
         self._observed.unregister()
 
     def _on_watcher(self, presence: Presence) -> None:
-        """A viewer has come or gone: without one, nobody needs to know what the robot does."""
+        """Listen to the robot's topics only while a viewer subscribes to them here."""
         if presence.alive:
             self._watchers.add(presence.key)
         else:
@@ -163,19 +163,19 @@ class Feed:
         self._executor.submit(self._listen)
 
     def _listen(self) -> None:
-        if self._watchers and self._deaf is None:
-            self._deaf = self._robot.listen(
+        if self._watchers and self._stop_listening is None:
+            self._stop_listening = self._robot.listen(
                 lambda record: self._observed.publish(record_text(record))
             )
-        elif not self._watchers and self._deaf is not None:
-            self._deaf()
-            self._deaf = None
+        elif not self._watchers and self._stop_listening is not None:
+            self._stop_listening()
+            self._stop_listening = None
 
     def _on_news(self) -> None:
         self._executor.submit(self._work)
 
     def _work(self) -> None:
-        """Send new events; run again until there are none."""
+        """Send new events; submit itself again until there are none."""
         kinds = self._collect()
         self._on_paths(kinds)
         self._send()
@@ -209,14 +209,17 @@ class Feed:
             self._base.fold(old)
 
     def _enqueue(self, text: str) -> None:
-        """Queue an event for sending; a viewer that misses dropped ones asks for the history."""
+        """Queue an event for sending; drop the oldest ones if too many wait.
+
+        A viewer that notices the gap asks for the history.
+        """
         self._queue.append(text)
         self._queued_bytes += len(text)
         while len(self._queue) > KEPT_EVENTS or self._queued_bytes > KEPT_BYTES:
             self._queued_bytes -= len(self._queue.popleft())
 
     def _answer(self, _request: object) -> tuple[bool, str]:
-        """Answer with the history."""
+        """Return the history, for the service."""
         kinds = self._collect()
         if kinds:
             self._executor.submit(lambda: self._on_paths(kinds))

@@ -1,17 +1,17 @@
-"""What a robot's topics tell, as records for pages and recordings: without threads, time or I/O.
+"""Data of a robot's topics as records for pages and recordings; without threads, time or I/O.
 
-A record has `kind` "Observed", `path` "", `stamp_ns` (when it came, by the mission's clock),
-`robot` and `what`. `robot` stands in front of the topics' names below the mission's own name space:
-"" for its own robot. Poses are [x, y, yaw] in the map frame [m, m, rad]:
+A record has `kind` "Observed", `path` "", `stamp_ns` (its arrival, by the mission's clock), `robot`
+and `what`. `robot` is the prefix of the topics' names below the mission's own namespace: "" for its
+own robot. Poses are [x, y, yaw] in the map frame [m, m, rad]:
 
 - "pose": `at`, a pose.
 - "scan": `at`, the pose of the scanner; `first` and `step` [rad]; `ranges` [cm], -1 for nothing.
-- "plan": `points`, [x, y] in the map frame [m]; none when there is no plan any more.
+- "plan": `points`, [x, y] in the map frame [m]; empty when there is no plan any more.
 - "map": `resolution` [m], `width`, `height`, `origin`, a pose; `cells`, base64 of zlib of one byte
-  a cell, row 0 at the bottom: 0 free, 1 occupied, 2 unknown.
+  per cell, row 0 at the bottom: 0 free, 1 occupied, 2 unknown.
 - "value": `name`, `value`, `unit`.
-- "values": `topic`, its name below the mission's name space; `values`, number by path within its
-  message ("linear.x"). `robot` is "".
+- "values": `topic`, its name below the mission's namespace; `values`, path in the message
+  ("linear.x") -> number. `robot` is "".
 """
 
 from __future__ import annotations
@@ -44,25 +44,25 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     ),
     "sensor_msgs/BatteryState": ("battery", ("battery", "battery_state")),
 }
-"""Type of a topic -> what it tells, and the names that it usually has."""
+"""Type of a topic -> its role, and its usual names."""
 
 NUMBERS: Final = "numbers"
-"""What any other topic tells, if its messages are small (`is_small`); its name stands for the
+"""The role of any other topic with small messages (`is_small`); its name takes the place of the
 robot's."""
 
 POSE_S: Final = 0.2
-"""Between two poses of a robot that moves [s]."""
+"""Time between two records of the pose of a moving robot [s]."""
 SCAN_S: Final = 0.5
 VALUE_S: Final = 1.0
 NUMBERS_S: Final = 0.5
 MAP_S: Final = 2.0
-_NEAR_M, _NEAR_RAD = 0.01, 0.02  # a pose this near to the one before is the same
+_NEAR_M, _NEAR_RAD = 0.01, 0.02  # smaller changes of a pose are not recorded
 _MOST_RAYS: Final = 181
 _MOST_POINTS: Final = 200  # of a plan
 _MOST_CELLS: Final = 4_000_000  # a larger map is made coarser
-_OCCUPIED, _FREE = 65, 25  # [%] as map_saver of ROS draws the line
-_STANDS: Final = 1e-3  # [m/s] and [rad/s]: slower is at rest
-_MOST_FRAMES: Final = 32  # between a frame and the map
+_OCCUPIED, _FREE = 65, 25  # [%], the thresholds of ROS's map_saver
+_STANDS: Final = 1e-3  # [m/s] and [rad/s]: a slower robot is at rest
+_MOST_FRAMES: Final = 32  # between a frame and the map; a longer chain is a cycle
 _MOST_SCOPES: Final = 1000
 _MOST_NUMBERS: Final = 32  # of one message
 _MOST_ITEMS: Final = 8  # of an array
@@ -71,11 +71,11 @@ _BYTES: Final = frozenset({"uint8", "int8", "char", "byte", "octet"})
 
 
 def role_of(type_name: str, name: str) -> tuple[str, str] | None:
-    """Return what a topic tells and whose it is, None for a topic that is of no use here.
+    """Return the role of a topic and the robot to which it belongs; None if it has no role.
 
     Args:
         type_name: "nav_msgs/Odometry" or "nav_msgs/msg/Odometry".
-        name: Its name, no slash in front: "robot_0/odom".
+        name: Its name without a leading slash: "robot_0/odom".
     """
     role, names = TOPICS.get(type_name.replace("/msg/", "/"), ("", ()))
     for usual in sorted(names, key=len, reverse=True):
@@ -87,12 +87,12 @@ def role_of(type_name: str, name: str) -> tuple[str, str] | None:
 
 
 def is_small(message: Any) -> bool:
-    """Whether messages of this kind have numbers to plot, and none of their arrays can be long.
+    """Return whether messages of this kind have numbers to plot and no arrays that can be long.
 
-    Arrays of bytes and of messages can be, as in images, clouds and paths.
+    Arrays of bytes and of messages can be long: those of images, point clouds and paths.
 
     Args:
-        message: One with the values that it has when it is made.
+        message: A new message with default values.
     """
     kinds = list(_kinds(message))
     may_be_long = any(
@@ -102,7 +102,7 @@ def is_small(message: Any) -> bool:
 
 
 def _kinds(message: Any) -> Iterator[str]:
-    """Yield the types of a message's fields and of those within, but not of headers."""
+    """Yield the types of all fields of a message, nested ones too, except headers."""
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         value = getattr(message, name)
         if not hasattr(value, "_slot_types"):
@@ -112,7 +112,7 @@ def _kinds(message: Any) -> Iterator[str]:
 
 
 def _numbers(message: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """Yield path and value of each finite number, but not of headers and of long fixed arrays."""
+    """Yield path and value of each finite number, except in headers and long fixed arrays."""
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         value, here = getattr(message, name), f"{path}{name}"
         if hasattr(value, "_slot_types"):
@@ -131,26 +131,26 @@ def _is_finite(value: Any) -> bool:
 
 
 class Observer:
-    """Turns messages of topics into records, and leaves out what says nothing new.
+    """Converts messages of topics to records, and skips those that change nothing.
 
-    Poses are given in the map frame, as far as `tf` leads there; a frame of which `tf` says nothing
-    is taken for it.
+    Poses are converted to the map frame by means of `tf`; a frame that `tf` does not contain is
+    taken for the map frame.
     """
 
     def __init__(self) -> None:
         self._frames: dict[str, dict[str, tuple[str, Pose]]] = {}  # robot -> child -> parent, pose
         self._poses: dict[str, Pose] = {}
-        self._told: dict[tuple[str, str], tuple[int, Any]] = {}  # by what and robot
+        self._recorded: dict[tuple[str, str], tuple[int, Any]] = {}  # by `what` and robot
         self._localized: set[str] = set()
 
     def take(self, role: str, robot: str, message: Any, stamp_ns: int) -> list[dict[str, Any]]:
-        """Return the records that a message makes; of one that cannot be read, none.
+        """Return the records of a message; none if it has invalid numbers.
 
         Args:
-            role: What the topic tells, see `role_of`.
-            robot: Whose it is.
-            message: Of ROS 1 or ROS 2.
-            stamp_ns: When it came.
+            role: The topic's role, see `role_of`.
+            robot: The robot to which it belongs.
+            message: A message of ROS 1 or ROS 2.
+            stamp_ns: Its arrival.
         """
         make = getattr(self, f"_take_{role}")
         try:
@@ -165,11 +165,11 @@ class Observer:
                 }
                 for what, facts in make(robot, message, stamp_ns)
             ]
-        except (ArithmeticError, ValueError):  # no finite number where one is needed
+        except (ArithmeticError, ValueError):  # NaN or infinity
             return []
         return records
 
-    # -- one method for each role: they yield what is told, and its fields -----------------------
+    # -- one method for each role: they yield `what` and the fields of the record ----------------
 
     def _take_tf(self, robot: str, message: Any, _stamp_ns: int) -> Iterable[Any]:
         if robot not in self._frames and len(self._frames) >= _MOST_SCOPES:
@@ -190,7 +190,7 @@ class Observer:
         pose, frame = _pose_of(message.pose.pose), _plain(message.header.frame_id)
         placed = self._in_map(robot, frame, pose)
         if placed is None and robot in self._localized:
-            return  # odometry drifts: without a transform, what localizes the robot knows better
+            return  # odometry drifts; the localization's own pose is better
         twist = message.twist.twist
         at_rest = max(abs(twist.linear.x), abs(twist.linear.y), abs(twist.angular.z)) < _STANDS
         yield from self._pose(robot, placed or pose, stamp_ns, at_rest=at_rest)
@@ -198,14 +198,14 @@ class Observer:
     def _pose(
         self, robot: str, pose: Pose, stamp_ns: int, *, at_rest: bool
     ) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Where it stops is told at once, as nothing may come after it."""
+        """Yield the pose, at a limited rate; the place where it stops at once, as the last one."""
         self._poses[robot] = pose
-        told_ns, told = self._told.get(("pose", robot), (0, None))
+        told_ns, told = self._recorded.get(("pose", robot), (0, None))
         if told is not None and _is_near(told, pose):
             return
         if told is not None and not at_rest and stamp_ns - told_ns < POSE_S * 0.95e9:
             return
-        self._told["pose", robot] = stamp_ns, pose
+        self._recorded["pose", robot] = stamp_ns, pose
         yield "pose", {"at": _rounded(pose)}
 
     def _take_scan(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
@@ -238,16 +238,16 @@ class Observer:
             pose = _pose_of(stamped.pose)
             x, y, _ = self._in_map(robot, frame, pose) or pose
             points.append([round(x, 2), round(y, 2)])
-        if self._told.get(("plan", robot), (0, None))[1] != points:
-            self._told["plan", robot] = stamp_ns, points
+        if self._recorded.get(("plan", robot), (0, None))[1] != points:
+            self._recorded["plan", robot] = stamp_ns, points
             yield "plan", {"points": points}
 
     def _take_map(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
         info = message.info
         facts = grid_facts(message.data, info.width, info.resolution, _pose_of(info.origin))
-        told_ns, told = self._told.get(("map", robot), (0, None))
+        told_ns, told = self._recorded.get(("map", robot), (0, None))
         if facts != told and (told is None or stamp_ns - told_ns >= MAP_S * 1e9):
-            self._told["map", robot] = stamp_ns, facts
+            self._recorded["map", robot] = stamp_ns, facts
             yield "map", facts
 
     def _take_numbers(self, topic: str, message: Any, stamp_ns: int) -> Iterator[Any]:
@@ -264,16 +264,16 @@ class Observer:
             yield "value", {"name": "battery", "value": round(100 * part, 2), "unit": "%"}
 
     def _is_due(self, what: str, robot: str, stamp_ns: int, seconds: float) -> bool:
-        told_ns, _ = self._told.get((what, robot), (None, None))
+        told_ns, _ = self._recorded.get((what, robot), (None, None))
         if told_ns is not None and stamp_ns - told_ns < seconds * 0.95e9:
             return False
-        self._told[what, robot] = stamp_ns, None
+        self._recorded[what, robot] = stamp_ns, None
         return True
 
     # -- frames ----------------------------------------------------------------------------------
 
     def _in_map(self, robot: str, frame: str, pose: Pose) -> Pose | None:
-        """Return a pose of `frame` in the map frame, None when `tf` does not lead there."""
+        """Return a pose of `frame` in the map frame; None if `tf` has no chain to it."""
         known = {**self._frames.get("", {}), **self._frames.get(robot, {})}
         for _ in range(_MOST_FRAMES):
             if frame == "map" or frame.endswith("/map"):
@@ -286,7 +286,7 @@ class Observer:
 
 
 def grid_facts(data: Any, width: int, resolution: float, origin: Pose) -> dict[str, Any]:
-    """Return the fields of a record of an occupancy grid.
+    """Return the fields of the record of an occupancy grid.
 
     Args:
         data: The cells row by row from the bottom: 0 free to 100 occupied, -1 unknown.
@@ -295,7 +295,7 @@ def grid_facts(data: Any, width: int, resolution: float, origin: Pose) -> dict[s
         origin: Pose of the lower left corner in the map frame.
 
     Raises:
-        ValueError: the cells are no whole rows, or a cell has no size.
+        ValueError: the number of cells is not a multiple of `width`, or the resolution is not > 0.
     """
     import numpy as np
 
@@ -317,7 +317,7 @@ def grid_facts(data: Any, width: int, resolution: float, origin: Pose) -> dict[s
 
 
 def map_record(facts: dict[str, Any]) -> dict[str, Any]:
-    """Return the record of a map that holds from the beginning, until a topic tells another."""
+    """Return the record of the initial map, valid until a topic sends another one."""
     return {
         "kind": KIND,
         "path": "",
@@ -341,7 +341,7 @@ def _finite(*values: float) -> tuple[float, ...]:
 
 
 def _yaw(turn: Any) -> float:
-    """The turn about the vertical axis [rad] of a quaternion."""
+    """Return the rotation about the vertical axis [rad] of a quaternion."""
     x, y, z, w = turn.x, turn.y, turn.z, turn.w
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
@@ -352,7 +352,7 @@ def _pose_of(message: Any) -> Pose:
 
 
 def _compose(frame: Pose, pose: Pose) -> Pose:
-    """Return a pose that is given in a frame in the one in which the frame is given."""
+    """Transform `pose`, given in `frame`, to the parent of `frame`."""
     x, y, yaw = frame
     c, s = math.cos(yaw), math.sin(yaw)
     return x + c * pose[0] - s * pose[1], y + s * pose[0] + c * pose[1], yaw + pose[2]

@@ -15,8 +15,8 @@ viewers):
 
 A path is absolute and begins with the machine's name as viewers show it ("/JOB/A"). `running` is
 "keep" or "cancel", as for `Control.pause`. An answer has `ok`, `text` (the reason of a refusal),
-`paused` and `breakpoints` (pairs path, outcome) right after the command; the current values are
-those of the newest `control_state`.
+and `paused` and `breakpoints` (pairs path, outcome) as they are right after the command; the
+present values are those of the newest `control_state`.
 """
 
 from __future__ import annotations
@@ -75,15 +75,15 @@ class CommandError(SmachError):
 
 
 class ControlServer:
-    """Carries out commands from the network.
+    """Executes commands from the network.
 
     Args:
         server_name: First part of the names.
-        machine: What to control.
-        path: What the machine is called in commands.
-        node: Where it listens.
+        machine: The machine to control.
+        path: Its path in commands.
+        node: Node that takes them.
 
-    Threads: commands are carried out one after another, in threads of the node's clock.
+    Threads: commands are executed one after another, in threads of the node's clock.
     """
 
     def __init__(self, server_name: str, machine: Container, path: str, node: Node) -> None:
@@ -101,14 +101,17 @@ class ControlServer:
         self._executor.submit(self._publish_state)
 
     def close(self) -> None:
-        """Take no more commands; a second call does nothing."""
+        """Stop taking commands; may be called twice."""
         self._forget()
         self._service.close()
         self._executor.join(ANSWER_S)
         self._states.unregister()
 
     def _publish_state(self) -> None:
-        """Publish after every change, even to the same values: an answer may have shown others."""
+        """Publish the state after a change, even if the values are the same.
+
+        An answer that was sent in between may have had other ones.
+        """
         self._states.publish(json.dumps(self.state()))
 
     def state(self) -> dict[str, Any]:
@@ -184,7 +187,7 @@ class ControlServer:
         return found
 
     def _find(self, path: str) -> Any:
-        """Return the state at an absolute path, None when there is none."""
+        """Return the state at an absolute path, or None."""
         root = self._root()
         return find_state(self._machine, path.removeprefix(root)) if _is_in(root, path) else None
 
@@ -192,7 +195,7 @@ class ControlServer:
         return f"/{self._machine.name or 'SM_ROOT'}"
 
     def _own(self, path: str) -> str:
-        """Return a command's path as the machine calls it."""
+        """Return a command's path with the machine's own name."""
         return _moved(path, self._path, self._root())
 
     def _shown(self, path: str) -> str:
@@ -213,7 +216,7 @@ class ControlClient:
 
     Args:
         server_name: The server.
-        node: Where.
+        node: The node to use.
     """
 
     def __init__(self, server_name: str, node: Node) -> None:
@@ -224,7 +227,7 @@ class ControlClient:
         )
 
     def close(self) -> None:
-        """End calls that wait; a second call does nothing."""
+        """End calls that wait; may be called twice."""
         self._service.close()
 
     def send(self, command: dict[str, Any]) -> dict[str, Any]:
@@ -233,7 +236,7 @@ class ControlClient:
         Raises:
             CommandError: the command is wrong, or nobody answers.
 
-        Blocks: until the answer, `ANSWER_S` at most.
+        Blocks: until the answer, at most `ANSWER_S`.
         """
         text = json.dumps({"by": self._by, **command})
         parse_command(text)
@@ -247,10 +250,10 @@ class ControlClient:
 
 
 def parse_command(text: str) -> dict[str, Any]:
-    """Return the command that `text` is.
+    """Parse the text of a command.
 
     Raises:
-        CommandError: it is none; names what is missing.
+        CommandError: it is not a command, or an argument is missing.
     """
     try:
         command = json.loads(text)

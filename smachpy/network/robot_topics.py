@@ -1,4 +1,4 @@
-"""Listens to the topics of the robots that a mission drives, for those who watch the mission."""
+"""Subscribes to the topics of the robots that a mission drives, for viewers and recordings."""
 
 from __future__ import annotations
 
@@ -28,39 +28,41 @@ if TYPE_CHECKING:
 logger = logging.getLogger("smachpy")
 
 KEPT: Final = 20_000
-"""So many records are kept for those who come later, besides the newest maps."""
+"""Number of records kept for viewers that join late, besides the newest maps."""
 
 KEPT_BYTES: Final = 8_000_000
-"""So much text of them at most."""
+"""Limit of their text [bytes]."""
 
 MOST_TOPICS: Final = 400
-"""So many topics are listened to at most."""
+"""Maximum number of topics to which it subscribes."""
 
 
 CLOSE_S: Final = 1.0
 _HAVE_NUMBERS: Final = frozenset({"battery", "odometry"})
-"""Roles of topics whose numbers are told as well: voltage, speed."""
+"""Roles of topics whose numbers are recorded as well: voltage, speed."""
 
 
 class RobotTopics:
-    """Tells what robots' topics say, while somebody wants to know: poses, scans, plans, maps, ...
+    """Provides data of robots' topics to listeners: poses, scans, plans, maps, ...
 
-    It listens to topics with the types and names of `observations.TOPICS` below the node's name
-    space, to every other topic there whose messages are small and have numbers, and to `/map` and
-    `/tf`, over every wire that the node's configuration names. A context manager.
+    While it has a listener, it subscribes to topics with the types and names of
+    `observations.TOPICS` in the node's namespace, to every other topic there whose messages are
+    small and have numbers, and to `/map` and `/tf`, over every wire that the node's configuration
+    names. A context manager.
 
     Args:
-        node: Where, and by whose clock; the node in force when None.
+        node: The node, whose clock is used too; None for the current node.
 
     Threads: every method may be called from any thread. Listeners are called in threads of the
-        node's clock, one at a time; what one raises is given to `threading.excepthook`.
+        node's clock, one at a time; an exception of a listener goes to `threading.excepthook`.
     """
 
     def __init__(self, node: Node | None = None) -> None:
         self._node = get_node() if node is None else node
         self._lock = threading.Lock()
-        # Around calls of listeners, so that records keep their order. A listener may leave.
-        self._telling = threading.RLock()
+        # Held while listeners are called, so that records keep their order. Re-entrant, because a
+        # listener may end its own subscription.
+        self._calling = threading.RLock()
         self._executor = SerialExecutor(self._node.clock, "robot topics")
         self._observer = Observer()
         self._listeners: list[Callable[[dict[str, Any]], object]] = []
@@ -80,11 +82,11 @@ class RobotTopics:
         self.close()
 
     def listen(self, listener: Callable[[dict[str, Any]], object]) -> Callable[[], None]:
-        """Tell `listener` everything from now on; returns how to end that.
+        """Call `listener` with each record from now on; return a function that ends it.
 
         Records are numbered from 1 in `n`; see `observations` for their other fields, and `kept`.
-        What ends it waits for a call that is under way, 1 s at most: what the listener uses can
-        be closed then.
+        The returned function waits for a running call, at most 1 s, so that whatever the listener
+        uses can be closed afterwards.
 
         Raises:
             TransportError: the network of a ROS 2 robot cannot be joined.
@@ -99,7 +101,7 @@ class RobotTopics:
         return partial(self._leave, listener)
 
     def kept(self) -> list[dict[str, Any]]:
-        """Return the newest records, and the newest map of every robot, oldest first."""
+        """Return the newest records and the newest map of each robot, oldest first."""
         with self._lock:
             first = self._kept[0][0]["n"] if self._kept else self._count + 1
             maps = sorted(self._maps.values(), key=lambda one: one["n"])
@@ -109,9 +111,9 @@ class RobotTopics:
             ]
 
     def close(self) -> None:
-        """Listen to nothing any more; a second call does nothing.
+        """End all subscriptions; may be called twice.
 
-        Blocks: until what is under way is done, 1 s at most.
+        Blocks: until running calls are done, at most 1 s.
         """
         with self._lock:
             self._listeners.clear()
@@ -130,8 +132,8 @@ class RobotTopics:
         self._wait_for_calls()
 
     def _wait_for_calls(self) -> None:
-        if self._telling.acquire(timeout=CLOSE_S):
-            self._telling.release()
+        if self._calling.acquire(timeout=CLOSE_S):
+            self._calling.release()
 
     def _begin(self) -> None:
         node = self._node
@@ -158,18 +160,18 @@ class RobotTopics:
             self._on_end(end, presence.key, presence.alive)
 
     def _on_end(self, end: Endpoint, key: str, alive: bool) -> None:
-        """A publisher has come or gone; called on the network's threads, so nothing waits here."""
+        """Handle a publisher that has appeared or gone; on the network's threads, so no waiting."""
         if end.kind is not Kind.PUBLISHER or self._scope(end) is None:
             return
         self._executor.submit(partial(self._change, end, key, alive=alive))
 
     def _scope(self, end: Endpoint) -> tuple[str, str] | None:
-        """What a topic tells and of which robot, None if it is none of this mission's."""
+        """Return the role and the robot of a topic; None if it does not belong to this mission."""
         space = self._node.namespace.strip("/")
         inside = not space or end.name.startswith(f"{space}/")
         if not inside and end.name not in {"map", "tf", "tf_static"}:
             return None
-        # Whose it is, is said with the whole name, as events say which action a goal was sent to.
+        # The robot is named with the namespace, as the actions in events are.
         found = role_of(end.type, end.name)
         return found or ((NUMBERS, self._inside(end.name)) if inside else None)
 
@@ -201,8 +203,9 @@ class RobotTopics:
             )
         except ActionlibError as error:
             level = logging.DEBUG if scope[0] == NUMBERS else logging.WARNING
-            logger.log(level, "robot topics: %s", error)  # of types that nobody here knows, too
+            logger.log(level, "robot topics: %s", error)  # an unknown type, for instance
             return
+        # The last listener, or another publisher's event, may have come in between.
         with self._lock:
             spare = made if end.name in self._topics or not self._listeners else None
             if spare is None:
@@ -222,7 +225,7 @@ class RobotTopics:
 
     def _on_message(self, role: str, robot: str, topic: str, message: Any) -> None:
         stamp_ns = self._node.clock.time_ns()
-        with self._telling:
+        with self._calling:
             with self._lock:
                 records = self._observer.take(role, robot, message, stamp_ns)
                 if role in _HAVE_NUMBERS:

@@ -3,8 +3,8 @@
 For every container, on SMACH's topics, as smach_msgs:
 
     <server>/smach/container_structure   its children and transitions, latched
-    <server>/smach/container_status      what is active, and its userdata, latched
-    <server>/smach/container_init        commands that choose where the next run begins
+    <server>/smach/container_status      its active states and userdata, latched
+    <server>/smach/container_init        commands that set the initial state of the next run
 
 and for the machine as a whole, in JSON:
 
@@ -77,15 +77,15 @@ STATUS_INTERVAL_S = 0.05
 READ_TRIES = 5
 
 LONGEST_VALUE = 10_000
-"""Of userdata values with more elements only the size is sent."""
+"""For userdata values with more elements only the size is sent."""
 
 
 class _Topics:
     """The topics of structure and status, with a latched message for each container.
 
     Attributes:
-        clock: Of the node.
-        executor: Sends.
+        clock: The node's clock.
+        executor: Its thread sends.
 
     Threads: each container's messages come from one thread at a time.
     """
@@ -94,7 +94,7 @@ class _Topics:
         self.clock = node.clock
         self.executor = SerialExecutor(node.clock, f"introspection {server_name}")
         self._transport = node.transport
-        self._ends: dict[Any, Publisher] = {  # make the server known
+        self._ends: dict[Any, Publisher] = {  # clients find the server by these
             kind: Publisher(server_name + topic, kind, node=node)
             for kind, topic in (
                 (SmachContainerStructure, STRUCTURE_TOPIC),
@@ -132,16 +132,16 @@ class ContainerProxy:
 
     Args:
         server_name: First part of the topics' names.
-        container: What to show.
-        path: What to call it, "/SM_ROOT/DRIVE".
-        update_rate: For SMACH's signature; there are no heartbeats here.
-        node: Where to send; the current node when None.
+        container: The container to show.
+        path: Its path for viewers, "/SM_ROOT/DRIVE".
+        update_rate: Ignored; from SMACH's signature. Here messages are sent on change only.
+        node: Node that sends; None for the current node.
 
     Attributes:
-        path: What the container is called.
+        path: See above.
 
     Raises:
-        InvalidStateError: `container` is none, or a name is no text.
+        InvalidStateError: `container` is not a container, or a name is not a string.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class ContainerProxy:
         self._sent: dict[str, Any] = {}
 
     def start(self) -> None:
-        """Begin to show the container and to take commands; a second call does nothing."""
+        """Start to show the container and to take commands; may be called twice."""
         if self._topics is not None:
             return
         node = get_node() if self._node is None else self._node
@@ -179,14 +179,16 @@ class ContainerProxy:
         self._commands = Subscriber(
             self._server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self.obey, node=node
         )
-        self._forget = node.on_close(self.stop)  # the newest are closed first: before our topics
+        # A node closes the newest first, so `stop` can still use the topics.
+        self._forget = node.on_close(self.stop)
 
     def show(self, topics: _Topics, *, listen: bool = True) -> None:
         """Send structure and status on `topics`, now and after every change.
 
         Args:
-            topics: Where to send.
-            listen: Listen for changes; if False, the caller calls `mark` after each.
+            topics: The topics to use.
+            listen: Watch the container's events; if False, the caller calls `mark` after each
+                change.
         """
         self._topics = topics
         self._updated = topics.clock.now() - STATUS_INTERVAL_S
@@ -195,7 +197,8 @@ class ContainerProxy:
             self._buffer = self._container.event_buffer(self.mark, limit=1)
 
     def mark(self, kind: str = "") -> None:
-        """Send changes soon; `kind` is the event that made them, "" if the buffer has it."""
+        """Send changes soon; `kind` is the event behind them, "" if the buffer has it."""
+        # Limited to one message each STATUS_INTERVAL_S: changes in between are merged into one.
         with self._lock:
             self._info = kind or self._info
             topics = self._topics
@@ -214,7 +217,7 @@ class ContainerProxy:
         self._update(topics)
 
     def stop(self) -> None:
-        """Send the last status and leave the topics; a second call does nothing."""
+        """Send the last status and leave the topics; may be called twice."""
         with self._lock:
             topics, self._topics = self._topics, None
         if topics is None:
@@ -234,10 +237,10 @@ class ContainerProxy:
             self._own_topics = None
 
     def obey(self, command: Any) -> bool:
-        """Carry out a SmachContainerInitialStatusCmd; return whether it was for this container.
+        """Execute a SmachContainerInitialStatusCmd; return whether it was for this container.
 
         The answer is a status whose `info` begins with the command's request id (the entry "$id" of
-        its userdata, if any) and goes on with "REMOTE_INIT", or "REMOTE_INIT_REFUSED: " and why.
+        its userdata, if any), followed by "REMOTE_INIT", or "REMOTE_INIT_REFUSED: " and the reason.
         """
         if command.path != self.path:
             return False
@@ -257,7 +260,7 @@ class ContainerProxy:
         return True
 
     def _update(self, topics: _Topics) -> None:
-        """Send what has changed."""
+        """Send structure and status if they have changed."""
         while self._buffer is not None and (records := self._buffer.read()):
             self._info = records[-1]["kind"]
         structure = self._describe_structure()
@@ -296,7 +299,7 @@ class ContainerProxy:
 
 
 def _checked(where: str, server_name: Any, argument: str, container: Any, path: Any) -> Container:
-    """Check what a proxy or server is made of, and return the container."""
+    """Check the arguments of a proxy or server, and return the container."""
     problems = Problems(f"{where} {server_name!r}")
     problems.word("server_name", server_name)
     if not isinstance(container, Container):
@@ -309,11 +312,11 @@ def _checked(where: str, server_name: Any, argument: str, container: Any, path: 
 
 def _describe_userdata(userdata: UserData) -> str:
     """Return userdata as JSON, while states may be changing it in other threads."""
-    values = dict(data_of(userdata))  # at once, so that no key vanishes meanwhile
+    values = dict(data_of(userdata))  # an atomic copy
     for _ in range(READ_TRIES):
         try:
             return dumps(values, longest=LONGEST_VALUE)
-        except RuntimeError:  # a dict or set has changed its size while it was read
+        except RuntimeError:  # a state changed the size of a dict or set meanwhile: try again
             continue
     return dumps({key: f"<{type(value).__name__} that changes>" for key, value in values.items()})
 
@@ -324,19 +327,19 @@ class IntrospectionServer:
     Args:
         server_name: First part of the topics' names.
         state: The machine.
-        path: What to call it, "/SM_ROOT".
-        obey: Take commands that choose the initial state; False only shows.
-        control: Take all the commands of `machine.control`, from everybody on the network.
-        node: Where to send; the current node when None.
-        robot: Tells viewers what the robot's topics say; None: what is said below `node`'s name
-            space, while somebody looks.
-        earlier: Records of what another process did of the run that this one goes on with.
+        path: Its path for viewers, "/SM_ROOT".
+        obey: Take commands that set the initial state.
+        control: Take all commands of `machine.control`, from anybody on the network.
+        node: Node that sends; None for the current node.
+        robot: Provides the data of the robot's topics; None for those in `node`'s namespace, while
+            somebody watches.
+        earlier: Records of earlier processes of the durable run that this one resumes.
 
     Raises:
-        InvalidStateError: `state` is no container, or a name is no text.
+        InvalidStateError: `state` is not a container, or a name is not a string.
 
-    Threads: `start` and `stop` by their caller; messages are sent in a thread of their own, so that
-        the machine never waits for the network.
+    Threads: messages are sent in a thread of their own, so that the machine never waits for the
+        network.
     """
 
     def __init__(
@@ -365,7 +368,7 @@ class IntrospectionServer:
         self._parts: ExitStack | None = None
 
     def start(self) -> None:
-        """Begin to show the machine; a second call does nothing."""
+        """Start to show the machine; may be called twice."""
         if self._parts is not None:
             return
         node = self._node = get_node() if self._node is None else self._node
@@ -398,13 +401,13 @@ class IntrospectionServer:
             self._parts = parts.pop_all()
 
     def stop(self) -> None:
-        """Send the last status and leave the topics; a second call does nothing."""
+        """Send the last status and leave the topics; may be called twice."""
         parts, self._parts = self._parts, None
         if parts is not None:
             parts.close()
 
     def construct(self, server_name: str, state: State, path: str) -> None:
-        """Make the proxies of a container and of all below it; `start` does it."""
+        """Make the proxies of a container and of all containers below it; `start` calls it."""
         if not isinstance(state, Container):
             return
         self._proxies.append(ContainerProxy(server_name, state, path, node=self._node))
@@ -412,13 +415,13 @@ class IntrospectionServer:
             self.construct(server_name, child, f"{path}/{label}")
 
     def clear(self) -> None:
-        """Stop the proxies and forget them."""
+        """Stop and remove the proxies."""
         for proxy in self._proxies:
             proxy.stop()
         self._proxies.clear()
 
     def _mark(self, kinds: dict[str, str]) -> None:
-        """Let the containers at the paths in `kinds`, and above them, send what has changed."""
+        """Let the containers at the paths in `kinds`, and those above, send their changes."""
         touched: dict[str, str] = {}
         for path, kind in kinds.items():
             while path:

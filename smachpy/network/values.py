@@ -34,13 +34,13 @@ string text       # the value; without success, why there is none
 
 
 def serve_values(server_name: str, machine: Container, path: str, node: Node) -> Service:
-    """Offer the service that returns the current value of a key of a container's userdata.
+    """Start the service that returns the current value of a key of a container's userdata.
 
     Args:
         server_name: First part of the service's name.
-        machine: Whose userdata.
-        path: What the machine is called in the paths of requests.
-        node: Where to offer it.
+        machine: The machine with the userdata.
+        path: Its path in requests.
+        node: Node of the service.
 
     Threads: values are formatted while the machine runs. A value that changes at that moment may
         show a mix of old and new parts, or the error that this caused.
@@ -57,17 +57,17 @@ def serve_values(server_name: str, machine: Container, path: str, node: Node) ->
             return False, f"{request.container}: {request.key!r} is not there any more."
         try:
             return True, value_text(value)
-        except Exception as error:  # noqa: BLE001  a repr may raise anything
+        except Exception as error:  # noqa: BLE001  the user's `__repr__`
             return False, f"{type(value).__name__}: its repr raised {type(error).__name__}: {error}"
 
     return Service(server_name + VALUE_SERVICE, ReadValue, answer, node=node, alone=False)
 
 
 def value_text(value: Any) -> str:
-    """Return a value for people: text as it is, messages as YAML, all else as Python.
+    """Return a value for people: text unchanged, messages as YAML, anything else as its `repr`.
 
     Raises:
-        Exception: whatever the value's `repr` does.
+        Exception: from the value's `repr`.
     """
     if isinstance(value, (str, Message)):
         text = str(value)
@@ -79,9 +79,9 @@ def value_text(value: Any) -> str:
 
 
 def find_state(state: Any, path: str) -> Any:
-    """Return the state at `path` below `state` ("/A/B"; "" is `state` itself), None for none.
+    """Return the state at `path` below `state` ("/A/B"; "" is `state` itself), or None.
 
-    Labels may have slashes in them.
+    Labels may contain slashes, so the path is compared with the labels instead of being split.
     """
     if not path:
         return state
