@@ -1,4 +1,4 @@
-"""What runs in this context, as far as errors need to know: below everything else."""
+"""The state that runs in this context; imported by all rooms, imports none of them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 THREAD: ContextVar[Any] = ContextVar("smachpy_thread", default=None)
 """The `smachpy.run.frame.Frame` with which the thread of this context begins, or None.
 
-Entering a container changes its attribute `innermost`, which takes a sixth of the time that a
-context variable does.
+Entering a container changes the attribute `innermost` of that frame, which takes a sixth of the
+time of setting a context variable.
 """
 
 

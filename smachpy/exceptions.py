@@ -1,19 +1,19 @@
-"""Every exception of smachpy; the data of each error is on the object too.
+"""All exceptions of smachpy; the data of each error are attributes as well.
 
     Exception
      +-- SmachError
-          +-- InvalidConstructionError   a container is built in a way that cannot work
+          +-- InvalidConstructionError   a container is built in a wrong way
           +-- InvalidStateError          a state, its label or its options are wrong
-          |    +-- InconsistentMachineError  a finished machine does not hold together
-          +-- InvalidTransitionError     an outcome or a target that does not exist
+          |    +-- InconsistentMachineError  a finished machine has problems
+          +-- InvalidTransitionError     an outcome or a target does not exist
           |    +-- InconsistentMachineError
-          +-- MissionError               what a mission or a command is given is wrong
+          +-- MissionError               a mission or a command got wrong arguments or files
           +-- InvalidUserCodeError       a state or a callback raised; see `path` and `__cause__`
-               +-- UserDataKeyError      a key was not declared or is not there (KeyError too)
+               +-- UserDataKeyError      a key is not declared or has no value (KeyError too)
                +-- UserDataTypeError     a value does not fit its typed field (TypeError too)
                +-- ReadOnlyError         an input-only value was changed (TypeError too)
 
-Exceptions never write to a log; who handles one decides.
+Exceptions are never logged where they are raised; the code that handles them decides.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ class SmachError(Exception):
 
 
 class MissionError(SmachError):
-    """What a mission, a command or the simulated robot was given is wrong, or it cannot do it."""
+    """A mission, command or simulated robot got wrong arguments or files, or cannot proceed."""
 
 
 class InvalidConstructionError(SmachError):
-    """A container is built in a way that cannot work."""
+    """A container is built in a wrong way."""
 
 
 class InvalidStateError(SmachError):
@@ -65,7 +65,7 @@ class InvalidTransitionError(SmachError):
 
 
 class InconsistentMachineError(InvalidTransitionError, InvalidStateError):
-    """A machine does not hold together; all its problems at once.
+    """A machine has problems; with all of them.
 
     Attributes:
         problems: One text per problem, "path: what: got …; expected …".
@@ -120,7 +120,7 @@ class UserDataTypeError(InvalidUserCodeError, TypeError):
 
     Attributes:
         key: The field.
-        value: What was written.
+        value: The value that was written.
         expected: The annotated type.
     """
 

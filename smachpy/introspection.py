@@ -1,8 +1,7 @@
-"""The structure of a machine as data: the only thing that pictures and viewers read.
+"""The structure of a machine as data, for pictures and viewers.
 
-`describe` walks a machine and returns one recursive, immutable record, which survives a round
-trip through JSON. The live side is the event stream (`smachpy.events`), whose paths are the paths
-of these records.
+`describe` walks a machine and returns one recursive, immutable record, which survives a round trip
+through JSON. Events (`smachpy.events`) describe a run; their paths are the paths of these records.
 """
 
 from __future__ import annotations
@@ -66,9 +65,9 @@ class TransitionRecord:
         source: Label of the child that the edge leaves.
         outcome: Outcome of that child.
         target: Label of another child, or an outcome of the container.
-        target_is_outcome: Which of the two `target` is.
-        implicit: The user did not write the edge: an outcome that falls through to the container
-            outcome of the same name.
+        target_is_outcome: Whether `target` is an outcome.
+        implicit: The user did not write the edge: it leads to the container's outcome of the same
+            name.
     """
 
     source: str
@@ -80,7 +79,7 @@ class TransitionRecord:
 
 @dataclass(frozen=True, slots=True)
 class RuleRecord:
-    """How a container derives an outcome from its children's outcomes.
+    """A rule by which a container derives its outcome from its children's outcomes.
 
     Attributes:
         outcome: Outcome of the container.
@@ -102,7 +101,7 @@ class PlaceRecord:
         name: Its label.
         tokens: Its tokens in the initial marking.
         child: Label of the child that runs while the place is marked, or "".
-        role: What it is to the plan.
+        role: Its role in the plan.
     """
 
     id: str
@@ -119,10 +118,10 @@ class NetTransitionRecord:
     Attributes:
         id: Its id.
         name: Its label.
-        guard: What has to hold, as text, or "".
+        guard: Its condition as text, or "".
         calls: Pairs (label of a child, what happens to it: "start", "end", "interrupt", ...).
-        inputs: Pairs (id of a place, weight) that it takes from.
-        outputs: Pairs (id of a place, weight) that it gives to.
+        inputs: Pairs (id of a place, weight) from which it takes tokens.
+        outputs: Pairs (id of a place, weight) to which it gives tokens.
     """
 
     id: str
@@ -151,9 +150,9 @@ class StateRecord:
     """One state, with everything below it.
 
     Attributes:
-        path: Absolute path ("/PATROL/DRIVE"); the root's is "/" and its name.
+        path: Absolute path ("/PATROL/DRIVE"); that of the root is "/" and its name.
         label: Last part of the path.
-        kind: What sort of state it is.
+        kind: Kind of state.
         type_name: Class name.
         outcomes: Registered outcomes, in the order of their declaration.
         input_keys: Userdata keys it may read.
@@ -165,7 +164,7 @@ class StateRecord:
         initial: Labels of the children that run first.
         transitions: Edges between the children and to the outcomes.
         rules: Outcome rules of a concurrence, loop rules of an iterator.
-        default_outcome: Outcome of a concurrence when no rule holds.
+        default_outcome: Outcome of a concurrence if no rule holds.
         net: The net of a plan.
     """
 
@@ -188,7 +187,7 @@ class StateRecord:
 
     @property
     def is_container(self) -> bool:
-        """Whether it is of a kind that has children."""
+        """Whether its kind can have children."""
         return self.kind in {"machine", "sequence", "concurrence", "iterator", "plan"}
 
     def walk(self) -> Iterator[StateRecord]:
@@ -208,7 +207,7 @@ class StateRecord:
         """Rebuild a record from `to_json` text.
 
         Raises:
-            ValueError: The text is no JSON, or not of this shape; names the path of the bad field.
+            ValueError: The text is not JSON, or a field is wrong; with the path of that field.
         """
         import json
 
@@ -217,7 +216,7 @@ class StateRecord:
 
 
 class Described(Protocol):
-    """What `describe` asks a state."""
+    """The methods of a state that `describe` uses."""
 
     _smachpy_is_container: ClassVar[bool]
 
@@ -230,7 +229,7 @@ class Described(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """What a container adds to its record; returned by `Container.describe_structure`."""
+    """A container's part of its record; returned by `Container.describe_structure`."""
 
     children: tuple[tuple[str, Described, tuple[tuple[str, str], ...]], ...] = ()
     initial: tuple[str, ...] = ()
@@ -242,7 +241,7 @@ class Structure:
 
 
 def describe(machine: Described, *, name: str | None = None) -> StateRecord:
-    """Return the structure of `machine`, without running it; inconsistent machines too.
+    """Return the structure of `machine` without running it, even if it has problems.
 
     Args:
         machine: Any state; a container is described with all its descendants.
@@ -292,14 +291,15 @@ def _describe(
 
 def _first_paragraph(state: Described) -> str:
     cls = type(state)
-    if cls.__module__.partition(".")[0] == "smachpy":  # the library's own texts say nothing new
+    # The docstrings of the library's own classes say nothing about this mission.
+    if cls.__module__.partition(".")[0] == "smachpy":
         return ""
     doc = cls.__dict__.get("__doc__") or ""
     return " ".join(doc.strip().split("\n\n")[0].split())
 
 
 def _rebuilt(kind: Any, data: Any, where: str) -> Any:
-    """Return the value of the annotated type `kind` that JSON gave back as `data`."""
+    """Convert `data`, read from JSON, to the annotated type `kind`."""
     arguments = get_args(kind)
     if NetRecord in arguments and data is not None:  # "or None"
         kind = NetRecord

@@ -21,11 +21,11 @@ _STANDARD = (_logger.info, _logger.warning, _logger.debug, _logger.error)
 
 
 class Messages:
-    """The functions for messages in force; what runs machines calls them directly.
+    """The current functions for messages; the library calls them directly.
 
     Attributes:
-        logger: The standard library's logger, to which messages go by default.
-        are_own: They go to functions of the program instead.
+        logger: The standard library's logger, the default.
+        are_own: The functions are the program's own.
     """
 
     __slots__ = ("are_own", "debug", "error", "info", "logger", "warn")
@@ -34,13 +34,13 @@ class Messages:
         self.use(_STANDARD)
 
     def use(self, functions: tuple[Callable[[str], object], ...]) -> None:
-        """Send messages to these from now on."""
+        """Set the functions."""
         self.info, self.warn, self.debug, self.error = functions
         self.are_own = functions != _STANDARD
         self.logger = _logger
 
     def all(self) -> tuple[Callable[[str], object], ...]:
-        """Return them, in the order in which `set_loggers` takes them."""
+        """Return them in the order of the arguments of `set_loggers`."""
         return self.info, self.warn, self.debug, self.error
 
 
@@ -53,7 +53,7 @@ def set_loggers(
     debug: Callable[[str], object],
     error: Callable[[str], object],
 ) -> None:
-    """Send the four kinds of messages to these functions; mind the order of the arguments.
+    """Set the functions for the four kinds of messages; note the order of the arguments.
 
     Raises:
         InvalidStateError: one of them cannot be called.
@@ -66,17 +66,17 @@ def set_loggers(
 
 
 def current_loggers() -> tuple[Callable[[str], object], ...]:
-    """Return the functions in force, in the order in which `set_loggers` takes them."""
+    """Return the current functions in the order of the arguments of `set_loggers`."""
     return MESSAGES.all()
 
 
 def loginfo(msg: str) -> None:
-    """Log what the machine does."""
+    """Log information about a run."""
     MESSAGES.info(msg)
 
 
 def logwarn(msg: str) -> None:
-    """Log something that is probably not meant so."""
+    """Log a probable mistake."""
     MESSAGES.warn(msg)
 
 

@@ -1,4 +1,4 @@
-"""`@smachpy.mission(...)`: what `smachpy run` has to know of a mission's function."""
+"""`@smachpy.mission(...)`: facts about a mission's function for `smachpy run`."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ _ATTRIBUTE: Final = "_smachpy_mission"
 
 @dataclass(frozen=True, slots=True)
 class MissionInfo:
-    """What `@smachpy.mission` was told.
+    """The arguments of `@smachpy.mission`.
 
     Attributes:
         serves: Names of the actions that the mission serves itself.
-        world: The world file that `smachpy run --start-robot` takes; None: only a robot.
-        real_time: Why the mission cannot run in virtual time; "" when it can.
-        robots: Whether the mission starts its robots, or the parameter that says so.
-        max_outage: How old its journal may be for a durable run to go on by itself [s]; None: any.
-        migrations: Says which paths of its machine have changed, or None.
+        world: The world file for `smachpy run --start-robot`; None for a robot only.
+        real_time: The reason why the mission cannot run in virtual time; "" if it can.
+        robots: Whether the mission starts its robots, or the parameter that decides it.
+        max_outage: Age of its journal up to which a durable run resumes by itself [s]; None for
+            any.
+        migrations: Returns the changed paths of its machine, or None.
     """
 
     serves: tuple[str, ...] = ()
@@ -66,32 +67,32 @@ def mission(
     max_outage: float | None = None,
     migrations: Migrations | None = None,
 ) -> F | Callable[[F], F]:
-    """Tell `smachpy run` what the mission that a function makes needs.
+    """Declare what `smachpy run` must know about the mission that a function builds.
 
         @smachpy.mission(serves=["turn"], world="doors.yaml")
         def deliver(to: str = "lab") -> StateMachine: ...
 
     Args:
-        function: The function, where nothing else is told.
-        serves: Names of actions that the mission serves itself: nobody waits for them before it
-            starts.
-        world: The world file to simulate when the run starts the robot and names no other.
-        real_time: Why the mission needs real time; `--time virtual` is then refused with it.
-        robots: The mission starts its robots itself: its run gets a network of its own, as one
-            with `--start-robot` does. Or the name of the function's parameter that says so.
-
-        max_outage: How old its journal may be for `smachpy run --durable` to go on with it [s]; an
-            older one wants a person, who says `smachpy missions resume`. None: any age.
-        migrations: Called with the differences, as texts, when the machine is another one than that
-            of the journal; returns old path -> new path, or None to refuse.
+        function: The function, for `@smachpy.mission` without arguments.
+        serves: Names of actions that the mission serves itself: the run does not wait for their
+            servers before it starts.
+        world: The world file to simulate if the run starts the robot and names no other.
+        real_time: The reason why the mission needs real time; `--time virtual` is then refused with
+            this text.
+        robots: The mission starts its robots itself, so its run gets a network of its own, as with
+            `--start-robot`. Or the name of the function's parameter that decides it.
+        max_outage: Age of its journal up to which `smachpy run --durable` resumes it [s]. An older
+            one needs a person and `smachpy missions resume`. None for any age.
+        migrations: Called with the differences, as texts, if the machine is not the one of the
+            journal; returns old path -> new path, or None to refuse.
 
     Returns:
-        A decorator, which returns the function itself; without arguments, as `@smachpy.mission`,
-        the function.
+        A decorator, which returns the function itself; for `@smachpy.mission` without arguments the
+        function.
 
     Raises:
-        InvalidStateError: `serves` is no list of names, `max_outage` no time, or `migrations` no
-            function.
+        InvalidStateError: `serves` is not a list of names, `max_outage` is not a duration, or
+            `migrations` is not a function.
     """
     problems = Problems("mission")
     names = problems.names("serves", serves)
@@ -109,11 +110,11 @@ def mission(
 
 
 def is_mission(thing: object) -> bool:
-    """Tell whether `@smachpy.mission` marks a function."""
+    """Return whether a function is decorated with `@smachpy.mission`."""
     return isinstance(getattr(thing, _ATTRIBUTE, None), MissionInfo)
 
 
 def mission_info(thing: object) -> MissionInfo:
-    """Return what `@smachpy.mission` was told about a function; nothing when it was not used."""
+    """Return the arguments of `@smachpy.mission` for a function; the defaults without it."""
     info = getattr(thing, _ATTRIBUTE, None)
     return info if isinstance(info, MissionInfo) else MissionInfo()

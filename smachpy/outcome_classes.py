@@ -1,6 +1,6 @@
-"""What kind of end the name of an outcome speaks of.
+"""The class of an outcome (success, failure, ...) by its name.
 
-Exit codes, pictures, statistics and the live page all take it from the table here.
+Exit codes, pictures, statistics and the live page all use the table here.
 """
 
 from __future__ import annotations
@@ -37,5 +37,5 @@ def outcome_class(outcome: str) -> OutcomeClass:
 
 
 def is_good(outcome: str) -> bool:
-    """Tell whether an outcome is no failure and no preempt: what is neither counts as good."""
+    """Return whether an outcome is good: it is neither a failure nor a preempt."""
     return outcome_class(outcome) in {"success", "other"}

@@ -1,10 +1,10 @@
-"""What shows machines and runs, offered by an installed package (`viz`).
+"""Pictures and views of machines and runs, provided by an installed package (`viz`).
 
-Such a package has entry points in the group `smachpy.pictures`:
+Entry points, because imports go from `viz` to `smachpy` only. The group `smachpy.pictures` has:
 
 run: called as `draw(machine_or_record, file, run=events)`, writes a picture
 svg: called as `draw(machine)`, returns SVG text
-history: a class; its `on_event` takes events in, and `run=` above takes it
+history: a class that collects events by `on_event`, for the argument `run` above
 terminal: a class, shows a run in the terminal while it happens (`viz.TerminalView`)
 viewer: a class, serves the live page in a process of its own (`viz.live.process.ViewerProcess`)
 """
@@ -28,10 +28,10 @@ GROUP = "smachpy.pictures"
 
 
 def load(name: str) -> Any:
-    """Return what an installed package offers as `name`, None when none does.
+    """Return the entry point `name`; None if no installed package has it.
 
     Raises:
-        ImportError: the package cannot be imported, or another package of its name can.
+        ImportError: the package cannot be imported, or another module has its name.
     """
     for point in entry_points(group=GROUP, name=name):
         try:
@@ -42,12 +42,12 @@ def load(name: str) -> Any:
 
 
 def draw_run(record: StateRecord, events: Iterable[Event], file: Path) -> Path | None:
-    """Draw `record`, with the run that `events` tell of, to `file`.
+    """Draw `record`, with the run of these `events`, to `file`.
 
     Returns:
-        The file, or None when nothing that draws is installed, or it failed (logged as a warning).
+        The file; None if no package that draws is installed, or if it failed (logged as a warning).
 
-    Blocks: while the picture is laid out, under a second.
+    Blocks: for the layout, less than a second.
     """
     try:
         draw = load("run")
@@ -62,12 +62,12 @@ def draw_run(record: StateRecord, events: Iterable[Event], file: Path) -> Path |
 
 
 def draw_svg(machine: Described) -> str | None:
-    """Return `machine` as SVG text, None when nothing that draws is installed.
+    """Return `machine` as SVG text; None if no package that draws is installed.
 
     Raises:
-        SmachError: drawing failed, for want of a `dot` program, say.
+        SmachError: drawing failed, for instance because there is no program `dot`.
 
-    Blocks: while the picture is laid out, under a second.
+    Blocks: for the layout, less than a second.
     """
     draw = load("svg")
     return None if draw is None else str(draw(machine))
@@ -76,7 +76,7 @@ def draw_svg(machine: Described) -> str | None:
 def draw_moments(
     record: StateRecord, moments: Iterable[tuple[str, str | None]], file: Path
 ) -> Path | None:
-    """Draw a run given as pairs (path, outcome), the outcome None where the state begins.
+    """Draw a run given as pairs (path, outcome), with the outcome None where a state begins.
 
     Returns, Blocks: as `draw_run`.
     """

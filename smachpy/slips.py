@@ -1,7 +1,7 @@
-"""Slips that SMACH accepted and this package refuses; programs for ROS 1 may go on with them.
+"""Mistakes ("slips") that SMACH accepted and this package refuses, except in programs for ROS 1.
 
-`accepts` is asked where such a slip is found. It says no by itself; while `smachpy.ros1` is
-installed it says yes, and warns once of each slip, with the line of the program.
+The code that finds such a slip calls `accepts`. It returns False, so that an error is raised. While
+`smachpy.ros1` is installed it returns True, and warns once of each slip with the program's line.
 """
 
 from __future__ import annotations
@@ -23,40 +23,40 @@ _OURS = tuple(
 
 
 class SlipWarning(UserWarning):
-    """A program does what SMACH accepted and this package refuses elsewhere."""
+    """A program for ROS 1 does something that SMACH accepted and this package normally refuses."""
 
 
 ACCEPTING = [False]
-"""Whether slips are accepted now; see `accepting`."""
-_told: set[tuple[str, int, str]] = set()
+"""Whether slips are accepted now; see `accepting`. A list, as `from ... import` copies a bool."""
+_warned: set[tuple[str, int, str]] = set()
 
 
 def accepting() -> bool:
-    """Tell whether slips are accepted now."""
+    """Return whether slips are accepted now."""
     return ACCEPTING[0]
 
 
 def set_accepting(on: bool) -> None:
-    """Accept slips from now on, or refuse them; which ones were told is forgotten."""
+    """Accept slips from now on, or refuse them, and warn of each one again."""
     ACCEPTING[0] = on
-    _told.clear()
+    _warned.clear()
 
 
 def accepts(problem: str) -> bool:
-    """Tell whether the program may go on with a slip; warns of it then.
+    """Return whether a slip is accepted, and warn of it in that case.
 
     Args:
-        problem: What is wrong, as an error would say it.
+        problem: The problem, as in the text of an error.
 
     Warns:
-        SlipWarning: it may; once for each line of the program and problem.
+        SlipWarning: it is accepted; once for each line of the program and problem.
     """
     if not ACCEPTING[0]:
         return False
-    frame = _program_frame(sys._getframe(1))  # as `warnings` looks for its caller
+    frame = _program_frame(sys._getframe(1))
     file, line = (frame.f_code.co_filename, frame.f_lineno) if frame else ("smachpy", 0)
-    if (file, line, problem) not in _told:
-        _told.add((file, line, problem))
+    if (file, line, problem) not in _warned:
+        _warned.add((file, line, problem))
         text = f"{problem} SMACH went on with it, and so does this run."
         warnings.warn_explicit(text, SlipWarning, file, line)
     return True

@@ -30,7 +30,7 @@ def _program_ends() -> bool:
 
 
 class _ShutdownCheck:
-    """What says whether the program is shutting down.
+    """The function that returns whether the program is shutting down.
 
     Attributes:
         is_own: `set_shutdown_check` was called.
@@ -44,15 +44,17 @@ SHUTDOWN_CHECK = _ShutdownCheck()
 
 
 def is_shutdown() -> bool:
-    """Tell whether the program is shutting down.
+    """Return whether the program is shutting down.
 
-    By the check of `set_shutdown_check`, else by `actionlib_core.shutdown`.
+    The answer comes from the check of `set_shutdown_check`, else from `actionlib_core.shutdown`.
     """
     return SHUTDOWN_CHECK.function()
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
-    """Make `cb` say whether the program is shutting down; machines then end 'preempted'.
+    """Set the function that returns whether the program is shutting down.
+
+    Machines end 'preempted' when it returns a true value.
 
     Raises:
         InvalidStateError: `cb` cannot be called.
@@ -64,12 +66,12 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
 
 
 def reset_shutdown_check() -> None:
-    """Forget what `set_shutdown_check` was given."""
+    """Undo `set_shutdown_check`."""
     SHUTDOWN_CHECK.function, SHUTDOWN_CHECK.is_own = _program_ends, False
 
 
 def has_smach_interface(obj: object) -> bool:
-    """Tell whether `obj` declares outcomes and keys as a state does."""
+    """Return whether `obj` declares outcomes and keys like a state."""
     return (
         hasattr(obj, "get_registered_input_keys")
         and hasattr(obj, "get_registered_output_keys")
@@ -133,7 +135,7 @@ class CBInterface(Generic[P, R_co]):
 
 
 class cb_interface:  # noqa: N801  SMACH's name
-    """Decorator that declares a callback's outcomes and keys; gives a `CBInterface`."""
+    """Decorator that declares a callback's outcomes and keys; returns a `CBInterface`."""
 
     def __init__(
         self,
@@ -161,7 +163,8 @@ set_preempt_handler: Any
 
 
 def __getattr__(name: str) -> Any:
-    if name == "set_preempt_handler":  # its name in smach_ros; it knows machines, this does not
+    # smach_ros has it here. Imported late: it imports machines, which import this module.
+    if name == "set_preempt_handler":
         from importlib import import_module
 
         return import_module("smachpy.run.preempt_handler").set_preempt_handler

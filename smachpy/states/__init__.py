@@ -1,4 +1,4 @@
-"""Ready-made states for robot missions, and what they are made from.
+"""Ready-made states for robot missions, and their parts.
 
 Each is a state for `sm.add(...)`, or a function that makes one: `drive_to`, `turn`, `locate`,
 `nav2_active`, `AskOperator`, `AwaitMessage`, `Wait`, `Serve`. The lessons in `missions` use them.

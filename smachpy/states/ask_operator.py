@@ -1,6 +1,6 @@
-"""A state that asks a person, and waits for the answer from anywhere on the network.
+"""A state that asks a person, and takes the answer from anywhere on the network.
 
-    smachpy answer                                                    # what is asked now
+    smachpy answer                                                    # list the questions
     smachpy answer retry
     actionlib topic echo operator/question
     actionlib topic pub -1 operator/answer std_msgs/String '{data: retry}'
@@ -54,30 +54,30 @@ NO_ANSWER = "no_answer"
 class AskOperator(State):
     """Asks a question and waits. Outcomes: the answers, `default`, 'preempted'.
 
-    While it waits, viewers show the question, `smachpy answer` answers it by a service of its own
-    (`smachpy.states.questions`), the question is on the latched topic `<channel>/question`
-    (std_msgs/String), and answers are taken from the topic `<channel>/answer` (std_msgs/String:
+    While it waits, viewers show the question, `smachpy answer` answers it through its own service
+    (`smachpy.states.questions`), and the question is on the latched topic `<channel>/question`
+    (std_msgs/String). Answers are also taken from the topic `<channel>/answer` (std_msgs/String:
     one of the answers) and, for yes and no, from the service `<channel>/confirm`
-    (std_srvs/SetBool). The first one counts, and is recorded with who gave it (`QuestionAnswered`).
-    Upper and lower case do not matter unless two answers differ in nothing else. Anything
-    else is refused and logged; the question stays.
+    (std_srvs/SetBool). The first answer counts, and is recorded with its author
+    (`QuestionAnswered`). Upper and lower case do not matter unless two answers differ in nothing
+    else. Any other text is refused and logged, and the question stays open.
 
     Args:
-        question: What to ask; or a function that returns it for the userdata.
-        answers: What may be answered; as a mapping, with the words for their buttons.
+        question: The question, or a function of the userdata that returns it.
+        answers: The possible answers; a mapping also gives the texts of their buttons.
         patience: Longest wait [s].
-        default: The outcome when nobody answers: 'no_answer', or one of the answers.
-        picture: What to show with it: the path of a PNG, JPEG or GIF file, the userdata key of
-            such a path, of the bytes or of a message with them in `data` (CompressedImage), or a
-            function that returns one of these for the userdata. The question is asked without
-            one that cannot be read, and the log says why.
-        channel: Where questions and answers go; an answer on its topics is for all questions that
-            are asked there now.
+        default: The outcome if nobody answers: 'no_answer', or one of the answers.
+        picture: A picture to show with it: the path of a PNG, JPEG or GIF file; the userdata key of
+            such a path, of the bytes, or of a message with them in `data` (CompressedImage); or a
+            function of the userdata that returns one of these. If it cannot be read, the question
+            is asked without it and the reason is logged.
+        channel: Prefix of the topics and services. An answer on the topic is for all questions
+            that are open on this channel.
         **options: See `smachpy.machines.state.StateOptions`, and `input_keys` for the functions.
 
     Raises:
-        MissionError: `patience` is no time, `default` no answer, or `answers` has none, or one
-            that says something else.
+        MissionError: `patience` is not a duration, `default` is not possible, or `answers` is empty
+            or has an answer with another meaning.
     """
 
     def __init__(
@@ -120,13 +120,14 @@ class AskOperator(State):
         self.__channel = channel
 
     def execute(self, userdata: UserData) -> str:
-        """Ask.
+        """Ask the question and wait for the answer.
 
         Blocks: until the answer, `patience` [s] or a preempt.
         """
         node = get_node()
         scope = current_scope()
-        # The same in each run with the same seed, and nobody else's.
+        # A counter instead of a random id, so that runs with the same seed are equal; together with
+        # the session's id the name is unique on the network.
         number = next(node.shared("questions", lambda: itertools.count(1)))
         service = node.resolve(f"{self.__channel}/questions/q{node.transport.session_id}_{number}")
         question = Question(
@@ -178,7 +179,7 @@ class AskOperator(State):
             elif isinstance(picture, str):
                 picture = userdata[picture]
             return ("", b"") if picture is None else read_picture(picture)
-        except Exception as error:  # noqa: BLE001  the user's code or data: the question matters more
+        except Exception as error:  # noqa: BLE001  the user's: ask without the picture
             logwarn(f"picture: {type(error).__name__}: {error} The question is asked without it.")
             return "", b""
 
@@ -192,7 +193,7 @@ class AskOperator(State):
 
 
 class _Asking:
-    """One question while it waits."""
+    """One open question."""
 
     def __init__(
         self, state: AskOperator, question: Question, picture: tuple[str, bytes], node: Node
@@ -206,7 +207,7 @@ class _Asking:
         self._inbox = Inbox(question.path, question.answers, self.wake.set)
 
     def wait(self, scope: Scope | None) -> str | None:
-        """Wait for the answer, tell of both; return it, or None after a preempt."""
+        """Publish the question, wait for the answer and publish it; None after a preempt."""
         question, inbox = self._question, self._inbox
         if scope is not None:
             scope.emit(
@@ -221,6 +222,7 @@ class _Asking:
             self.wake.wait(left)
             self.wake.clear()
         preempted = self._state.preempt_requested()
+        # An answer may have arrived together with the preempt or the timeout: it counts.
         answer, by = inbox.close("preempted" if preempted else question.default)
         if preempted and not by:
             return None

@@ -1,4 +1,4 @@
-"""States that drive the robot by `move_base`, and the messages they are made of."""
+"""States that drive the robot with `move_base`, and conversions of its messages."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from smachpy.sim.geometry import Pose2D, quaternion_of, yaw_of
 if TYPE_CHECKING:
     from smachpy import UserData
 
-SIGNAL_TIMEOUT: Final = 5.0  # [s] the robot's own topics answer within this, or never
-DRIVE_TIMEOUT: Final = 600.0  # [s] no drive in a building takes longer
+SIGNAL_TIMEOUT: Final = 5.0  # [s] a robot's own topic that is silent for this long is not there
+DRIVE_TIMEOUT: Final = 600.0  # [s] longer than any drive in a building
 TURN_TIMEOUT: Final = 60.0  # [s]
 
 
@@ -40,10 +40,10 @@ def drive_to(
     """Return a state that drives to a place. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     Args:
-        place: A pose in the map frame; or the userdata key that holds a pose, as a `Pose2D` or a
-            message, or something with the attribute `pose`: a `Waypoint`, a `PoseStamped`.
+        place: A pose in the map frame; or the userdata key of a pose: a `Pose2D`, a message, or an
+            object with the attribute `pose`, such as a `Waypoint` or `PoseStamped`.
         action: Name of the action.
-        **options: Of `SimpleActionState`; `exec_timeout` is 600 s when nothing else is said.
+        **options: Those of `SimpleActionState`; the default of `exec_timeout` is 600 s.
     """
     options.setdefault("exec_timeout", DRIVE_TIMEOUT)
     if not isinstance(place, str):
@@ -59,12 +59,12 @@ def drive_to(
 
 
 def drive_back(key: str = "home") -> SimpleActionState:
-    """Return a state that drives to the pose in a userdata key and tries three times."""
+    """Return a state that drives to the pose in a userdata key, with up to three attempts."""
     return drive_to(key, retry=(3, 5.0, ["aborted"]))
 
 
 def turn(degrees: float, **options: Any) -> SimpleActionState:
-    """Return a state that turns on the spot: anticlockwise, at most half a circle."""
+    """Return a state that turns on the spot, anticlockwise, by at most 180 degrees."""
     options.setdefault("exec_timeout", TURN_TIMEOUT)
     goal = goal_at(Pose2D(0.0, 0.0, math.radians(degrees)), frame="base_link")
     return SimpleActionState("move_base", MoveBaseAction, goal=goal, **options)

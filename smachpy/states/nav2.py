@@ -23,8 +23,9 @@ def nav2_active(
 
     Outcomes: 'succeeded', 'aborted', 'preempted'.
 
-    It asks Nav2's lifecycle manager (`<manager>/is_active`) once a second, as Nav2's own programs
-    do: a manager tells nobody when it is done. 'aborted': it was not active within `timeout`.
+    It asks Nav2's lifecycle manager (`<manager>/is_active`) once a second, like Nav2's own
+    programs, because the manager does not announce when it is done. 'aborted': not active within
+    `timeout`.
 
     Args:
         manager: Name of the manager's node; "lifecycle_manager_localization" is another.

@@ -1,4 +1,4 @@
-"""How far a mission is, for the terminal view and the live page."""
+"""The progress of a mission, for the terminal view and the live page."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from smachpy.userdata.kept_types import register_type
 @register_type
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a mission is; written to a userdata key, it is shown while the mission runs.
+    """The progress of a mission; viewers show it if it is written to a userdata key.
 
     Attributes:
-        fraction: 0 to 1; None when it is not known.
-        seconds_left: Estimated time until the end [s]; None when it is not known.
-        text: Where it is, in a few words.
+        fraction: 0 to 1; None if unknown.
+        seconds_left: Estimated time until the end [s]; None if unknown.
+        text: A short text.
     """
 
     fraction: float | None

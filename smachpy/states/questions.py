@@ -1,11 +1,11 @@
-"""Questions of missions on the network: find those that wait for an answer, and answer them.
+"""Questions of missions on the network: find the open ones, and answer them.
 
-Each question is a service for as long as it waits, so its token says that it is there:
+Each question is a service while it is open, so its liveliness token shows that it exists:
 
     <channel>/questions/<id>      smachpy_msgs/AnswerQuestion
 
 A request with an empty `answer` reads the question; any other one answers it. The first answer
-counts; whoever comes later is told whose it was.
+counts; later ones are refused with the name of its author.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ uint8[] picture
 )
 
 CALL_S: Final = 3.0
-"""A mission has so long to take an answer [s]."""
+"""Time for a mission to accept an answer [s]."""
 
 LONGEST_BY: Final = 200
 MOST_BYTES: Final = 4_000_000
-"""Of a picture."""
+"""Limit of a picture [bytes]."""
 
 _MEDIA = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
@@ -61,11 +61,11 @@ MEDIA_TYPES = frozenset(media for _, media in _MEDIA)
 
 
 class AnswerRefusedError(SmachError):
-    """An answer was not taken: it is none of those, somebody was faster, or nobody asks any more.
+    """An answer was refused: it is not possible, it came too late, or the question is gone.
 
     Attributes:
         answer: The answer.
-        reason: Why.
+        reason: The reason.
     """
 
     def __init__(self, where: str, answer: str, reason: str) -> None:
@@ -76,16 +76,16 @@ class AnswerRefusedError(SmachError):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question that waits for an answer.
+    """An open question.
 
     Attributes:
-        path: The state that asks.
-        text: What it asks.
-        answers: What may be answered.
-        words: What to write on their buttons, in the same order.
-        default: The outcome when nobody answers.
+        path: Path of the state that asks.
+        text: The question.
+        answers: The possible answers.
+        words: The texts of their buttons, in the same order.
+        default: The outcome if nobody answers.
         patience: Time for an answer [s].
-        left: What was left of it when the question was read [s].
+        left: The rest of that time when the question was read [s].
         service: Full name of the service that takes the answer.
     """
 
@@ -103,12 +103,12 @@ class Inbox:
     """Takes the answers to one question; the first one counts.
 
     Args:
-        where: The state that asks, for errors.
-        answers: What may be answered.
-        on_answer: Called once, with the first answer taken.
+        where: Path of the state that asks, for errors.
+        answers: The possible answers.
+        on_answer: Called once, after the first answer.
 
     Attributes:
-        answer: The answer and who gave it; None until there is one.
+        answer: The answer and its author; None until there is one.
 
     Threads: `take` may be called from any thread.
     """
@@ -121,10 +121,10 @@ class Inbox:
         self._lock = threading.Lock()
 
     def take(self, text: str, by: str) -> str:
-        """Take an answer; return which one of the answers it is.
+        """Take an answer; return the matching one of the possible answers.
 
         Raises:
-            AnswerRefusedError: it is none of them, fits several, or there is one already.
+            AnswerRefusedError: it matches none or several, or there is an answer already.
         """
         meant = find_answer(text, self._answers)
         if meant is None:
@@ -142,7 +142,7 @@ class Inbox:
         return meant
 
     def close(self, otherwise: str) -> tuple[str, str]:
-        """Take no more answers; return the first one, and by whom, else (`otherwise`, "")."""
+        """Stop taking answers; return the first one with its author, else (`otherwise`, "")."""
         with self._lock:
             if self.answer is None:
                 self.answer = otherwise, ""
@@ -150,7 +150,7 @@ class Inbox:
 
 
 def find_answer(text: str, answers: Sequence[str]) -> str | None:
-    """Return the answer that a text means, None when there is none or the text fits several."""
+    """Return the answer that matches a text; None if none or several do."""
     word = text.strip()
     for fold in (str, str.casefold):
         found = [answer for answer in answers if fold(answer.strip()) == fold(word)]
@@ -160,12 +160,12 @@ def find_answer(text: str, answers: Sequence[str]) -> str | None:
 
 
 def find_questions(node: Node | None = None) -> list[Question]:
-    """Return the questions that wait for an answer, by path.
+    """Return the open questions, sorted by path.
 
     Args:
-        node: Where to look; the current node when None.
+        node: The node to use; None for the current node.
 
-    Blocks: until the network has answered, and each of them, some seconds at most.
+    Blocks: until the network and each question have answered, at most some seconds.
     """
     node = node or get_node()
     found = []
@@ -184,15 +184,15 @@ def give_answer(service: str, answer: str, by: str, *, node: Node | None = None)
     """Answer a question.
 
     Args:
-        service: Of the question.
+        service: The question's service.
         answer: One of its answers; upper and lower case do not matter.
-        by: Who gives it, for the record.
-        node: Where it is; the current node when None.
+        by: The author, for recordings.
+        node: The node to use; None for the current node.
 
     Raises:
-        AnswerRefusedError: it was not taken, or the mission does not say.
+        AnswerRefusedError: it was refused, or the mission did not reply.
 
-    Blocks: until the mission has taken it, 3 s at most.
+    Blocks: until the mission has accepted it, at most 3 s.
     """
     if not answer.strip():
         raise AnswerRefusedError(service, answer, "expected one of its answers.")
@@ -211,9 +211,9 @@ def give_answer(service: str, answer: str, by: str, *, node: Node | None = None)
 
 
 def fetch_picture(service: str, *, node: Node | None = None) -> tuple[str, bytes] | None:
-    """Return media type and bytes of a question's picture; None when there is none any more.
+    """Return media type and bytes of a question's picture; None if there is none any more.
 
-    Blocks: until it has come, 3 s at most.
+    Blocks: until it has arrived, at most 3 s.
     """
     make: Any = AnswerQuestion._request_class
     reply = _call(node or get_node(), service, make(picture=True))
@@ -223,7 +223,7 @@ def fetch_picture(service: str, *, node: Node | None = None) -> tuple[str, bytes
 
 
 def question_text(question: Question, left: float) -> str:
-    """Return what the service tells of a question, with what is left of its time [s], as JSON."""
+    """Return a question, with the rest of its time [s], as the service's JSON text."""
     told = {**asdict(question), "left": left}
     del told["service"]
     return json.dumps(told)
@@ -237,7 +237,7 @@ def read_picture(value: Any) -> tuple[str, bytes]:
             in `data`, such as sensor_msgs/CompressedImage.
 
     Raises:
-        ValueError: it is none, or larger than 4 MB.
+        ValueError: it is not a picture of these formats, or is larger than 4 MB.
         OSError: the file cannot be read.
     """
     if hasattr(value, "__fspath__") or isinstance(value, str):
@@ -264,10 +264,10 @@ def _read(text: str, service: str) -> Question:
 
 
 def _call(node: Node, service: str, request: Any) -> Any:
-    """Return the answer of a question's service; None when there is none.
+    """Return the reply of a question's service; None if there is none.
 
-    No `ServiceProxy`: what proxies of a name share lasts as long as the node, and every question
-    has a name of its own.
+    Without a `ServiceProxy`, because proxies leave data in the node for each name until the node is
+    closed, and every question has a name of its own.
     """
     replies: list[Reply] = []
     done = node.clock.event(f"the answer of {service}")

@@ -1,4 +1,4 @@
-"""Servers that a mission brings along: for one run of a machine, or for one state."""
+"""Servers that belong to a mission: for each run of a machine, or for one state."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Closeable(Protocol):
-    """Something that is on the network from when it is made until `close`: a `Service`."""
+    """A server that is on the network until `close`, such as a `Service`."""
 
     def close(self) -> None:
         """Leave the network."""
@@ -22,7 +22,7 @@ class Closeable(Protocol):
 
 
 class Stoppable(Protocol):
-    """Something that is on the network from when it is made until `stop`: an action server."""
+    """A server that is on the network until `stop`, such as an action server."""
 
     def stop(self) -> None:
         """Leave the network."""
@@ -33,11 +33,11 @@ Server: TypeAlias = Closeable | Stoppable
 
 
 def serve_during(machine: Container, *makers: Callable[[], Server]) -> None:
-    """Make servers when `machine` starts; when it has ended, close them, the last one first.
+    """Make servers when `machine` starts, and close them in reverse order when it has ended.
 
     Args:
-        machine: Whose runs.
-        *makers: Each makes one server.
+        machine: The machine.
+        *makers: Functions that make one server each.
     """
     stack = ExitStack()
 
@@ -65,9 +65,9 @@ class Serve(State):
         self.__makers = makers
 
     def execute(self, userdata: UserData) -> str:
-        """Serve until then.
+        """Serve until the preempt.
 
-        Blocks: until the preempt.
+        Blocks: until then.
         """
         del userdata
         with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""States that wait: for some time, or for a message."""
+"""States that wait for some time or for a message."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 class AwaitMessage(State):
-    """Waits for a message that is accepted. Outcomes: 'came', 'timeout', 'preempted'.
+    """Waits for a message that fulfils a condition. Outcomes: 'came', 'timeout', 'preempted'.
 
     Args:
         topic: Name of the topic.
         msg_type: Class of its messages.
-        wanted: Called with each message, in the subscriber's thread; true ends the wait.
+        wanted: Called with each message, in the subscriber's thread; a true value ends the wait.
         timeout: Longest wait [s].
     """
 
@@ -35,7 +35,7 @@ class AwaitMessage(State):
         self.__longest = timeout
 
     def execute(self, userdata: UserData) -> str:
-        """Wait.
+        """Wait for the message.
 
         Blocks: until the message, `timeout` or a preempt.
         """
@@ -66,10 +66,10 @@ class AwaitMessage(State):
 
 
 class Wait(State):
-    """Lets some time pass. Outcomes: 'done', 'preempted'.
+    """Waits for some time. Outcomes: 'done', 'preempted'.
 
     Args:
-        seconds: How long [s]; None takes the userdata key `seconds`.
+        seconds: The time [s]; None for the userdata key `seconds`.
     """
 
     def __init__(self, seconds: float | None = None) -> None:

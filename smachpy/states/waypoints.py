@@ -29,8 +29,8 @@ class Waypoint:
     """A named place to drive to.
 
     Attributes:
-        name: What to call it in logs and pictures.
-        pose: In the map frame.
+        name: Its name in logs and pictures.
+        pose: Its pose in the map frame.
     """
 
     name: str
@@ -39,13 +39,13 @@ class Waypoint:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """What a patrol needs to know of a floor.
+    """The places and limits of a patrol.
 
     Attributes:
-        waypoints: Where to go, in this order.
-        dock: Where the robot charges.
-        low_battery: Drive to the dock below this charge, 0 to 1.
-        charge_until: Leave the dock at this charge, 0 to 1.
+        waypoints: The places to visit, in this order.
+        dock: The place where the robot charges.
+        low_battery: Charge below which it drives to the dock, 0 to 1.
+        charge_until: Charge at which it leaves the dock, 0 to 1.
     """
 
     waypoints: tuple[Waypoint, ...]
@@ -55,19 +55,19 @@ class Route:
 
 
 class PlaceFile(Document):
-    """A YAML or CSV file that names places, for readers of kinds of files.
+    """A YAML or CSV file with places; base of the readers of such files.
 
-    With the field `map` (and `robot`, for its radius) every place is checked against that floor;
-    without it only the robot's server can refuse places where the robot cannot stand.
+    With the field `map` (and `robot`, for its radius) every place is checked against that map.
+    Without it, only the robot's server can refuse places where the robot cannot stand.
 
     Args:
         path: The file.
-        map_file: The floor to check against when the file has no field `map`.
-        csv_rows: The key under which the rows of a CSV file are found; "": no CSV file will do.
-        csv_texts: Columns of a CSV file that hold texts, whatever they look like.
+        map_file: The map for the check if the file has no field `map`.
+        csv_rows: The key for the rows of a CSV file; "" to refuse CSV files.
+        csv_texts: Columns of a CSV file that are always texts.
 
     Attributes:
-        floor: The floor, inflated by the robot; None when nothing names one.
+        floor: The map, inflated by the robot's radius; None if there is none.
 
     Raises:
         InputFileError: it cannot be read, or the map or the robot's file is wrong.
@@ -111,7 +111,7 @@ class PlaceFile(Document):
         return Waypoint(name, Pose2D(x, y, wrap_angle(yaw)))
 
     def named_places(self, key: str) -> tuple[Waypoint, ...]:
-        """Read a list of places whose names differ."""
+        """Read a list of places with different names."""
         names: set[str] = set()
         places = []
         for row in self.top.rows(key):
@@ -120,14 +120,14 @@ class PlaceFile(Document):
         return tuple(places)
 
     def check_name(self, row: Section, names: set[str]) -> None:
-        """Note a problem when the row has no name, or one of `names`, and add it to these."""
+        """Add the row's name to `names`; add a problem if it has none, or one of these."""
         name = row.text("name", REQUIRED)
         if name in names:
             row.problem("name", "a name that no other place has")
         names.add(name)
 
     def charges(self) -> tuple[float, float]:
-        """Read the battery charge below which to charge, and up to which; 0 to 1."""
+        """Read the battery charges at which to begin and to end charging; 0 to 1."""
         low = self.top.number("low_battery", 0.3, _SHARE)
         until = self.top.number("charge_until", 0.9, _SHARE)
         if "charge_until" in self.top and until <= low:
@@ -145,7 +145,7 @@ class PlaceFile(Document):
 
 
 def network_name(row: Section, key: str) -> str:
-    """Read a name of the network; "" when it is not there."""
+    """Read a name of the network; "" if it is missing."""
     if key not in row:
         row.text(key, "-")
         return ""
