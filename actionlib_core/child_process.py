@@ -127,6 +127,7 @@ class ChildProcess:
         process = self._process
         if process is None:
             return
+        # First the request, by closing its standard input; then SIGTERM; then SIGKILL.
         self.let_go()
         if not self._ended.wait(GRACE_S):
             process.terminate()

@@ -143,7 +143,7 @@ class AccessDeniedError(TransportError):
         but = f" but {list(denied)}" if denied else ""
         super().__init__(
             f"{key}: access denied: got {who}; expected one who may use it, as this one may use "
-            f"{list(allowed)}{but}. Try a name space that is allowed, or another login."
+            f"{list(allowed)}{but}. Try a namespace that is allowed, or another login."
         )
 
 
@@ -370,7 +370,7 @@ class ServerConflictError(ActionException):
 def _two_servers(mine: tuple[str, str], other: tuple[str, str]) -> str:
     return (
         f"two servers: got one of node '{mine[0]}' (session {mine[1]}) beside one of node "
-        f"'{other[0]}' (session {other[1]}); expected one. Try another name or a name space for "
+        f"'{other[0]}' (session {other[1]}); expected one. Try another name or a namespace for "
         "this one, or end the other."
     )
 

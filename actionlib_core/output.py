@@ -113,6 +113,7 @@ def tell(name: str, text: str) -> None:
 
 
 def _escape_errors() -> None:
+    # Logs and tracebacks may quote texts of other programs, with control characters.
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(_Formatter())
     threading.excepthook = _print_thread_exception

@@ -201,6 +201,8 @@ class _SignalHandler:
         self.task = self._clock.spawn(self._relay, name="shutdown-signals")
 
     def __call__(self, number: int, _frame: FrameType | None) -> None:
+        # `_wake` also distinguishes the first signal from later ones. With the default handler,
+        # restored below, a second SIGTERM and a third SIGINT end the process.
         if not self._wake.is_set():
             self._shutdown.note(signal.Signals(number).name)
             self._wake.set()
@@ -285,6 +287,7 @@ def handle_signals(
             signal.signal(number, handler)
         yield shutdown
     finally:
+        # None: the old handler was not installed from Python, and cannot be restored.
         for number, old in before.items():
             signal.signal(number, signal.SIG_DFL if old is None else old)
         handler.end()

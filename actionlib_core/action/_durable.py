@@ -127,6 +127,7 @@ class GoalFile:
                     "DELETE FROM goals WHERE action = ? AND goal IS NULL AND changed < ?",
                     (self._action, now - MEMORY_S),
                 )
+                # By rowid: in the order in which the goals arrived.
                 rows = self._connection.execute(
                     "SELECT id, type, stamp_ns, client, status, text, begun, goal, result "
                     "FROM goals WHERE action = ? ORDER BY rowid",

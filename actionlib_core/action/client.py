@@ -728,7 +728,7 @@ class GoalManager:
                 goal = handle.goal
                 entry = taken.get(goal.id)
                 if entry is not None:
-                    self._pass(handle, goal.hear(entry, server.session, now), entry)
+                    self._pass(handle, goal.on_entry(entry, server.session, now), entry)
                 elif goal.server in {"", server.session}:
                     self._pass(handle, goal.on_untaken(now))
             acks, self._acks = self._acks, []
@@ -783,7 +783,7 @@ class GoalManager:
         now = self.clock.now()
         servers, goals = self._servers, self._goals
         if servers.current is None or session in servers.foreign:
-            self._hear_foreign(session, now)
+            self._on_foreign_list(session, now)
         if not goals:  # the usual case of an idle client: needs no lock
             return
         with self.lock:
@@ -793,7 +793,7 @@ class GoalManager:
                 handle = goals.get(entry.id)
                 if handle is not None and (speaks or self._believes(session, handle)):
                     goal = handle.goal
-                    path = goal.hear(entry, session, now)
+                    path = goal.on_entry(entry, session, now)
                     if path and handle.on_state is None and not goal.over and goal.due >= self._due:
                         continue  # what `_pass` would do here is nothing: saves the call
                     if path != ():
@@ -805,10 +805,10 @@ class GoalManager:
                         self._pass(handle, handle.goal.on_unlisted(now, answers=answers))
                         self._arm(handle.goal.due)
 
-    def _hear_foreign(self, session: str, now: float) -> None:
+    def _on_foreign_list(self, session: str, now: float) -> None:
         """Handle a status list of a session that may be a server without a token."""
         with self.lock:
-            if self._servers.hear_foreign(session, now):
+            if self._servers.on_foreign_list(session, now):
                 self._hurry(now)
                 self._wake()
             if self._goals and session in self._servers.foreign:
@@ -841,11 +841,11 @@ class GoalManager:
             goal, now = handle.goal, self.clock.now()
             if goal.over:
                 return
-            # The usual case, many times a second, without the rest of `hear`.
+            # The usual case, many times a second, without the rest of `on_entry`.
             if entry.status == goal.status and session == goal.server and goal.acknowledged:
                 goal.on_sign_of_life(now)
             else:
-                self._pass(handle, goal.hear(entry, session, now), entry)
+                self._pass(handle, goal.on_entry(entry, session, now), entry)
             if feedback is not None:
                 handle.keep_feedback(feedback, len(body))
 
@@ -891,7 +891,7 @@ class GoalManager:
         with self.lock:
             if entry.status != Status.LOST:
                 now = self.clock.now()
-                self._pass(handle, handle.goal.hear(entry, session, now), entry)
+                self._pass(handle, handle.goal.on_entry(entry, session, now), entry)
             elif not self._servers.conflict:  # of two servers, the other may have the goal
                 self._pass(handle, handle.goal.on_unknown(entry.text))
 

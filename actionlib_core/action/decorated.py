@@ -213,7 +213,7 @@ class GoalServer(Generic[G, R, F]):
             InvalidNameError: the name breaks the ROS rules.
             TransportError: the network session is closed.
 
-        Blocks: until the network has said who has the name, 1 s at most.
+        Blocks: until the network has listed the servers of the name, 1 s at most.
         """
         return RunningServer(
             _Runner(

@@ -206,6 +206,7 @@ class SentGoal(Generic[R, F]):
         if goal.status is not Status.SUCCEEDED:
             raise GoalFailedError(self._name, goal.id, goal.status.name, goal.text, goal.result)
         result: Any = goal.result
+        # The server no longer had the result when this client asked for it.
         if result is None:
             raise GoalFailedError(self._name, goal.id, "SUCCEEDED without result", goal.text, None)
         return result  # type: ignore[no-any-return]

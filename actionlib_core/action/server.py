@@ -847,7 +847,7 @@ class ActionServer:
             TransportError: the network session is closed.
             ActionException: the server was stopped.
 
-        Blocks: until the network has answered who has the name, 1 s at most.
+        Blocks: until the network has listed the servers of the name, 1 s at most.
         """
         with self.lock:
             if self.keeper.stopped:

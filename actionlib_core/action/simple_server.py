@@ -143,7 +143,7 @@ class SimpleActionServer:
             TransportError: the network session is closed.
             ActionException: the server was stopped.
 
-        Blocks: until the network has answered who has the name, 1 s at most.
+        Blocks: until the network has listed the servers of the name, 1 s at most.
         """
         self.action_server.start()
         with self.lock:

@@ -79,6 +79,7 @@ def main(
 def _run(given: list[str], node: Node | None, on_ready: Callable[[], object]) -> int:
     debug = "--debug" in given
     try:
+        # `--debug` may stand anywhere, also behind a command, where argparse does not know it.
         names = parse_arguments([word for word in given if word != "--debug"])
         args = _parser().parse_args(names.rest)
         args.node, args.names = node, names

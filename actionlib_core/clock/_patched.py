@@ -255,6 +255,7 @@ def _start(thread: threading.Thread) -> None:
         with use_clock(clock):
             run()
 
+    # The thread stays the user's own object; only its `run` waits for the turn first.
     task = clock.adopt(target, name=thread.name)
 
     def run_in_turn() -> None:
@@ -402,6 +403,7 @@ _FAKES = _replacements()
 
 
 def _replace() -> None:
+    # All modules, as `from time import sleep` has put the function into a module's own globals.
     for name, module in list(sys.modules.items()):
         names = getattr(module, "__dict__", None)
         if type(names) is dict and not _is_in(name, REAL_TIME):

@@ -133,6 +133,7 @@ class VirtualClock:
         return VirtualEvent(self, name)
 
     def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
+        # It gets a thread at its first turn (`Participant.begin`), which may never come.
         task = VirtualTask(self, target, contextvars.copy_context(), name)
         task.participant.job = task
         with self._lock:
@@ -147,7 +148,7 @@ class VirtualClock:
                 self._ready.append(timer)
             elif delay < math.inf:
                 heapq.heappush(self._deadlines, (self._now + delay, next(self._count), timer))
-        if self.rate is not None:
+        if self.rate is not None:  # a running pause may now be too long
             self._poke.set()
         return timer
 
@@ -397,6 +398,7 @@ class VirtualClock:
 
     def _choose(self, me: Participant | None) -> Participant | VirtualTimer | None:
         ready = self._ready
+        # Nobody is ready: time advances. If only `me` waits for time, without the heap.
         if not ready:
             if me is not None and me.deadline is not None and self._is_alone(me.deadline):
                 self._now = me.deadline
@@ -408,6 +410,7 @@ class VirtualClock:
             return self._owner
         if ready:
             return ready.pop(0 if len(ready) == 1 or self._pick is None else self._pick(ready))
+        # Nothing can run any more: end the owner's wait with an error.
         if self._owner in self._waits:
             waits = name_waits(self._waits, self._participants)
             over = self.limit is not None and self._next_due() is not None

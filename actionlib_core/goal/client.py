@@ -143,7 +143,7 @@ class ClientGoal:
 
     # -- messages of servers -------------------------------------------------------------------
 
-    def hear(self, entry: StatusEntry, session: str, now: float) -> Path | None:
+    def on_entry(self, entry: StatusEntry, session: str, now: float) -> Path | None:
         """Handle a status of the goal; return the states passed, None if there is no such status.
 
         Args:
@@ -197,6 +197,7 @@ class ClientGoal:
         """Handle the result with its final status; return the states passed."""
         if self.over:
             return ()
+        # LOST also stands for a number that is not a status, and for a malformed result.
         if status not in TERMINAL:
             return self.lose(f"the server sent a result with status {status.name}: {text}")
         path = self.on_status(status, text, now)
@@ -431,7 +432,7 @@ class KnownServers:
         """
         return session in self._trusted or not self._fitting
 
-    def hear_foreign(self, session: str, now: float) -> bool:
+    def on_foreign_list(self, session: str, now: float) -> bool:
         """Handle a status list of a session without a token, which may be a bridge to a server.
 
         Late lists of a server that has left do not count.

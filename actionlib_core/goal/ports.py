@@ -149,7 +149,7 @@ class ServerPort(Protocol):
             ServerConflictError: the name has a server.
             TransportError: the session is closed.
 
-        Blocks: until the network has answered who has the name, 1 s at most.
+        Blocks: until the network has listed the servers of the name, 1 s at most.
         """
 
     def close(self) -> None:
@@ -164,7 +164,7 @@ class ServerPort(Protocol):
         Raises:
             TransportError: the session is closed.
 
-        Blocks: until the network has answered who is there, 0.2 s at most.
+        Blocks: until the network has listed the clients, 0.2 s at most.
         """
 
     def send_farewell(self, taken: Iterable[StatusEntry]) -> None:

@@ -305,6 +305,7 @@ class ServerGoals:
         del self.tracked[goal.id]
         self._past[goal.id] = (int(goal.status), now, acknowledged)
         self._oldest.append(goal.id)
+        # Not only in `expire`: many goals may end between two of its calls.
         if len(self._past) > MEMORY_GOALS:
             self._trim(now)
 

@@ -123,15 +123,15 @@ def define_action(name: str, text: str) -> type[Message]:
 
 
 def add_definition(kind: Kind, name: str, text: str, origin: str) -> None:
-    """Make a definition known, in any order with those that it uses.
+    """Register a definition, before or after those that it uses; an existing one is kept.
 
-    It is read when it is asked for, and errors come then. A definition that is there stays.
+    It is parsed on first use, when its errors are raised too.
 
     Args:
         kind: "msg", "srv" or "action".
         name: "my_pkg/Name".
-        text: What a file of that kind would hold.
-        origin: Where it is from, for errors.
+        text: The contents of a file of that kind.
+        origin: The text's origin, for errors.
 
     Raises:
         InterfaceError: The name breaks the rules.

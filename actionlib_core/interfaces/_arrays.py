@@ -27,6 +27,7 @@ STRUCT_CODES = {
 BOOLS = {False: 0, True: 1}
 """A bool's byte; a value that equals neither raises KeyError."""
 
+# numpy's "l" is a C long, of 8 or 4 bytes; ours are the codes of the standard sizes.
 _NATIVE = {"l": "q", "L": "Q"} if struct.calcsize("l") == 8 else {"l": "i", "L": "I"}  # noqa: PLR2004 # 64-bit
 
 

@@ -166,6 +166,8 @@ def _write_array(output: _Output, kind: FieldType, value: str, resolve: Resolve)
         _write_loop(output, kind, name, resolve)
         return
     size = struct.calcsize(code)
+    # The length before a dynamic array has aligned it to 4 bytes. Wider elements need more, unless
+    # there are none.
     if kind.length:
         output.align(size)
     elif size == _WIDEST:

@@ -360,7 +360,7 @@ class _Ros2Reader(_Reader):
     """
 
     def _split(self, line: str) -> tuple[str, str]:
-        quote = ""
+        quote = ""  # within quotes, "#" does not begin a comment
         for index, character in enumerate(line):
             if quote:
                 escaped = line[index - 1] == "\\"

@@ -142,7 +142,7 @@ class Registry:
                 raise
 
     def add_definition(self, kind: Kind, name: str, text: str, origin: str) -> None:
-        """Make a definition known, to be read when it is asked for; one that is there stays."""
+        """Register a definition, which is parsed on first use; an existing one is kept."""
         package, _, short = parse_name(name)
         with self._lock:
             if self.sources.find(kind, package, short) is None:

@@ -166,6 +166,7 @@ class _Stub:
         names = {f.attribute for f in definition.fields} | {
             c.attribute for c in definition.constants
         }
+        # A field called `int` hides the type of that name in its class.
         shadowed = names & _BUILTIN_NAMES
         for constant in definition.constants:
             yield self._constant(constant)

@@ -145,6 +145,7 @@ class _Check:
     def message(self, cls: type[Message], value: Any, path: str) -> Message | None:
         if isinstance(value, cls):
             return self._from_message(cls, value, path)
+        # Other forms only in plain data: a dict in the field of a message is a mistake.
         if self._from_plain and cls._type in HEADERS and value == "auto":
             return cls(stamp=Time.now())  # type: ignore[call-arg] # Header has a stamp
         if self._from_plain and hasattr(value, "keys"):
@@ -186,6 +187,7 @@ class _Check:
         return self._one(cls, kind, value, path)
 
     def _array(self, cls: type[Message], kind: FieldType, value: Any, path: str) -> Any:
+        # Texts and dicts have a length too, but are not arrays.
         if isinstance(value, (str, dict)) or not hasattr(value, "__len__"):
             self._problem(path, f"expected {kind}, got {_kind(value)}")
             return None

@@ -72,6 +72,7 @@ class RemoteNode:
         self._node = node if node is not None else get_node()
         self.name = self._node.resolve(name, "node name")
         self._timeout = check_limit(f"node {name!r}", "timeout", timeout)
+        # The services' types are those of the robot's distribution.
         self._distro = choose_network(self._node.config.ros2, self.name).distro
 
     def get_parameters(self, *names: str) -> dict[str, Any]:
@@ -123,6 +124,7 @@ class RemoteNode:
             for name, result in zip(values, response.results, strict=False)
             if not result.successful
         }
+        # Fewer results than parameters: the node has not answered for the rest.
         refused |= dict.fromkeys(list(values)[len(response.results) :], "got no answer")
         if refused:
             raise RemoteNodeError(self.name, refused)

@@ -70,7 +70,7 @@ class Service(ServiceEnd):
         NodeError: the node is closed.
         ServiceConflictError: the name has a server already.
 
-    Blocks: until the network has answered who has the name, 1 s at most.
+    Blocks: until the network has listed the servers of the name, 1 s at most.
 
     Threads: each call of the handler has a thread of the node's clock, so calls may overlap, block,
         and call services themselves. An exception is sent to the caller and logged. When
@@ -89,6 +89,7 @@ class Service(ServiceEnd):
     ) -> None:
         check_function(f"service {name!r}", "handler", handler)
         super().__init__(name, service_class, node)
+        # Of two servers with the name, the younger stops.
         if self._end.ages:
             self._end.own = with_age(self._end.own, self.node.clock.time_ns())
         self.handler = handler
@@ -262,6 +263,7 @@ class Service(ServiceEnd):
             query.finish()
 
     def _respond(self, result: object) -> Message:
+        # The return values that rospy accepts.
         if isinstance(result, self.response_class):
             return result
         make: Callable[..., Message] = self.response_class

@@ -172,6 +172,7 @@ class ServiceProxy(ServiceEnd):
         else:
             request = self.request_class(*args, **kwargs)
         clock = self.node.clock
+        # The wait for the server is part of the timeout.
         start = clock.now()
         self._find_server()
         left = None if self.timeout is None else max(self.timeout - (clock.now() - start), 0.0)
@@ -199,6 +200,7 @@ class ServiceProxy(ServiceEnd):
             )
 
     def _wait_for_server(self, timeout: float | None) -> bool:
+        # A server of another type ends the wait too, so that it is reported at once.
         self._ends.wait(lambda: self._closed or bool(self._ends.ends(any_type=True)), timeout)
         if self._closed:
             raise NodeError(f"/{self.resolved_name}: not called: the proxy is closed.")

@@ -229,6 +229,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         self._lock = threading.Lock()  # guards `_waiting`
         self._waiting: Backlog[Sample] = Backlog(queue_size or MESSAGES)
         self._call = self._caller()
+        # Last: a message may arrive at once, and needs all of the above.
         self._join(lambda: self._end.receive(self._on_sample))
 
     def _caller(self) -> Callable[[Callable[[], None]], object]:

@@ -153,6 +153,7 @@ class Subscriber(Listener[Sample]):
                 self.inbox.post(self, sample)
 
     def deliver(self, item: Sample) -> None:
+        # A message that was on its way when the link was cut is lost too.
         link = self.session.link
         if not (self.closed or (link is not None and link.is_cut)):
             self._callback(item)
@@ -439,6 +440,8 @@ class MemoryQuery(Entry):
 
     def finish(self) -> None:
         with self.network.lock:
+            # While the link is cut, the end of the answer is not sent: `link_back_locked`, or
+            # `link_dead_locked` after the lease, closes this later.
             self._finished = True
             link = self.session.link
             if link is None or not link.is_cut or link.is_dead:

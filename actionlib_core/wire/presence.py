@@ -92,7 +92,7 @@ def token_key(endpoint: Endpoint) -> str:
 
 def parse_token(key: str) -> Endpoint | None:
     """Return the end that a token's key describes; None if the key is not one of our tokens."""
-    words = key.split("/", WORDS_BEFORE_NAME)
+    words = key.split("/", WORDS_BEFORE_NAME)  # the name keeps its slashes
     if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT:
         return None
     _, kind, session, entity, node, type_name, md5, name = words
@@ -176,6 +176,7 @@ def find_mismatch(endpoints: Iterable[Endpoint], own: Endpoint) -> TypeMismatchE
     return None
 
 
+# In a key, slashes separate words, and a word cannot be empty.
 def _pack(word: str) -> str:
     return word.replace("/", "%") or "-"
 

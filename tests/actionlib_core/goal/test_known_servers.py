@@ -76,7 +76,7 @@ def test_younger_server_that_does_not_give_way_gets_the_new_goals():
 
 def test_goal_of_a_server_without_a_token_goes_to_no_other():
     servers = KnownServers()
-    servers.hear_foreign("bridge", 0.0)
+    servers.on_foreign_list("bridge", 0.0)
     assert servers.find_receiver(ClientGoal("new"), 0.0) == ("bridge", None)
     servers.appear(A, None)
     assert servers.find_receiver(offered("bridge"), 0.0) == ("bridge", None)
@@ -113,7 +113,7 @@ def test_server_of_another_type_is_no_error_beside_a_right_one(right):
     servers = KnownServers()
     servers.appear(A, WRONG)
     if right == "foreign":
-        servers.hear_foreign("bridge", 0.0)
+        servers.on_foreign_list("bridge", 0.0)
     else:
         servers.appear(B, None)
     if right == "leaving":
@@ -166,15 +166,15 @@ def test_server_that_said_farewell_takes_its_own_goals_only():
 def test_status_list_without_a_token_stands_for_a_server_for_a_while():
     servers = KnownServers()
     assert not servers.is_there
-    assert servers.hear_foreign("bridge", 1.0)
-    assert not servers.hear_foreign("bridge", 2.0)
+    assert servers.on_foreign_list("bridge", 1.0)
+    assert not servers.on_foreign_list("bridge", 2.0)
     assert servers.is_there
     assert servers.take_silent(2.0 + STATUS_LIST_TIMEOUT_S - 0.1) == []
     assert servers.take_silent(2.0 + STATUS_LIST_TIMEOUT_S) == ["bridge"]
     assert not servers.is_there
     servers.appear(A, None)
     servers.vanish(A)
-    assert not servers.hear_foreign(A.session, 20.0), "the last words of one that has left"
+    assert not servers.on_foreign_list(A.session, 20.0), "the last words of one that has left"
 
 
 @given(
