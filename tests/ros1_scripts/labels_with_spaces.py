@@ -15,7 +15,7 @@ class Step(State):
         return "ok"
 
 
-rospy.init_node("spaces", log_level=rospy.INFO)
+rospy.init_node("labels-with spaces", log_level=rospy.INFO)
 sm = StateMachine(["all done", "gave up"])
 with sm:
     StateMachine.add("first step", Step("1"), {"ok": "second step", "not ok": "gave up"})

@@ -25,6 +25,7 @@ from actionlib_core.yaml_text import load_yaml
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
 from smachpy.ros1.session import session
 from smachpy.ros1.stubs import Anything
+from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,6 +89,7 @@ def init_node(
         name = str(name)
     if not name or not isinstance(name, str):
         raise ValueError(f"init_node: name: got {name!r}; expected a word.")
+    name = _legal(name)
     if log_level is not None:
         logger.setLevel(_LEVELS.get(log_level, log_level))
     now = session()
@@ -108,6 +110,13 @@ def init_node(
         now.rosout = Publisher("/rosout", Log, queue_size=_MOST_LOGS)
     if not disable_signals:
         now.handle_signals()
+
+
+def _legal(name: str) -> str:
+    """Return a name without the characters that ROS only warned of, `my-node` for example."""
+    made = re.sub(r"[^\w/]", "_", name, flags=re.ASCII)
+    problem = f"init_node: name: got {name!r}; expected letters, digits and '_', as in {made!r}."
+    return made if made != name and accepts(problem) else name
 
 
 def _base(name: str) -> str:
