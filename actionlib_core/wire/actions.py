@@ -355,9 +355,9 @@ class ActionClientPort:
             else self._publishers[self._keys.goal, self._types.action_goal, AGAIN]
         )
         message = pack_goal(stamp_ns, goal_id, stamp_ns, body, token)
+        goals.put(message)  # first, as it fails when the session is closed: nobody would follow it
         if wait and token in self._in_process and (near := in_process.servers.get(token)):
             near.take_goal(Sample(self._keys.goal, message, self._goal_encoding, self._session))
-        goals.put(message)
 
     def send_cancel(self, goal_id: str, stamp_ns: int, *, wait: bool = True) -> None:
         cancels = self._publishers[self._keys.cancel, GoalID, GOAL if wait else AGAIN]

@@ -414,15 +414,15 @@ class _Shown:
 
     def take_goal(self, sample: Sample) -> None:
         """See `in_process.ServerInProcess`."""
-        self._pass_on(sample, copy_follows=True)
+        self._pass_on(sample, self._goals.on_direct_goal)
 
     # -- from clients here ---------------------------------------------------------------------
 
     def _on_goal(self, sample: Sample) -> None:
         if not self._sides.is_own(sample):
-            self._pass_on(sample)
+            self._pass_on(sample, self._goals.on_goal)
 
-    def _pass_on(self, sample: Sample, *, copy_follows: bool = False) -> None:
+    def _pass_on(self, sample: Sample, judge: Callable[[str], Verdict]) -> None:
         if not self._sides.fits(sample, self._types["goal"]):
             return
         try:
@@ -434,10 +434,8 @@ class _Shown:
         if other is not None and other.kind is Kind.ACTION_SERVER and other.name == self._name:
             return  # a late copy of a goal for a server that was here before
         with self._lock:
-            verdict = self._goals.on_goal(goal_id)
+            verdict = judge(goal_id)
             result = self._goals.result(goal_id)
-            if copy_follows:
-                self._goals.expect_copy(goal_id)
         if verdict is Verdict.PASS:
             self._to_server[0].put(sample.payload)
         elif verdict is Verdict.REPEAT_RESULT and result is not None:

@@ -41,20 +41,25 @@ class GoalsOfServer:
         self._known = Recent(REMEMBERED)
         self._listed: dict[str, StatusEntry] = {}
         self._results: dict[str, tuple[float, bytes]] = {}
-        self._copies = Recent(REMEMBERED)
-
-    def expect_copy(self, goal_id: str) -> None:
-        """Take note that a goal that has come comes once more, over the network."""
-        self._copies.add(goal_id)
+        self._came_directly = Recent(REMEMBERED)  # and not yet over the network
+        self._came_by_network = Recent(REMEMBERED)
 
     def on_goal(self, goal_id: str) -> Verdict:
-        """Take a goal from a client, which may be a repetition."""
-        if goal_id in self._copies:
-            del self._copies[goal_id]
+        """Take a goal from a client over the network, which may be a repetition."""
+        self._came_by_network.add(goal_id)
+        if goal_id in self._came_directly:
+            del self._came_directly[goal_id]
             return Verdict.DROP
         if goal_id in self._results:
             return Verdict.REPEAT_RESULT
         return Verdict.DROP if goal_id and goal_id in self._known else Verdict.PASS
+
+    def on_direct_goal(self, goal_id: str) -> Verdict:
+        """Take a goal from a client in this process, which comes over the network too."""
+        if goal_id in self._came_by_network:
+            return Verdict.DROP
+        self._came_directly.add(goal_id)
+        return Verdict.PASS
 
     def on_statuses(self, entries: Iterable[StatusEntry]) -> bool:
         """Take a status list; return whether it says anything new, or anything at all."""

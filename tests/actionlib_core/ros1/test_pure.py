@@ -127,13 +127,15 @@ def test_a_goal_is_passed_until_the_server_speaks_of_it():
     assert goals.on_goal("") is Verdict.PASS
 
 
-def test_the_copy_of_a_goal_is_dropped_once_even_after_the_result():
+def test_of_a_goal_that_comes_both_ways_the_second_is_dropped():
     goals = GoalsOfServer()
-    assert goals.on_goal("g") is Verdict.PASS
-    goals.expect_copy("g")
+    assert goals.on_direct_goal("g") is Verdict.PASS
     goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=0.0)
     assert goals.on_goal("g") is Verdict.DROP
     assert goals.on_goal("g") is Verdict.REPEAT_RESULT
+    assert goals.on_goal("h") is Verdict.PASS
+    assert goals.on_direct_goal("h") is Verdict.DROP
+    assert goals.on_goal("h") is Verdict.PASS  # sent again: the server has not spoken of it
 
 
 def test_a_result_is_sent_again_until_it_is_acknowledged_or_old():
