@@ -172,7 +172,8 @@ class ServerInRos:
         self._definitions = definitions
         self._status_timeout = status_timeout
         self._lock = threading.Lock()
-        self._parts: dict[str, dict[str, Typed]] = {}  # node in ROS 1 -> what it is connected with
+        # Node in ROS 1 -> which of the five -> links with their types, the newest last.
+        self._links: dict[str, dict[str, dict[object, Typed]]] = {}
         self._shown: _Shown | None = None
         self._silent = ""  # node that was there but says nothing any more
         self._heard = 0.0
@@ -212,49 +213,63 @@ class ServerInRos:
         """Take a subscriber of goals or cancels."""
         if ANY in {header.get("type"), header.get("md5sum")}:
             return lambda: None  # it takes any message, to record it: no server
-        node = header.get("callerid", "")
-        self.connect(node, word, type_of(header, f"{self._name}/{word}"))
-        return partial(self.disconnect, node, word)
+        node, link = header.get("callerid", ""), object()
+        self.connect(node, word, link, type_of(header, f"{self._name}/{word}"))
+        return partial(self.disconnect, node, word, link)
 
-    def connect(self, node: str, word: str, typed: Typed) -> None:
-        """Note that a node is connected with one of the five; with all, it is the server."""
+    def connect(self, node: str, word: str, link: object, typed: Typed) -> None:
+        """Note that a node is connected with one of the five; with all, it is the server.
+
+        A process that comes under the name of another one, which ROS 1 ends then, takes its place
+        even if the links to that one have not ended: its computer may have lost its power.
+        """
         with self._lock:
-            parts = self._parts.setdefault(node, {})
-            parts[word] = typed
-            if len(parts) < len(ACTION_WORDS) or self._closed:
+            self._links.setdefault(node, {}).setdefault(word, {})[link] = typed
+            newest = self._newest(node)
+            shown = self._shown
+            if len(newest) < len(ACTION_WORDS) or self._closed:
                 return
-            if self._shown is None:
-                self._show(node)
-            elif self._shown.ros_node != node:
-                text = f"two servers in ROS 1: got {node} beside {self._shown.ros_node}"
+            if shown is not None and shown.ros_node != node:
+                text = f"two servers in ROS 1: got {node} beside {shown.ros_node}"
                 error = Ros1Error(f"action {self._name}", f"{text}; expected one.")
                 self._sides.ros.report(f"servers of {self._name}", error)
+            elif shown is None or shown.links.isdisjoint(newest.values()):
+                self._hide()
+                self._show(node)
 
-    def disconnect(self, node: str, word: str) -> None:
+    def disconnect(self, node: str, word: str, link: object) -> None:
         """Note that one of the five has ended: the server is not there any more."""
         with self._lock:
-            parts = self._parts.get(node, {})
-            parts.pop(word, None)
-            if not parts:
-                self._parts.pop(node, None)
-            if self._shown is not None and self._shown.ros_node == node:
+            words = self._links[node]
+            del words[word][link]
+            if not words[word]:
+                del words[word]
+            if not words:
+                del self._links[node]
+            if self._shown is not None and link in self._shown.links:
                 self._hide()
-                others = (n for n, p in self._parts.items() if len(p) == len(ACTION_WORDS))
-                other = next(others, None)
+                whole = (n for n in self._links if len(self._newest(n)) == len(ACTION_WORDS))
+                other = next(whole, None)
                 if other is not None and not self._closed:
                     self._show(other)
 
+    def _newest(self, node: str) -> dict[str, object]:
+        """Return the newest link of each of the five to a node; with the lock held."""
+        return {word: next(reversed(links)) for word, links in self._links.get(node, {}).items()}
+
     def _show(self, node: str) -> None:
         """Show the server; with the lock held."""
+        newest = self._newest(node)
+        types = {word: self._links[node][word][link] for word, link in newest.items()}
         try:
-            typed = action_type(self._parts[node])
+            typed = action_type(types)
         except Ros1Error as error:
             self._sides.ros.report(f"type of {self._name}", error)
             return
         self._heard, self._silent = self._clock.now(), ""
-        self._shown = _Shown(
-            self._sides, self._name, typed, self._parts[node], node, self._goals, self._cancels
-        )
+        links = frozenset(newest.values())
+        to_server = self._goals, self._cancels
+        self._shown = _Shown(self._sides, self._name, typed, types, node, links, to_server)
 
     def _hide(self) -> None:
         shown, self._shown = self._shown, None
@@ -276,23 +291,25 @@ class ServerInRos:
 
     # -- what it says --------------------------------------------------------------------------
 
-    def take(self, node: str, word: str, payload: bytes) -> None:
+    def take(self, node: str, word: str, link: object, payload: bytes) -> None:
         """Pass on what a node says on `status`, `feedback` or `result`."""
         with self._lock:
-            whole = len(self._parts.get(node, ())) == len(ACTION_WORDS)
-            if word == "status" and node == self._silent and self._shown is None and whole:
-                self._show(node)
+            if word == "status" and node == self._silent and self._shown is None:
+                newest = self._newest(node)
+                if len(newest) == len(ACTION_WORDS) and newest[word] is link:
+                    self._show(node)
             shown = self._shown
-            if word == "status" and shown is not None and shown.ros_node == node:
+            if shown is None or link not in shown.links:
+                return
+            if word == "status":
                 self._heard = self._clock.now()
         if word == "result":  # what was sent before on another connection comes before, here too
             self._subscriptions["feedback"].wait_idle(OVERTAKEN_S)
-        if shown is not None and shown.ros_node == node:
-            try:
-                getattr(shown, f"on_{word}")(payload)
-            except ValueError as error:
-                about = f"{self._name}/{word} of {node}"
-                self._sides.ros.report(about, Ros1Error(about, str(error)))
+        try:
+            getattr(shown, f"on_{word}")(payload)
+        except ValueError as error:
+            about = f"{self._name}/{word} of {node}"
+            self._sides.ros.report(about, Ros1Error(about, str(error)))
 
     def learn(self, header: Header, typed: Typed) -> None:
         """Learn the text of a type from a publisher."""
@@ -310,13 +327,13 @@ class _Part:
         self._word = word
         self._node = header.get("callerid", "")
         server.learn(header, typed)
-        server.connect(self._node, word, typed)
+        server.connect(self._node, word, self, typed)
 
     def take(self, payload: bytes) -> None:
-        self._server.take(self._node, self._word, payload)
+        self._server.take(self._node, self._word, self, payload)
 
     def gone(self) -> None:
-        self._server.disconnect(self._node, self._word)
+        self._server.disconnect(self._node, self._word, self)
 
 
 class _Shown:
@@ -327,17 +344,18 @@ class _Shown:
         sides: Sides,
         name: str,
         typed: Typed,
-        parts: dict[str, Typed],
+        types: dict[str, Typed],
         ros_node: str,
-        goals: Publication,
-        cancels: Publication,
+        links: frozenset[object],
+        to_server: tuple[Publication, Publication],
     ) -> None:
         self.ros_node = ros_node
+        self.links = links
         self._sides = sides
         self._clock = sides.node.clock
         self._name = sides.key(name)
-        self._types = parts
-        self._to_server = goals, cancels
+        self._types = types
+        self._to_server = to_server
         self._lock = threading.Lock()
         self._goals = GoalsOfServer()
         self._clients: dict[in_process.ClientInProcess, None] = {}  # those in this process
@@ -348,8 +366,8 @@ class _Shown:
         end = end._replace(node=sides.key(ros_node))
         self._own_key = token_key(with_age(end, self._clock.time_ns()))
         self._status = transport.publisher(keys.status, STATUS_ARRAY.encoding, STATUS)
-        self._feedback = transport.publisher(keys.feedback, parts["feedback"].encoding, FEEDBACK)
-        self._result = transport.publisher(keys.result, parts["result"].encoding, RESULT)
+        self._feedback = transport.publisher(keys.feedback, types["feedback"].encoding, FEEDBACK)
+        self._result = transport.publisher(keys.result, types["result"].encoding, RESULT)
         self._declared: list[Closable] = [
             *(self._status, self._feedback, self._result),
             transport.subscribe(keys.goal, self._on_goal, history=False),

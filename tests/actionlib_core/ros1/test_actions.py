@@ -141,6 +141,27 @@ def test_a_server_in_ros_that_hangs_is_lost_and_comes_back(ros, bridge, node):
     assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
 
 
+def test_a_server_in_ros_takes_the_place_of_one_of_its_name_that_hangs(ros, bridge, node):
+    old = ros.start("action_server", "taken", "same_name")
+    made = bridge(actions=["taken"], status_timeout=100.0)
+    client = client_of("taken")
+    begun = node.clock.event()
+    client.send_goal(msg.TestGoal(-5), feedback_cb=lambda feedback: begun.set())
+    assert begun.wait(WAIT_S)
+    old.send_signal(signal.SIGSTOP)
+    ros.start("action_server", "taken", "same_name")
+    assert client.wait_for_result(WAIT_S)
+    assert client.get_state() == GoalStatus.LOST
+    assert client.wait_for_server(WAIT_S)
+    assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
+    old.send_signal(signal.SIGKILL)
+    links = made._actions["/taken"]._side._links["/same_name"]
+    while any(len(of_word) > 1 for of_word in list(links.values())):
+        assert send(client, 4) == (GoalStatus.SUCCEEDED, 8)
+    assert client.wait_for_server(WAIT_S)
+    assert send(client, 5) == (GoalStatus.SUCCEEDED, 10)
+
+
 def test_a_recorder_in_ros_hears_goals_and_is_no_server(ros, bridge):
     recorder = ros.start("topics", "recorder")
     recorder.ask("record /recorded/goal")
