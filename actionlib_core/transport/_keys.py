@@ -15,6 +15,7 @@ from actionlib_core.exceptions import TransportError
 _KEY = re.compile(r"[^/*$?#]+(?:/[^/*$?#]+)*")
 
 
+@lru_cache(maxsize=1024)
 def check_key(key: str) -> str:
     """Return `key` unchanged if it is a valid key.
 

@@ -156,7 +156,11 @@ class ZenohTransport:
         on_reply: Callable[[Reply], None],
         on_done: Callable[[], None],
     ) -> Asking:
-        asking = self._declare(lambda: Asking(self, on_reply, on_done), check_key(key))
+        self._check_open(check_key(key))
+        self._check_access(key)
+        asking = Asking(self, on_reply, on_done)
+        with self._lock:
+            self._declared[asking] = None
         callback = direct(asking.take_reply, asking.take_done)
         try:
             self._get(

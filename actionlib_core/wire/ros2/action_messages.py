@@ -15,7 +15,7 @@ import struct
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable
 
 FRONT = b"\x00\x01\x00\x00"  # CDR version 1, little-endian
 UUID_BYTES = 16
@@ -158,14 +158,21 @@ def unpack_canceling(payload: bytes) -> Canceling:
     return Canceling(code, tuple((uuid, sec * _NS + nsec) for uuid, sec, nsec in found))
 
 
-def pack_statuses(goals: Sequence[GoalState]) -> bytes:
+def pack_state(goal: GoalState) -> bytes:
+    """Write an element of GoalStatusArray, one that is not the first; errors as `pack_with_id`."""
+    return _NEXT.pack(_checked(goal.uuid), *_time(goal.stamp_ns), goal.code)
+
+
+def pack_statuses(goals: Iterable[GoalState]) -> bytes:
     """Write GoalStatusArray; errors as `pack_with_id`."""
-    parts = [_COUNT.pack(FRONT, len(goals))]
-    layout = _FIRST
-    for uuid, stamp_ns, code in goals:
-        parts.append(layout.pack(_checked(uuid), *_time(stamp_ns), code))
-        layout = _NEXT
-    return b"".join(parts)
+    return join_statuses([pack_state(goal) for goal in goals])
+
+
+def join_statuses(packed: Collection[bytes]) -> bytes:
+    """Write GoalStatusArray of what `pack_state` has written."""
+    body = b"".join(packed)
+    # Only the first element has its stamp where it needs no padding.
+    return b"".join((_COUNT.pack(FRONT, len(packed)), body[:16], body[19:]))
 
 
 def unpack_statuses(payload: bytes) -> list[GoalState]:

@@ -295,23 +295,25 @@ class RosClientPort:
 
     # -- what is decided -----------------------------------------------------------------------
 
-    def _do(self, goal: _Goal, step: Step) -> None:
+    def _do(self, goal: _Goal, step: int) -> None:
         """Do what `GoalExchange` has decided."""
-        if Step.TELL in step:
-            self._tell(goal)
-        if Step.QUEUE in step:
-            self._enqueue(goal)
-        if Step.ASK in step:
+        if step & Step.ASK:  # first: an answer is awaited
             self._ask_result(goal)
-        if Step.ASK_LATER in step:
+        if step & Step.TELL:
+            self._tell(goal)
+        if not step & ~(Step.ASK | Step.TELL):
+            return
+        if step & Step.QUEUE:
+            self._enqueue(goal)
+        if step & Step.ASK_LATER:
             self._clock.call_later(goal.pause, partial(self._ask_again, goal))
             goal.pause = min(2 * goal.pause, LONGEST_S)
-        if Step.CANCEL in step:
+        if step & Step.CANCEL:
             self._ask_cancel(goal)
-        if Step.KEEPS_RUNNING in step:
+        if step & Step.KEEPS_RUNNING:
             log.warning("action '%s': the server refused to cancel goal %s", self._name, goal.id)
         for end, status, text in ENDS:
-            if end in step:
+            if step & end:
                 self._end(goal, status, text)
 
     def _tell(self, goal: _Goal) -> None:
@@ -391,7 +393,7 @@ class RosClientPort:
             step = goal.exchange.on_result(code, self._clock.now())
             status = goal.exchange.status
             goal.open.pop(self._result, None)  # it is over without being taken back
-        if Step.END not in step:
+        if not step & Step.END:
             self._do(goal, step)
             return
         self._drop(goal)
@@ -556,7 +558,7 @@ class RosClientPort:
 
     def _note_sender(self, goal: _Goal, session: str) -> None:
         """Note which of several servers has a goal, where that is known. Needs the lock."""
-        if any(server.session == session for server in self._there):
+        if session != goal.server and any(server.session == session for server in self._there):
             goal.server = session
 
     # -- servers -------------------------------------------------------------------------------

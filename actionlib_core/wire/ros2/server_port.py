@@ -26,9 +26,10 @@ from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.ros2.action_messages import (
     Canceling,
     GoalState,
+    join_statuses,
     pack_accepted,
     pack_canceling,
-    pack_statuses,
+    pack_state,
     pack_with_id,
     unpack_cancel,
     unpack_id,
@@ -92,6 +93,19 @@ class _Undecided(NamedTuple):
     due: float
 
 
+class _Shown(NamedTuple):
+    """A goal as the list of statuses showed it."""
+
+    status: int
+    code: GoalCode
+    packed: bytes
+
+    @classmethod
+    def make(cls, entry: StatusEntry, code: GoalCode) -> _Shown:
+        packed = pack_state(GoalState(goal_uuid(entry.id), entry.stamp_ns, code))
+        return cls(entry.status, code, packed)
+
+
 class RosServerPort:
     """The ends of an action server on a ROS 2 network; see `ports.make_server_port`.
 
@@ -125,7 +139,7 @@ class RosServerPort:
         self._declared: list[Closable] = []
         self._feedback: PublisherPort | None = None
         self._status: PublisherPort | None = None
-        self._shown: list[GoalState] = []
+        self._shown: dict[str, _Shown] = {}
         self._undecided: dict[str, _Undecided] = {}
         self._waiting: dict[str, list[_Asker]] = {}
         self._refused = Recent(REFUSED_KEPT)
@@ -241,23 +255,32 @@ class RosServerPort:
             return due
 
     def _publish_status(self, listed: list[StatusEntry]) -> None:
-        states = [
-            GoalState(goal_uuid(entry.id), entry.stamp_ns, self._code(entry))
-            for entry in listed
-            if entry.id not in self._undecided  # it may yet be refused, and never be known
-        ]
-        states = [state for state in states if state.code != GoalCode.UNKNOWN]
-        if states != self._shown:
-            stopped = {
-                goal_uuid(entry.id): _BEFORE_CANCEL[entry.status]
-                for entry in listed
-                if entry.status in _BEFORE_CANCEL
-            }
-            skipped = list_skipped(self._shown, states, stopped)
-            for shown in (skipped, states) if skipped else (states,):
-                self._put(self._status, self._names.status, pack_statuses(shown))
-            self._shown = states
-        self._answer_forgotten({entry.id for entry in listed})
+        """Send the list if it has changed; most goals in it have ended, and are as they were."""
+        before = self._shown
+        now: dict[str, _Shown] = {}
+        skipped: dict[str, _Shown] = {}
+        for entry in listed:
+            if entry.id in self._undecided:  # it may yet be refused, and never be known
+                continue
+            known = before.get(entry.id)
+            if known is not None and known.status == entry.status:
+                now[entry.id] = known
+                continue
+            code = self._code(entry)
+            if code == GoalCode.UNKNOWN:
+                continue
+            now[entry.id] = _Shown.make(entry, code)
+            earlier = _BEFORE_CANCEL.get(entry.status, GoalCode.UNKNOWN)
+            if earlier > (known.code if known else GoalCode.UNKNOWN):
+                skipped[entry.id] = _Shown.make(entry, earlier)
+        if now != before:
+            # A client can tell only from the list before a cancel whether the goal has run.
+            for each in (now | skipped, now) if skipped else (now,):
+                payload = join_statuses([shown.packed for shown in each.values()])
+                self._put(self._status, self._names.status, payload)
+            self._shown = now
+        if self._waiting:
+            self._answer_forgotten({entry.id for entry in listed})
 
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:  # noqa: ARG002  replies never wait
         self._decide(entry.id, accepted=entry.status != Status.REJECTED)
@@ -477,25 +500,6 @@ class RosServerPort:
         own = self._ros.full_name, self._ros.token.session
         there = other.full_node, other.session
         return ServerConflictError(self._name, *((there, own) if stays else (own, there)))
-
-
-def list_skipped(
-    before: Iterable[GoalState], now: list[GoalState], stopped: Mapping[bytes, GoalCode]
-) -> list[GoalState]:
-    """Return the list that was skipped and shows what cancelled goals were before their cancel.
-
-    Clients tell from it whether such a goal has run. Empty when none was skipped.
-
-    Args:
-        before: What was shown last.
-        now: What is to be shown.
-        stopped: What the cancelled goals were when they were cancelled.
-    """
-    shown = {goal.uuid: goal.code for goal in before}
-    skipped = {uuid: code for uuid, code in stopped.items() if shown.get(uuid, 0) < code}
-    if not skipped:
-        return []
-    return [goal._replace(code=skipped.get(goal.uuid, goal.code)) for goal in now]
 
 
 def choose_cancelled(goals: Iterable[StatusEntry], asked: Asked) -> list[StatusEntry]:

@@ -24,7 +24,6 @@ from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.action_messages import (
     Asked,
     Canceling,
-    GoalState,
     pack_id,
     pack_with_id,
     unpack_accepted,
@@ -34,7 +33,7 @@ from actionlib_core.wire.ros2.goal_states import GoalCode
 from actionlib_core.wire.ros2.graph import RosType
 from actionlib_core.wire.ros2.names import NO_GOAL, Kind
 from actionlib_core.wire.ros2.parameters import SERVICES
-from actionlib_core.wire.ros2.server_port import DECISION_S, choose_cancelled, list_skipped
+from actionlib_core.wire.ros2.server_port import DECISION_S, choose_cancelled
 from tests.ros2_client import Ros2Client
 
 if TYPE_CHECKING:
@@ -603,16 +602,23 @@ def test_lists_show_whether_a_cancelled_goal_has_run(world: World, accepted: boo
     assert (GoalCode.ACCEPTED in codes) is not accepted
 
 
-def test_list_of_what_was_skipped() -> None:
-    one, two, other = new_id(), new_id(), new_id()
-    now = [GoalState(one, 1, 3), GoalState(two, 2, 5), GoalState(other, 3, 2)]
-    stopped = {one: GoalCode.EXECUTING, two: GoalCode.ACCEPTED}
-    first = list_skipped([], now, stopped)
-    assert first == [GoalState(one, 1, 2), GoalState(two, 2, 1), GoalState(other, 3, 2)]
-    assert list_skipped(first, now, stopped) == []
-    assert list_skipped([GoalState(one, 1, 1), first[1]], now, stopped) == [
-        first[0],
-        now[1],
-        now[2],
-    ]
-    assert list_skipped([], now, {}) == []
+def test_the_list_that_was_skipped_goes_before_a_cancel(world: World) -> None:
+    keeper, client = world.serve().keeper, world.client()
+    ids = [new_id() for _ in range(3)]
+
+    def show(*statuses: Status) -> list[list[int]]:
+        client.statuses.clear()
+        listed = zip(ids, statuses, strict=True)
+        keeper.list_goals = lambda: entries
+        entries = [StatusEntry(uuid.hex(), 1, status, "") for uuid, status in listed]
+        keeper.port.send_status(())
+        world.clock.sleep(0.01)
+        assert all([state.uuid for state in states] == ids for states in client.statuses)
+        return [[state.code for state in states] for states in client.statuses]
+
+    stopped = Status.PREEMPTING, Status.RECALLED, Status.ACTIVE
+    assert show(*stopped) == [[2, 1, 2], [3, 5, 2]]
+    assert show(*stopped) == []
+    assert show(Status.PREEMPTED, Status.RECALLED, Status.SUCCEEDED) == [[5, 5, 4]]
+    assert show(Status.PENDING, Status.ACTIVE, Status.ACTIVE) == [[1, 2, 2]]
+    assert show(Status.PREEMPTED, Status.PREEMPTED, Status.ABORTED) == [[2, 5, 6], [5, 5, 6]]
