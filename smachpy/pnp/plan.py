@@ -140,6 +140,8 @@ def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem
         problems: What its file was found to have already.
     """
     found = list(problems)
+    if not net.places:
+        found.append(problem_of(net, "xml", "error", "got no places; expected a plan."))
     places = [place_label(place.name) for place in net.places]
     labels = [transition_label(transition.name) for transition in net.transitions]
     for number, place in enumerate(places):

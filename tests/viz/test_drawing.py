@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import smachpy
 import viz
 from smachpy import events as ev
+from smachpy import pnp
 from smachpy.introspection import RuleRecord, StateRecord, TransitionRecord, describe
 from viz.pictures import drawing, graphviz_process
 
@@ -328,12 +329,44 @@ def test_a_picture_that_nobody_can_look_at_is_refused_with_the_way_out(build, mo
     assert viz.picture(record, "txt")
 
 
-def test_a_container_that_dot_cannot_lay_out_in_time_is_refused_at_once(build, tmp_path):
-    record = build.rooted(build.machine("M", [build.leaf(f"S{i}") for i in range(1000)], {}))
+def test_a_container_with_too_many_states_is_refused_at_once(build, tmp_path):
+    record = build.rooted(build.machine("M", [build.leaf(f"S{i}") for i in range(5000)], {}))
     for draw in (lambda: viz.picture(record, "png"), lambda: viz.atlas(record, tmp_path / "pages")):
         with pytest.raises(drawing.TooLargeError, match=r"FILE\.txt") as caught:
             draw()
-        assert (caught.value.path, caught.value.states) == ("/M", 1000)
+        assert (caught.value.path, caught.value.states) == ("/M", 5000)
+
+
+@pytest.mark.slow
+def test_a_net_in_which_each_place_leads_to_many_others_is_drawn():
+    """As planners write policies: `dot` is not done with it in minutes."""
+    places = 40
+    net = pnp.Net(
+        "policy",
+        tuple(pnp.Place(f"p{i}", f"at_{i}", int(i == 0)) for i in range(places)),
+        tuple(
+            pnp.Transition(f"t{i}_{j}", f"[seen_{j}]")
+            for i in range(places)
+            for j in range(places)
+            if (i - j) % 3 == 1
+        ),
+        tuple(
+            arc
+            for i in range(places)
+            for j in range(places)
+            if (i - j) % 3 == 1
+            for arc in (
+                pnp.Arc(f"p{i}", f"t{i}_{j}"),
+                pnp.Arc(f"t{i}_{j}", f"p{j}"),
+            )
+        ),
+    )
+    plan = pnp.PetriNetPlan(net)
+    content = viz.picture(plan, "svg").decode()
+    states = states_of(content)
+    assert len(states) == len(set(states)) == 1 + len(net.places) + len(net.transitions) > 500
+    paths = [e for e in ET.fromstring(content).iter(f"{SVG}g") if e.get("class") == "edge"]
+    assert len(paths) >= len(net.arcs)
 
 
 @pytest.mark.slow

@@ -6,15 +6,16 @@ per outcome on the lower border. Lengths are points (1/72 inch), y points up.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import groupby, pairwise, product
 from math import ceil, sqrt
 from typing import TYPE_CHECKING, Any
 
 import graphviz
 
 from viz.pictures import style
-from viz.pictures.curves import around, crossings, length, point, trace, with_stem
+from viz.pictures.curves import around, crossings, length, point, straight, trace, with_stem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,6 +43,8 @@ FOLDS = (2, 3, 4, 6, 8, 12, 16)
 """The numbers of pieces into which a container may be folded."""
 MOST_UNFOLDED = 100
 """A container with more states is always folded: that is readable, and minutes faster."""
+MOST_ARRANGED = 400
+"""In a container with more states, they stand in rows, with straight arrows."""
 
 
 # The attributes that a layout depends on. Without the others, writing and reading takes half the
@@ -62,6 +65,8 @@ class Try:
         back_first: Whether back arrows are placed before the others.
         plain: Straight arrows without sides, for containers that make `dot` crash otherwise.
         pieces: Number of columns for a chain, or of rows for states without arrows between them.
+        in_rows: Whether all states stand in rows. `dot` gets no arrows then: with this many it
+            would need minutes.
     """
 
     side: str = "e"
@@ -69,6 +74,7 @@ class Try:
     back_first: bool = False
     plain: bool = False
     pieces: int = 1
+    in_rows: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +101,8 @@ class Page:
 
 def tries(box: Box) -> tuple[Try, ...]:
     """Return the ways to lay out a container; they differ only in how they treat back arrows."""
+    if len(box.boxes) > MOST_ARRANGED:  # 1.2: a state is wider than high
+        return (Try(pieces=ceil(1.2 * sqrt(len(box.boxes))), in_rows=True),)
     if len(box.boxes) > MOST_UNFOLDED:
         return folds(box)
     back = [arrow for arrow in box.arrows if arrow.back]
@@ -108,6 +116,8 @@ def tries(box: Box) -> tuple[Try, ...]:
 def folds(box: Box) -> tuple[Try, ...]:
     """Return the ways to fold a container that is too long or too wide otherwise."""
     states = len(box.boxes)
+    if states > MOST_ARRANGED:
+        return ()
     if states > MOST_UNFOLDED:  # only one way: each takes seconds at this size
         return (Try(pieces=ceil(sqrt(states) / 2)),)
     return tuple(Try(pieces=pieces) for pieces in FOLDS if pieces <= min(states // 2, 16))
@@ -156,13 +166,24 @@ def page_text(box: Box, how: Try, theme: Theme, pages: Mapping[int, Page]) -> st
     loops = {arrow.name for child in box.boxes for arrow in _loops(box, child)}
     piece = pieces_of(box, how.pieces)
     for arrow in sorted(box.arrows, key=lambda arrow: how.back_first and not arrow.back):
-        if arrow.name not in loops:
+        if arrow.name not in loops and (arrow.tail == arrow.head or not how.in_rows):
             apart = piece.get(arrow.tail.box, 0) != piece.get(arrow.head.box, 0)
             between = apart and arrow.tail.box in piece and arrow.head.box in piece
             _write_arrow(dot, box, arrow, how, free=between)
-    if how.pieces > 1:
+    if how.in_rows:
+        dot.attr("graph", nodesep="0.8")  # room for the arrows' labels
+        _write_rows(dot, [box.entry.name, *piece], {box.entry.name: -1, **piece})
+    elif how.pieces > 1:
         _write_folds(dot, box, piece)
     return str(dot.source)
+
+
+def _write_rows(dot: graphviz.Digraph, names: list[str], row: Mapping[str, int]) -> None:
+    """Invisible arrows: each state stands below one of the row before."""
+    rows = [list(each) for _, each in groupby(names, row.__getitem__)]
+    for above, below in pairwise(rows):
+        for i, name in enumerate(below):
+            dot.edge(above[min(i, len(above) - 1)], name, style="invis")
 
 
 def _write_folds(dot: graphviz.Digraph, box: Box, piece: Mapping[str, int]) -> None:
@@ -301,6 +322,12 @@ def read_page(box: Box, result: Mapping[str, Any], pages: Mapping[int, Page]) ->
         edge["id"]: {key: edge[key] for key in ("pos", "lp") if key in edge}
         for edge in _arrows(result)
     }
+    loops = [arrow for child in box.boxes for arrow in _loops(box, child)]
+    arrows = Counter(anchor for arrow in box.arrows for anchor in (arrow.tail, arrow.head))
+    for arrow in box.arrows:
+        if arrow.name not in curves and arrow not in loops:
+            label_at_tail = arrows[arrow.tail] < arrows[arrow.head]
+            curves[arrow.name] = _straight(box, arrow, found, label_at_tail=label_at_tail)
     left, right, top = _extent(result, curves)
     spots = {name: point(item["pos"]) for name, item in found.items()}
     assert box.entry is not None
@@ -330,6 +357,22 @@ def read_page(box: Box, result: Mapping[str, Any], pages: Mapping[int, Page]) ->
     )
     _draw_loops(box, pages, page)
     return page
+
+
+def _straight(
+    box: Box, arrow: Arrow, found: Mapping[str, Mapping[str, Any]], *, label_at_tail: bool
+) -> dict[str, str]:
+    """Return an arrow that `dot` has not seen, from border to border."""
+    tail, head = (
+        found[_end(anchor, box, "s").partition(":")[0]] for anchor in (arrow.tail, arrow.head)
+    )
+    ends = point(tail["pos"]), point(head["pos"])
+    sizes = [(_size(item, "width") / 2, _size(item, "height") / 2) for item in (tail, head)]
+    curve = {"pos": straight(ends, sizes, back=arrow.back)}
+    if "label" in arrow.attributes:  # where fewer arrows meet
+        (x, y), (_, high) = (ends[0], sizes[0]) if label_at_tail else (ends[1], sizes[1])
+        curve["lp"] = f"{x:.2f},{y + high + LABEL[1]:.2f}"
+    return curve
 
 
 def _extent(

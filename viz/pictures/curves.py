@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from itertools import combinations, pairwise
-from math import dist
+from math import dist, hypot, inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -68,6 +68,31 @@ def with_stem(curve: str, x: float, top: float) -> str:
     stem = [(x + (first_x - x) * part, top + (first_y - top) * part) for part in (0, 1 / 3, 2 / 3)]
     text = " ".join(f"{px:.2f},{py:.2f}" for px, py in stem)
     return f"{head}e,{arrow} {text} {points}"
+
+
+def straight(
+    ends: tuple[Point, Point], halves: Sequence[tuple[float, float]], *, back: bool
+) -> str:
+    """Return a straight arrow between two boxes.
+
+    Args:
+        ends: The centres of the boxes, that with the arrow's tip last.
+        halves: Half the width and height of each.
+        back: Write it from its tip to its tail, as Graphviz has arrows that point back.
+    """
+    (x, y), (to_x, to_y) = ends
+    dx, dy = to_x - x, to_y - y
+    whole = hypot(dx, dy) or 1.0
+    inside = [
+        min(wide / abs(dx) if dx else inf, high / abs(dy) if dy else inf) for wide, high in halves
+    ]
+    begin, tip = min(inside[0], 0.5), max(1.0 - inside[1], 0.5)
+    stop = max(begin, tip - ARROW / whole)
+    places = [begin, begin + (stop - begin) / 3, stop - (stop - begin) / 3, stop]
+    line = [f"{x + dx * at:.2f},{y + dy * at:.2f}" for at in places]
+    if back:
+        line.reverse()
+    return f"{'s' if back else 'e'},{x + dx * tip:.2f},{y + dy * tip:.2f} {' '.join(line)}"
 
 
 def around(start: Point, end: Point, lane: float, floor: float, corner: float) -> str:

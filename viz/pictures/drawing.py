@@ -35,8 +35,8 @@ MOST_PIXELS = 16000
 """Longest side of a PNG."""
 LARGEST = 14_400
 """Longest side of a picture [points]: a PDF page may not be larger, and readers refuse it."""
-MOST_STATES = 400
-"""Most states in one container, side by side; `dot` needs minutes for more."""
+MOST_STATES = 4000
+"""Most states in one container, side by side; nobody can follow the arrows between more."""
 
 
 FORMATS = ("dot", "gv", "json", "mmd", "pdf", "png", "svg", "txt")
@@ -99,7 +99,7 @@ def render(
     Raises:
         PictureError: unknown format or theme, or the file cannot be written.
         TooLargeError: an SVG, PNG or PDF would be longer than 14,400 points, or a container has
-            more than 400 states side by side.
+            more than 4,000 states side by side.
         UnknownPathError: `path` or one of `active` names no state.
         EngineError: there is no `dot` program, or it failed.
 
@@ -284,7 +284,7 @@ def _draw(diagram: Diagram, form: graphviz_process.Format, theme: Theme) -> byte
 
 
 def _check_states(roots: Iterable[Node]) -> None:
-    """Refuse containers that `dot` would work on for minutes."""
+    """Refuse containers that are too large to look at."""
     for node in (node for root in roots for node in root.walk()):
         if len(node.children) > MOST_STATES:
             raise TooLargeError(

@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import viz
+from smachpy.checks import check
 from smachpy.exceptions import InvalidStateError
 from smachpy.pnp import (
     Arc,
@@ -14,6 +16,7 @@ from smachpy.pnp import (
     PlanError,
     Transition,
     explore,
+    load_plan,
     parse_pnml,
     pnml_text,
     read_pnml,
@@ -128,7 +131,7 @@ def test_what_is_wrong_is_told_with_its_line(old, new, rule, line):
     assert str(first).startswith(f"x.pnml:{line}: ")
 
 
-@pytest.mark.parametrize("data", [b"", b"\x00\xff", b"<a/>", b"<pnml/>", b"<pnml><net/></pnml>",
+@pytest.mark.parametrize("data", [b"", b"\x00\xff", b"<a/>", b"<pnml/>",
                                   b'<?xml version="1.0" encoding="nonsense"?><pnml/>', b"\xff\xfe<"])  # fmt: skip
 def test_hostile_bytes(data):
     with pytest.raises(PlanError):
@@ -195,3 +198,14 @@ def test_the_2009_form_has_its_namespace(tmp_path):
     net, _ = parse_pnml(JARP)
     root = ET.parse(write_pnml(net, tmp_path / "x.pnml", dialect="2009")).getroot()
     assert root.tag == "{http://www.pnml.org/version-2009/grammar/pnml}pnml"
+
+
+def test_a_net_without_places_is_checked_and_drawn_and_does_not_run(tmp_path):
+    file = tmp_path / "empty.pnml"
+    file.write_text('<pnml><net id="n1" type="PTNet"></net></pnml>')
+    plan = load_plan(file, to_run=False)
+    assert any("got no places; expected a plan" in each.message for each in check(plan).problems)
+    assert explore(plan.plan.net).came == {(): None}
+    assert b"empty" in viz.picture(plan, "svg")
+    with pytest.raises(PlanError, match="got no places"):
+        load_plan(file)
