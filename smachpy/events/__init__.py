@@ -460,6 +460,7 @@ def to_record(event: Event) -> dict[str, Any]:
     replaced by their `repr`, and values that are too long for display are cut, or replaced by their
     size.
     """
+    # One `Room` for the whole record: many values of medium size are cut as one large value is.
     record: dict[str, Any] = {"kind": type(event).__name__}
     room = Room()
     for key, value in event._asdict().items():
@@ -496,6 +497,7 @@ def from_record(record: dict[str, Any]) -> Event:
     kind = _BY_NAME.get(name) if isinstance(name, str) else None
     if kind is None:
         raise ValueError(f"event record: kind: got {name!r}; expected one of {sorted(_BY_NAME)}.")
+    # JSON has lists where events have tuples.
     fields = {key: tuple(v) if isinstance(v, list) else v for key, v in fields.items()}
     try:
         return kind(**fields)

@@ -164,6 +164,7 @@ class EventBuffer:
 
     def put(self, entry: tuple[Any, ...]) -> None:
         """Append an entry (see `SLOTS`) and notify the reader."""
+        # No lock: `extend` is atomic, and readers take entries from the front under `_cut`.
         entries = self._entries
         entries.extend(entry)
         if len(entries) >= self._full:
@@ -180,6 +181,8 @@ class EventBuffer:
 
     def _thin(self) -> None:
         """Thin out the entries above the limit."""
+        # Only entries beyond `limit` are thinned out, so that a reader that is a little late gets
+        # everything. Entries that are appended meanwhile follow the slice that is replaced.
         with self._cut:
             tail = self._entries[self._most :]
             if self._most + len(tail) < self._full:
@@ -229,6 +232,7 @@ class EventBuffer:
 
     def _take_all(self) -> list[Any]:
         with self._cut:
+            # A copy and a deletion of the same length: entries that are appended in between stay.
             entries = self._entries
             found = entries[:]
             del entries[: len(found)]

@@ -219,6 +219,7 @@ class Control:
         Blocks: until a command lets the step run, or a preempt arrives.
         """
         path = f"{frame.path}/{step.label}"
+        # A breakpoint pauses the whole machine, not only this branch.
         if (path, None) in self._breakpoints:
             self._pause()
             reason = "breakpoint"
@@ -289,6 +290,7 @@ class Control:
         try:
             while self._paused and not self._take_step():
                 visit = frame.visit
+                # Called off: the caller sees the same flags and does not start the state.
                 if container._preempt_requested or (visit is not None and visit.is_asked()):
                     return
                 if until is not None and until():
@@ -344,6 +346,7 @@ class Control:
             frame.run.journal.asked_one(frame, step, override)
         if not ask_child(frame, step, override):
             raise ControlError(path, "it has just ended", self.active())
+        # The state may wait at the gate; all of them check again whether they were called off.
         with self._lock:
             waiting = list(self._waiting.values())
         for event in waiting:

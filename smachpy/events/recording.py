@@ -158,12 +158,13 @@ class Recorder:
             if run and run_of(self.path) == run:
                 self._file = self._continued()
             else:
+                # "x": an existing file is never overwritten, even if two processes begin at once.
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self._file = self.path.open("x", encoding="utf-8")
                 made_ns = RealClock().time_ns()
                 header = header_line(describe(machine), clock.time_ns(), made_ns=made_ns, run=run)
                 self._file.write(header)
-                self._file.flush()
+                self._file.flush()  # readable from now on, also if the process is killed
         except FileExistsError as error:
             raise RecordingError(
                 path, "the file exists; expected a new name, runs are never overwritten."
@@ -193,6 +194,7 @@ class Recorder:
 
         Blocks: 2 s at most.
         """
+        # No new events from here on; the last ones are written by one more call of `_write`.
         self._closed = True
         self._buffer.close()
         self._on_news()
@@ -399,7 +401,8 @@ def _check_stamp(stamp_ns: int) -> int:
 
 def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
-        event: dict[str, Any] = json.loads(line, parse_constant=str)  # browsers know no NaN
+        # NaN and Infinity, which Python's JSON has and browsers refuse, become texts.
+        event: dict[str, Any] = json.loads(line, parse_constant=str)
         for name, kind in _FIELDS.items():
             if type(event[name]) is not kind:
                 raise ValueError(f"{name}: {event[name]!r}")
@@ -458,6 +461,7 @@ def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
         RecordingError: there is no such file or folder, or a given file cannot be read.
     """
     for place in places:
+        # Headers first: only files of the same durable run must be held in memory together.
         paths = find_recordings([place])
         runs = [run_of(path) for path in paths]
         parts: dict[str, list[Recording]] = {}

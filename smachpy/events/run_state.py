@@ -190,6 +190,7 @@ class RunState:
         state["outcomes"][outcome] = state["outcomes"].get(outcome, 0) + 1
 
     def _on_preempt(self, record: dict[str, Any]) -> None:
+        # The first request counts: it has the first cause, and the grace runs from it.
         state = self._state(record["path"])
         if state["since"] is not None and not state.get("preempt"):
             asked = {name: record.get(name) for name in ("source", "by", "why", "grace")}
@@ -202,6 +203,7 @@ class RunState:
 
     def holding_up(self) -> list[str]:
         """Return the paths of the leaves that were asked to stop and are still running."""
+        # A container waits for its children, so only the innermost ones delay the preempt.
         asked = [
             path
             for path, state in self.data["states"].items()
@@ -241,6 +243,7 @@ class RunState:
         return dict(sorted(found, key=lambda one: (one[1]["asked"], one[0])))
 
     def _on_userdata(self, record: dict[str, Any]) -> None:
+        # A state writes to the userdata of the container above it.
         container = record["path"].rpartition("/")[0] or record["path"]
         userdata, name = self.data["userdata"], f"{container} {record['key']}"
         userdata.pop(name, None)  # so that the newest write is the last item
@@ -267,6 +270,7 @@ class RunState:
             "ended": None,
             "attempt": self._state(record["path"]).get("attempt", 1),
         }
+        # Bounded, as a mission may send goals for weeks; running goals are always kept.
         ended = [goal_id for goal_id, goal in goals.items() if goal["ended"] is not None]
         ended.sort(key=lambda goal_id: (goals[goal_id]["since"], goal_id))
         for goal_id in ended[:-ENDED_GOALS]:

@@ -139,6 +139,7 @@ class Feed:
 
         Blocks: at most 2 s.
         """
+        # First stop what submits work, then let the executor do the rest, then leave the topics.
         self._presence.close()
         self._watchers.clear()
         self._executor.submit(self._listen)
@@ -184,6 +185,8 @@ class Feed:
 
     def _collect(self) -> dict[str, str]:
         """Encode new events; return path -> kind of its newest event."""
+        # Called by the executor and by the history service; the lock keeps the events in order.
+        # Without a viewer nothing is sent: the next one gets these events with the history.
         kinds: dict[str, str] = {}
         with self._lock:
             wanted = self._is_open and self._events.get_num_connections() > 0
@@ -193,7 +196,7 @@ class Feed:
                     self._executor.submit(self._describe)
                     journal = self._machine._smachpy.journal
                     self._run = "" if journal is None else journal.run
-                record["seq"] += self._before
+                record["seq"] += self._before  # continues the numbers of the earlier process
                 text = record_text(record)
                 self._keep(record, text)
                 if wanted:
@@ -203,6 +206,7 @@ class Feed:
     def _keep(self, record: dict[str, Any], text: str) -> None:
         self._kept.append((record, text))
         self._kept_bytes += len(text)
+        # Events that are dropped here go into `base`, so that the history is still complete.
         while len(self._kept) > KEPT_EVENTS or self._kept_bytes > KEPT_BYTES:
             old, text = self._kept.popleft()
             self._kept_bytes -= len(text)

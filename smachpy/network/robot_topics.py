@@ -96,7 +96,7 @@ class RobotTopics:
         with self._lock:
             self._listeners.append(listener)
             first = len(self._listeners) == 1
-        if first:
+        if first:  # without the lock: joining a network may take a while
             self._begin()
         return partial(self._leave, listener)
 

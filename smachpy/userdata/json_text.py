@@ -92,6 +92,8 @@ def _encode_dict(value: dict[Any, Any], inside: Callable[[Any], Any]) -> Any:
     return {"$items": [[inside(key), inside(item)] for key, item in value.items()]}
 
 
+# Pairs (class, encoder), tried in this order; subclasses are encoded as their base class. Sets are
+# sorted, so that equal userdata gives equal text and is not sent again.
 _ENCODERS: tuple[tuple[Any, Callable[[Any, Callable[[Any], Any]], Any]], ...] = (
     (int, lambda value, _: int(value)),
     (float, lambda x, _: float(x) if math.isfinite(x) else {"$float": str(float(x))}),
@@ -117,6 +119,7 @@ def _decode(data: Any, where: str) -> Any:
         return _decode_list(data, where)
     if not isinstance(data, dict):
         return data
+    # `dumps` writes a dict with a key that begins with `$` as `$items`, so these are marks only.
     marks = [key for key in data if key.startswith("$")]
     if not marks:
         return {key: _decode(value, f"{where}.{key}") for key, value in data.items()}

@@ -24,7 +24,8 @@ from smachpy.slips import accepts
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: the class was not compiled into the interpreter
+# Py_TPFLAGS_HEAPTYPE: set for classes made by a `class` statement, not for static types of C code.
+_HEAP_TYPE = 1 << 9
 
 # Types whose instances cannot change: they need no view.
 ATOMS: frozenset[type] = frozenset(
@@ -64,6 +65,8 @@ def still_shows(view: Any, value: Any) -> bool:
 def _list_still_shows(view: list[Any], value: list[Any]) -> bool:
     if len(view) != len(value):
         return False
+    # First the fast way, a loop in C: immutable elements are the same objects in view and original.
+    # Identity, not `==`, which could be the user's code, and which equates 1, 1.0 and True.
     pairs = zip(view, value, strict=False)
     return all(map(is_, view, value)) or all(x is y or still_shows(x, y) for x, y in pairs)
 
@@ -164,6 +167,8 @@ _CHANGES: dict[type, tuple[str, ...]] = {
 @functools.lru_cache(maxsize=1024)
 def _maker(kind: type) -> Callable[[Any, str], Any] | None:
     """Return the function that makes a view of an instance of `kind`; None if it needs no view."""
+    # A view is read-only already, a frozenset cannot change, and classes, enum members and
+    # exceptions are compared by identity, so a view of them would not be equal to them.
     if issubclass(kind, (_View, type, enum.Enum, BaseException, frozenset)):
         return None
     if kind.__module__ == "numpy" and kind.__name__ == "ndarray":
@@ -211,13 +216,14 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | No
     has_dict = kind.__dictoffset__ != 0
 
     def make(value: Any, key: str) -> Any:
+        # Without `__init__`, which may do anything: attributes are shared or copied below.
         view = new(view_class)
         if base is not None:
             _fill(base, view, value, key)
         for slot in slots:
             with contextlib.suppress(AttributeError):  # an empty slot
                 object.__setattr__(view, slot, object.__getattribute__(value, slot))
-        if has_dict:
+        if has_dict:  # the same dict, so that later changes of the object are seen in the view
             object.__setattr__(view, "__dict__", value.__dict__)
         object.__setattr__(view, "_smach_original", value)
         object.__setattr__(view, "_smach_key", key)
@@ -236,6 +242,8 @@ def _view_class(kind: type, base: type | None) -> Any:
             return value
         return read_only(value, self._smach_key)
 
+    # For built-in containers the mutating methods are known and replaced. For other objects every
+    # attribute is read-only, and values read from it become views in `__getattribute__`.
     changes = () if base is None else _CHANGES[base]
     body: dict[str, Any] = {name: _refuser(base or object, name) for name in changes}
     body |= {

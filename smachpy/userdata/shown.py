@@ -75,6 +75,8 @@ def _fits(value: Any, left: Room, above: set[int]) -> bool:
     size = _size(value)
     if size is not None and size > min(LONGEST_LIST, left.items):
         return False
+    # `above` has the ids of the values around this one: Python's `repr` shows a cycle as "...", so
+    # it adds nothing here.
     inside = _inside(value)
     return inside is None or id(value) in above or _all_fit(inside, left, {*above, id(value)})
 

@@ -203,12 +203,14 @@ class Remapper:
         return key in self._input and self._input[str(key)] in self._data
 
     def __getitem__(self, key: str) -> Any:
+        # The hot path of userdata: two look-ups, and no view for a number or text.
         try:
             value = self._data[self._input[key]]
         except KeyError:
             self._unreadable(key)
         if type(value) in ATOMS or key in self._output:
             return value
+        # Only views of lists and dicts are expensive to make and cheap to compare.
         if type(value) is list or type(value) is dict:
             return self._view_of(key, value)
         return read_only(value, key)
@@ -248,7 +250,7 @@ class Remapper:
         return f"Remapper({values})"
 
     def _unreadable(self, key: str) -> NoReturn:
-        if key[:1] == "_":
+        if key[:1] == "_":  # never a key; Python looks for `__deepcopy__` and the like here
             raise AttributeError(key) from None
         if key in self._input:
             name = self._input[key]
@@ -265,6 +267,7 @@ class Remapper:
 
     def _refuse_write(self, key: str) -> None:
         """Raise an error; in programs for ROS 1 drop the write instead, as SMACH did."""
+        # The path is not in the text of the error, which adds it, but it is in that of the warning.
         declared = sorted(self._output)
         problem = (
             f"userdata key written but not declared: got {key!r}; declared output keys: "
