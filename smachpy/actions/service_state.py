@@ -171,9 +171,8 @@ class ServiceState(State):
                 while not (call.over or self.preempt_requested()):
                     wake.wait_until()
                     wake.clear()
-            except (
-                BaseException
-            ):  # such as KeyboardInterrupt: do not leave the call's thread behind
+            except BaseException:
+                # Such as KeyboardInterrupt: do not leave the call's thread behind.
                 self.__drop_proxy()
                 raise
         if not call.over:

@@ -1,10 +1,10 @@
-"""Static checks of a machine: what is certainly wrong with it, found without running it.
+"""Static checks of a machine: they find definite mistakes without running it.
 
     report = smachpy.check(machine, properties=[never("ABORT"), before("UNDOCK", "DRIVE")])
     report.assert_ok()
 
 A check takes milliseconds. Rules have ids (`RULES`); a few are off unless the argument `enable`
-names them. All are switched off with a reason: by `ignore(state, rule, reason)`, by a comment
+names them. A rule is switched off, with a reason, by `ignore(state, rule, reason)`, by a comment
 `# smachpy: ignore[rule] reason` in the state's class or function, by the argument `ignores`, or in
 pyproject.toml under [tool.smachpy.check].
 """
@@ -63,21 +63,21 @@ def check(
     enable: Iterable[str] = (),
     name: str | None = None,
 ) -> Report:
-    """Look for everything that is certainly wrong with `machine`.
+    """Check a machine for definite mistakes.
 
     Args:
         machine: Any container; it is not run.
-        properties: What must hold for every run; as objects or texts ("never(/PATROL/ABORT)").
-        ignores: Rules that are off, with reasons.
-        enable: Rules that are on, of those that are off by themselves ("no-timeout").
+        properties: Properties of every run, as objects or texts ("never(/PATROL/ABORT)").
+        ignores: Rules to switch off, with reasons.
+        enable: Rules to switch on that are off by default ("no-timeout").
         name: Name of the machine in paths; default: its own.
 
     Raises:
-        PropertyError: a property names a state or outcome that is not there.
-        IgnoreError: a comment switches off a rule that is not there, or gives no reason; or
-            `enable` names one that is not there.
+        PropertyError: a property names a state or outcome that does not exist.
+        IgnoreError: a comment switches off a rule that does not exist, or gives no reason; or
+            `enable` names one that does not exist.
     """
-    begun = time.perf_counter()  # wall time of the check itself, no mission's time
+    begun = time.perf_counter()  # the duration of the check itself, whatever the current clock is
     on = {rule.name for rule in RULES.values() if rule.is_on}
     for rule in enable:
         check_rule("check: enable", rule)
@@ -90,7 +90,9 @@ def check(
         from smachpy.checks import plans  # most machines have none
 
         problems += plans.find(machine, record.path)
-    if not any(problem.rule in facts.HOLDS_BACK for problem in problems):
+    # The graph of an inconsistent machine would have edges to nowhere: report only what keeps it
+    # from running.
+    if not any(problem.rule in facts.PREVENTS_RUN for problem in problems):
         moments = graph.build(subject)
         problems += structure.find(subject, moments)
         problems += userdata.find(subject, moments)

@@ -1,4 +1,4 @@
-"""`smachpy check`: static checks from the command line."""
+"""`smachpy check`: runs static checks from the command line."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
-    parser = subparsers.add_parser("check", help="find what is wrong with a machine, without a run")
+    parser = subparsers.add_parser("check", help="find mistakes in a machine without running it")
     parser.add_argument(
         "targets",
         nargs="+",
         metavar="TARGET",
         help="mission, module:factory, path.py[:factory] or plan.pnml",
     )
-    parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="of the report")
+    parser.add_argument("--format", choices=sorted(FORMATS), default="text", help="report format")
     parser.add_argument(
         "--property",
         action="append",
         default=[],
         dest="properties",
-        help="what must hold for every run: never(STATE), always_reaches(OUTCOME, ...), "
-        "before(STATE, STATE), after_preempt(STATE); may be repeated",
+        help="a property of every run: never(STATE), always_reaches(OUTCOME, ...), "
+        "before(STATE, STATE), after_preempt(STATE) (repeatable)",
     )
     parser.add_argument(
         "--enable",
         action="append",
         default=[],
         metavar="RULE",
-        help="look for what is off by itself: no-timeout; may be repeated",
+        help="switch on a rule that is off by default: no-timeout (repeatable)",
     )
     parser.add_argument("--pictures", metavar="FOLDER", help="draw the runs that show problems")
     add_ros1_options(parser, loads=True)
@@ -52,7 +52,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check the targets; 1 when there are problems."""
+    """Check the targets; return 1 if there are problems."""
     settings = read_settings(Path.cwd())
     reports = [_check(text, args, settings) for text in args.targets]
     print(printable(FORMATS[args.format](reports)))
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tell_unused(settings: Settings, checked: list[str]) -> None:
-    """Say which properties of pyproject.toml no machine had: other machines', or a wrong name."""
+    """Report properties in pyproject.toml that no checked machine has: a wrong name, perhaps."""
     for name, _ in settings.properties:
         if name not in checked:
             print(

@@ -1,4 +1,4 @@
-"""What is known of the states of a machine: from the objects and from their source."""
+"""Collects facts about the states of a machine, from the objects and from their source."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from smachpy.introspection import StateRecord
 
-# Kinds of states that wait for something outside, and the detail that says how long.
+# Kinds of states that wait for something external, and the detail with their timeout.
 _LIMITS = {
     "action": ("exec_timeout", "the goal"),
     "service": ("timeout", "the call"),
@@ -32,18 +32,18 @@ _LIMITS = {
 }
 
 
-HOLDS_BACK = frozenset({"inconsistent", "unmapped-outcome", "wrong-signature"})
+PREVENTS_RUN = frozenset({"inconsistent", "unmapped-outcome", "wrong-signature"})
 """Rules of `find_problems`: a machine with such a problem would not run."""
 
 
 def find_problems(state: State, path: str) -> Iterator[Problem]:
-    """Yield what holds a machine from running: inconsistencies and wrong signatures of `execute`.
+    """Yield what keeps a machine from running: inconsistencies and wrong signatures of `execute`.
 
-    `add` refuses most of it; what a program has changed afterwards is found here.
+    `add` refuses most of them; changes that a program made afterwards are found here.
     """
     for text in state.find_problems(path) if isinstance(state, Container) else ():
         if state._smachpy_kind == "plan" and not text.startswith(f"{path}: one state"):
-            continue  # told by `smachpy.checks.plans`, with its line
+            continue  # reported by `smachpy.checks.plans`, with its line in the plan's file
         rule = "unmapped-outcome" if "outcome has no transition" in text else "inconsistent"
         yield Problem(rule, RULES[rule].severity, text.partition(": ")[0], text)
     for text in _signature_problems(state):
@@ -64,25 +64,26 @@ def _signature_problems(state: State) -> Iterator[str]:
         yield "execute: got a function with `yield`, which returns no outcome; expected `return`."
 
 
-# CPython 3.11 counts the depth of all threads' parsers together, and may raise SystemError
-# if two parse at once: a check, and the viewer's in its thread.
+# CPython 3.11 counts the recursion depth of all threads' parsers together, and may raise
+# SystemError if two threads parse at once: a check here, and the viewer's check in its thread.
 _reading = threading.Lock()
 
 
 def collect(machine: State, record: StateRecord) -> Subject:
-    """Return a machine with what is known of it and all below it."""
+    """Return a machine with the facts about it and all its states."""
     facts: dict[str, Facts] = {}
     containers: dict[str, Container] = {}
 
     def walk(state: State, record: StateRecord) -> StateRecord:
-        """Return the part of a machine that its structure says how it runs."""
+        """Collect facts; return the record without states that are run by code of the user."""
         if isinstance(state, Container) and not _has_own_execute(state):
             containers[record.path] = state
             facts[record.path] = _of_container(state)
             states = state.get_children()
             children = tuple(walk(states[child.label], child) for child in record.children)
             return replace(record, children=children)
-        if isinstance(state, Container):  # it may run its states in any way: it counts as a leaf
+        # With its own `execute` it may do anything: it is a leaf here.
+        if isinstance(state, Container):
             containers[record.path] = state
             record = replace(
                 record, kind="state", children=(), initial=(), transitions=(), rules=()
@@ -94,6 +95,8 @@ def collect(machine: State, record: StateRecord) -> Subject:
 
     with _reading:
         record = walk(machine, record)
+    # Values may appear from outside if machines share their userdata, or if a state's code uses the
+    # userdata of some machine: nothing is certain about unset keys then.
     owners = Counter(id(container.userdata) for container in containers.values())
     anywhere = any(known.reaches for known in facts.values())
     for path, container in containers.items():
@@ -155,7 +158,7 @@ def _of_leaf(state: State, record: StateRecord) -> Facts:
     )
     if code is None:
         return replace(facts, reads=None if _is_foreign(type(state)) else _sent_keys(state))
-    # An outcome that the constructor names is declared in some cases, and returned in these.
+    # An outcome named in the constructor may be declared in some cases, and returned only then.
     known = {*record.outcomes, *source.texts_in_constructors(type(state)), "preempted"}
     returns = code.returns or {}
     return replace(
@@ -172,14 +175,14 @@ def _of_leaf(state: State, record: StateRecord) -> Facts:
 
 
 def _function(given: Any) -> Callable[..., Any] | None:
-    """Return the plain function that a callback or the state of one calls, if it is one."""
+    """Return the plain function behind a callback or a CBState, if there is one."""
     callback = given._smachpy.code[0] if isinstance(given, CBState) else given
     callback = callback._cb if isinstance(callback, CBInterface) else callback  # noqa: SLF001
     return callback if inspect.isfunction(callback) else None
 
 
 def _sent_keys(state: State) -> Reads:
-    """Return the keys that a state of this package reads for what it sends or tests."""
+    """Return the keys that a state of this package reads to send or test something."""
     keys: set[str] = set()
     sometimes: set[str] = set()
     callbacks: list[Any] = []

@@ -1,9 +1,9 @@
 """All runs of a machine as one directed graph.
 
-A node is a moment: a state begins, or a state has ended with an outcome. The children of a
-concurrence run at once; the graph has them one after the other, once for each outcome of the
-concurrence with the child outcomes that lead to it, and once more each child alone, first.
-Edges that only a preempt takes are marked.
+A node is a moment: a state begins, or it has ended with an outcome. The children of a concurrence
+run at once; the graph has them in sequence, once for each outcome of the concurrence with the child
+outcomes that lead to it, and once more each child alone, as the first to run. Edges that only a
+preempt takes are marked.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PREEMPTED = "preempted"
 MOST_COMBINATIONS = 5_000  # of child outcomes; a larger concurrence may end with any outcome
-MOST_NODES = 200_000
+MOST_NODES = 200_000  # a larger machine is refused: its parts can be checked one by one
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Node:
     Attributes:
         number: Its number in the graph.
         record: The state.
-        outcome: The outcome it has just ended with; None: it begins.
+        outcome: The outcome with which it has just ended; None: it begins.
     """
 
     number: int
@@ -41,7 +41,7 @@ class Node:
 
 @dataclass(slots=True)
 class _Part:
-    """A state inside the graph: where it begins, and where it ends by outcome."""
+    """A state in the graph: the node where it begins, and the nodes where it ends, by outcome."""
 
     enter: Node
     ends: dict[str, Node]
@@ -49,15 +49,15 @@ class _Part:
 
 @dataclass(slots=True)
 class Graph:
-    """Moments and what may follow them.
+    """Moments and their possible successors.
 
     Attributes:
         nodes: The moments.
-        edges: What may follow each.
+        edges: The successors of each.
         only_preempt: Edges that only a preempt takes.
-        by_framework: Edges by which a container ends a run by itself after a preempt.
-        loose: Ends of children that were looked at alone; nothing follows in the graph.
-        start: The root begins.
+        by_framework: Edges on which a container itself ends because of a preempt.
+        loose: Ends of children that are in the graph alone; they have no successors.
+        start: The beginning of the root.
         ends: The root's outcomes.
     """
 
@@ -74,12 +74,12 @@ class Graph:
         return {n.number for n in self.nodes if n.outcome is None and n.record.path == path}
 
     def after(self, number: int, *, preempt: bool = True, framework: bool = True) -> Iterator[int]:
-        """Yield what may follow a moment.
+        """Yield the possible successors of a moment.
 
         Args:
             number: The moment.
-            preempt: Whether somebody may ask for a preempt.
-            framework: Whether a container may end because of it by itself.
+            preempt: Whether a preempt may be requested.
+            framework: Whether a container may end by itself because of it.
         """
         for after in self.edges[number]:
             pair = (number, after)
@@ -89,7 +89,7 @@ class Graph:
                 yield after
 
     def reachable(self, start: Iterable[int], *, preempt: bool = True) -> set[int]:
-        """Return the moments that can follow one of `start`, and these."""
+        """Return `start` and all moments that can follow."""
         seen = set(start)
         queue = list(seen)
         while queue:
@@ -107,7 +107,7 @@ class Graph:
         preempt: bool = True,
         framework: bool = True,
     ) -> list[Node] | None:
-        """Return a shortest run from `start` to one of `goals` past none of `avoid`."""
+        """Return a shortest run from `start` to one of `goals` that avoids all of `avoid`."""
         came: dict[int, int | None] = {number: None for number in start if number not in avoid}
         queue = deque(came)
         while queue:
@@ -124,19 +124,21 @@ class Graph:
         return None
 
     def closed_loops(self, among: Collection[int]) -> Iterator[set[int]]:
-        """Yield each set of moments that follow each other again and again, and nothing else.
+        """Yield each set of moments that only lead to each other.
 
         Args:
-            among: Moments; what may follow them, unless a container ends because of a preempt, is
-                among them, too.
+            among: Moments; all their successors must be in it, except for ends that a container
+                takes by itself because of a preempt.
         """
         after = {number: [*self.after(number, framework=False)] for number in sorted(among)}
         before: dict[int, list[int]] = {number: [] for number in after}
         for number, followers in after.items():
             for follower in followers:
                 before[follower].append(number)
-        # Kosaraju's algorithm on the reversed graph: a search backwards leaves a moment last if
-        # nothing that follows it was left out. From there forwards, loop after loop is found.
+        # Kosaraju's algorithm on the reversed graph: a depth-first search along reversed edges
+        # finishes last with a moment of a component without outgoing edges. Searches along the
+        # edges in that order find one component after another. Written without recursion: graphs
+        # are deep.
         order: list[int] = []
         seen: set[int] = set()
         for start in after:
@@ -171,7 +173,7 @@ def build(subject: Subject) -> Graph:
     """Return the graph of a machine.
 
     Raises:
-        RecursionError: the machine has more moments than can be looked through.
+        RecursionError: the machine has too many moments.
     """
     builder = _Builder(subject)
     root = builder.state(subject.root)
@@ -182,7 +184,7 @@ def build(subject: Subject) -> Graph:
 
 
 def possible(record: StateRecord, facts: Facts) -> list[str]:
-    """Return the outcomes that a leaf can end with."""
+    """Return the possible outcomes of a leaf."""
     if facts.returns is None:
         return list(record.outcomes)
     made = facts.returns | facts.made | {PREEMPTED}
@@ -236,7 +238,7 @@ class _Builder:
             self._preempted(part, child)
 
     def _preempted(self, part: _Part, child: _Part) -> None:
-        """A preempt before or after a child ends the container, if it declares the outcome."""
+        """Add the ends after a preempt before or after a child, if the container declares them."""
         if PREEMPTED in part.ends:
             for node in (child.enter, *child.ends.values()):
                 self._edge(node, part.ends[PREEMPTED], preempt=True, framework=True)
@@ -263,7 +265,7 @@ class _Builder:
                 self._edge(part.enter, node)
 
     def _plan(self, record: StateRecord, part: _Part) -> None:
-        """The actions of a plan, in any order: what its net allows is checked on the net."""
+        """Add the actions of a plan, in any order: the possible orders are checked on its net."""
         for child_record in record.children:
             child = self.state(child_record)
             self._edge(part.enter, child.enter)
@@ -275,7 +277,7 @@ class _Builder:
             self._edge(part.enter, node, preempt=preempt, framework=preempt)
 
     def _concurrence(self, record: StateRecord, part: _Part) -> None:
-        for child_record in record.children:  # alone, before the others did anything
+        for child_record in record.children:  # each one alone, before the others have done anything
             alone = self.state(child_record)
             self._edge(part.enter, alone.enter)
             self.graph.loose |= {node.number for node in alone.ends.values()}
@@ -310,6 +312,8 @@ class _Builder:
         if new:
             graph.edges[source.number].append(target.number)
         for marked, marks in ((preempt, graph.only_preempt), (framework, graph.by_framework)):
+            # An edge stays marked only if each of its reasons is marked: one ordinary transition
+            # makes it an ordinary edge.
             if marked and new:
                 marks.add(pair)
             elif not marked:
@@ -317,7 +321,7 @@ class _Builder:
 
 
 def combinations(record: StateRecord, subject: Subject) -> list[dict[str, str]] | None:
-    """Return every combination of outcomes of a concurrence's children; None when too many."""
+    """Return all combinations of the outcomes of a concurrence's children; None if too many."""
     choices = [
         possible(child, subject.facts_of(child)) if not child.is_container else child.outcomes
         for child in record.children
@@ -332,7 +336,7 @@ def combinations(record: StateRecord, subject: Subject) -> list[dict[str, str]] 
 
 
 def decide(facts: Facts, outcomes: Mapping[str, str]) -> str | None:
-    """Return the outcome that the rules give: the most demanding one that holds, the last."""
+    """Return the outcome by the rules: of those that hold, the last of the most demanding."""
     best, most = None, -1
     for rule in facts.outcome_rules:
         if rule.need >= most and rule.holds(outcomes):
@@ -341,7 +345,7 @@ def decide(facts: Facts, outcomes: Mapping[str, str]) -> str | None:
 
 
 def outcomes_of(record: StateRecord, subject: Subject) -> dict[str, dict[str, set[str]]]:
-    """Return each outcome of a concurrence with the child outcomes that can come with it."""
+    """Return each outcome of a concurrence, with the child outcomes that can go with it."""
     facts = subject.facts_of(record)
     anything = {child.label: set(child.outcomes) for child in record.children}
     combined = combinations(record, subject)
@@ -358,5 +362,5 @@ def outcomes_of(record: StateRecord, subject: Subject) -> dict[str, dict[str, se
 
 
 def moments(steps: Iterable[Node]) -> Moments:
-    """Return a run as pairs (path, outcome), the outcome None where the state begins."""
+    """Return a run as pairs (path, outcome); the outcome is None where the state begins."""
     return tuple((node.record.path, node.outcome) for node in steps)

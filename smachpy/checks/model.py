@@ -1,4 +1,4 @@
-"""What the rules look at, what they are, and what they find."""
+"""The rules, the facts that they use, and the problems that they find."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Moments: TypeAlias = tuple[tuple[str, str | None], ...]
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One thing that is looked for.
+    """One rule.
 
     Attributes:
         name: Its id.
-        severity: Of what it finds, unless that is milder.
+        severity: The severity of its problems, unless they are milder.
         summary: What it finds.
-        is_on: Whether it is looked for when nobody asks for it.
+        is_on: Whether it is on by default.
     """
 
     name: str
@@ -34,19 +34,19 @@ class Rule:
 RULES: dict[str, Rule] = {
     rule.name: rule
     for rule in (
-        Rule("inconsistent", "error", "the machine does not hold together and would not run"),
+        Rule("inconsistent", "error", "the machine is inconsistent and would not run"),
         Rule("wrong-signature", "error", "`execute` cannot be called as the machine calls it"),
-        Rule("unreachable-state", "error", "no run can get to the state"),
+        Rule("unreachable-state", "error", "no run can reach the state"),
         Rule("unmapped-outcome", "error", "an outcome of a state leads nowhere"),
         Rule("impossible-outcome", "warning", "a declared outcome that nothing can produce"),
         Rule("undeclared-outcome", "error", "code returns an outcome that is not declared"),
-        Rule("unset-key", "error", "a userdata key is read on some path before anyone writes it"),
+        Rule("unset-key", "error", "a userdata key is read on some path before it is written"),
         Rule("unread-key", "warning", "a userdata key is written and never read"),
         Rule("endless-loop", "error", "a loop of states with no way out"),
         Rule("no-timeout", "warning", "a wait without a timeout", is_on=False),
-        Rule("deaf-loop", "warning", "`execute` loops without looking at the preempt"),
+        Rule("deaf-loop", "warning", "`execute` loops without checking for a preempt"),
         Rule("stuck-concurrence", "error", "a concurrence that cannot finish"),
-        Rule("ambiguous-map", "warning", "two rules of an outcome map hold and ask equally"),
+        Rule("ambiguous-map", "warning", "two rules of an outcome map hold with equal conditions"),
         Rule("preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"),
         Rule("property", "error", "a property that does not hold"),
         Rule("net-label", "error", "a label, a condition or a name of a plan that looks wrong"),
@@ -76,8 +76,8 @@ class Reads(NamedTuple):
 
     Attributes:
         always: Read in every call.
-        sometimes: Read in some calls only: in a branch, or after one that may have returned.
-        writes: Written somewhere.
+        sometimes: Read in some calls only: in a branch, or after a possible return.
+        writes: Written anywhere.
     """
 
     always: frozenset[str] = frozenset()
@@ -94,31 +94,31 @@ class OutcomeRule:
     conditions: tuple[tuple[str, tuple[str, ...]], ...]
 
     def holds(self, outcomes: Mapping[str, str]) -> bool:
-        """Tell whether the children's outcomes fulfil it."""
+        """Return whether the children's outcomes fulfil it."""
         met = sum(outcomes.get(label) in wanted for label, wanted in self.conditions)
         return met >= self.need
 
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What is known of a state beyond its record; None or empty where nothing is known.
+    """Facts about a state beyond its record; None or empty where nothing is known.
 
     Attributes:
-        place: Where its code is.
-        returns: Outcomes that its code can end with.
+        place: The place of its code.
+        returns: Outcomes that its code can return.
         made: Outcomes that the machine gives it: after a timeout, for an exception.
-        undeclared: Outcomes that its code names in a `return` and that are not declared.
+        undeclared: Outcomes that its code returns and that are not declared.
         reads: Keys that its code reads.
-        prepared: Its `on_enter` may write its output keys before it runs.
-        reaches: Its code may use the userdata of some machine past its own keys.
-        waits: Waits without a limit: what waits, and the line.
-        loops: Loops that wait and never look at the preempt: what, and the line.
-        is_function: Its code is a plain function, which has no `self`.
+        prepared: Whether its `on_enter` may write its output keys before it runs.
+        reaches: Whether its code may use the userdata of some machine beyond its own keys.
+        waits: Waits without a timeout: what waits, and the line.
+        loops: Loops that wait and never check for a preempt: what, and the line.
+        is_function: Whether its code is a plain function, without `self`.
         preset: Keys of the container's userdata that have a value before the run.
         outcome_rules: A concurrence's rules.
-        any_outcome: The concurrence has an outcome callback.
-        cuts: The concurrence has a callback that may preempt its children.
-        watched: Callbacks, or code that is not seen, may change the container's userdata.
+        any_outcome: Whether the concurrence has an outcome callback.
+        cuts: Whether the concurrence has a callback that may preempt its children.
+        watched: Whether callbacks, or code that cannot be seen, may change the userdata.
         empty: Whether the iterator is known to have no items.
         ignored: Rule id -> why the rule is switched off for this state.
     """
@@ -144,16 +144,16 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something wrong.
+    """A mistake in a machine.
 
     Attributes:
         rule: Id of the rule.
         severity: "error" and "warning" fail a check, "note" does not.
         path: Path of the state.
-        message: What is wrong, in one sentence.
-        hint: What to do about it.
-        place: Line of the code, when known.
-        moments: A run that shows it: pairs (path, outcome), the outcome None where the state
+        message: The mistake, in one sentence.
+        hint: How to correct it.
+        place: Line of the code, if known.
+        moments: A run that shows it: pairs (path, outcome); the outcome is None where the state
             begins.
         firings: A run of a plan: labels of its transitions.
     """
@@ -169,7 +169,7 @@ class Problem:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """The run in words: what ended, and how ("/PATROL/DRIVE -aborted->")."""
+        """The run in words: the states that ended, with outcomes ("/PATROL/DRIVE -aborted->")."""
         last = self.moments[-1:]
         ended = [f"{path} -{outcome}->" for path, outcome in self.moments if outcome is not None]
         return (*ended, *(path for path, outcome in last if outcome is None))
@@ -180,13 +180,13 @@ NOTHING = Facts()
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A machine under check, with what is known of its states by their paths."""
+    """A machine under check, with the facts about its states by path."""
 
     root: StateRecord
     facts: Mapping[str, Facts]
 
     def facts_of(self, record: StateRecord) -> Facts:
-        """Return what is known of a state."""
+        """Return the facts about a state."""
         return self.facts.get(record.path, NOTHING)
 
     def problem(
@@ -200,7 +200,7 @@ class Subject:
         place: Place | None = None,
         moments: Moments = (),
     ) -> Problem:
-        """Return a problem of a state, at its code unless `place` says otherwise."""
+        """Return a problem of a state, at its code unless `place` is given."""
         return Problem(
             rule,
             severity or RULES[rule].severity,

@@ -1,4 +1,4 @@
-"""Plans under check: what is wrong with their labels and nets, and what nobody does or says."""
+"""Checks plans: their labels, their nets, and names that nothing provides."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _RULES: Final = {
 
 
 def find(state: State, path: str) -> Iterator[Problem]:
-    """Yield what is wrong with the plans in a machine."""
+    """Yield the problems of the plans in a machine."""
     if isinstance(state, PetriNetPlan):
         for problem in (*check_plan(state.plan), *state.binding_problems()):
             yield _as_problem(problem, path)

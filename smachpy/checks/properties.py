@@ -1,4 +1,4 @@
-"""Properties of all runs of a machine, and the shortest run that breaks one."""
+"""Checks properties of all runs of a machine, and finds a shortest run that violates one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from smachpy.checks.graph import Graph, Node
     from smachpy.checks.model import Subject
 
-    Broken: TypeAlias = tuple[str, list[Node]] | None  # in words, and a run
+    Broken: TypeAlias = tuple[str, list[Node]] | None  # the violation in words, and a run
 
 
 class PropertyError(SmachError):
@@ -25,7 +25,7 @@ class PropertyError(SmachError):
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """Something that holds for every run.
+    """A property of every run.
 
     Attributes:
         kind: "never", "always_reaches", "before" or "after_preempt".
@@ -40,25 +40,25 @@ class Property:
 
 
 def never(state: str) -> Property:
-    """No run gets to `state` (a path, or the end of one)."""
+    """No run reaches `state` (a path, or the end of one)."""
     return Property("never", (state,))
 
 
 def always_reaches(*outcomes: str) -> Property:
     """Every run without a preempt ends, with one of these outcomes of the machine.
 
-    A loop is left some time if there is a way out of it.
+    A loop with a way out counts as one that is left at some time.
     """
     return Property("always_reaches", outcomes)
 
 
 def before(first: str, second: str) -> Property:
-    """No run gets to state `second` without state `first` having ended before."""
+    """No run reaches state `second` before state `first` has ended."""
     return Property("before", (first, second))
 
 
 def after_preempt(state: str) -> Property:
-    """A run in which a state answers a preempt passes through `state` before it ends."""
+    """A run in which a state services a preempt passes through `state` before it ends."""
     return Property("after_preempt", (state,))
 
 
@@ -66,10 +66,10 @@ _KINDS = {"never": 1, "always_reaches": None, "before": 2, "after_preempt": 1}
 
 
 def parse(text: str) -> Property:
-    """Return the property that a text says, as in `before(/PATROL/UNDOCK, /PATROL/DRIVE)`.
+    """Return the property in a text such as `before(/PATROL/UNDOCK, /PATROL/DRIVE)`.
 
     Raises:
-        PropertyError: it says none.
+        PropertyError: there is none.
     """
     match = re.fullmatch(r"\s*(\w+)\s*\((.*)\)\s*", text)
     kind = match[1] if match else text.strip()
@@ -83,10 +83,10 @@ def parse(text: str) -> Property:
 
 
 def find(subject: Subject, graph: Graph, wanted: Property) -> Problem | None:
-    """Return the problem if a property does not hold.
+    """Return a problem if a property does not hold.
 
     Raises:
-        PropertyError: it names something that the machine does not have.
+        PropertyError: it names something that does not exist.
     """
     if wanted.kind == "always_reaches":
         found = _always_reaches(subject, graph, wanted.names)
@@ -105,7 +105,7 @@ def find(subject: Subject, graph: Graph, wanted: Property) -> Problem | None:
 
 
 def _resolve(subject: Subject, name: str) -> str:
-    """Return the path of the one state that `name` means."""
+    """Return the path of the state that matches `name`."""
     paths = [record.path for record in subject.root.walk()]
     if name in paths:
         return name
@@ -133,6 +133,7 @@ def _always_reaches(subject: Subject, graph: Graph, names: tuple[str, ...]) -> B
     steps = graph.path([graph.start], {*graph.ends.values()} - good, preempt=False)
     if steps is not None:
         return f"this run ends with {steps[-1].outcome!r}", steps
+    # Some reachable moment from which no good end can be reached: the run never ends.
     for number in sorted(graph.reachable([graph.start], preempt=False)):
         if not (good | graph.loose) & graph.reachable([number], preempt=False):
             return "this run never ends", graph.path([graph.start], {number}, preempt=False) or []
@@ -141,6 +142,7 @@ def _always_reaches(subject: Subject, graph: Graph, names: tuple[str, ...]) -> B
 
 def _before(graph: Graph, first: str, second: str) -> Broken:
     ended = {n.number for n in graph.nodes if n.record.path == first and n.outcome is not None}
+    # With all ends of `first` removed, no way to `second` may be left.
     steps = graph.path([graph.start], graph.begins(second), avoid=ended)
     return None if steps is None else (f"this run gets to {second} without {first}", steps)
 

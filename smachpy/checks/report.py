@@ -1,4 +1,4 @@
-"""What a check found, as text, JSON, GitHub annotations or SARIF."""
+"""The result of a check, as text, JSON, GitHub annotations or SARIF."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
 class Report:
     """The result of a check.
 
-    It is true when `ok` is; iterating over it, and `len`, give its problems, notes too.
+    It is true if it is `ok`; iteration and `len` go over its problems, including notes.
 
     Attributes:
         record: The machine.
-        problems: What is wrong.
-        ignored: What is switched off, with the reasons.
+        problems: The problems.
+        ignored: The problems whose rules are switched off, with the reasons.
         seconds: How long the check took.
     """
 
@@ -55,7 +55,7 @@ class Report:
         return as_text([self])
 
     def assert_ok(self) -> None:
-        """Fail with all that was found unless it is `ok`.
+        """Fail with all problems unless the report is `ok`.
 
         Raises:
             AssertionError: there are errors or warnings.
@@ -65,10 +65,10 @@ class Report:
             raise AssertionError(str(self))
 
     def draw(self, folder: Path | str) -> list[Path]:
-        """Write a picture of the machine for each problem that has a run, with that run.
+        """Draw the machine for each problem with a run, and mark that run.
 
         Returns:
-            The files; none when the drawing package is not installed.
+            The files; none if no drawing package is installed.
         """
         files = []
         for number, problem in enumerate(self.problems, 1):
@@ -179,7 +179,7 @@ def _plain(problem: Problem) -> dict[str, Any]:
 
 
 def _where(problem: Problem) -> tuple[()] | tuple[str, int]:
-    """Return the file, from this folder if it is below it, and the line; () if not known."""
+    """Return the file, relative to this folder if it is below it, and the line; () if unknown."""
     place = problem.place
     if place is None or not place.file:
         return ()

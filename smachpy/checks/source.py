@@ -1,7 +1,7 @@
-"""A look at a leaf's source: what it returns, reads, waits for and loops around.
+"""Analyses a leaf's source: what it returns, reads and waits for, and its loops.
 
-It says only what is certain. Code that hands the state or the userdata to others, returns what it
-computes, or has no source, is taken to do everything it may.
+Only what is certain counts. Code that passes the state or the userdata on, returns a computed value
+or has no source is assumed to do everything that it may.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
     Function: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
-    Texts: TypeAlias = set[str] | None  # all that an expression can be; None: not known
+    Texts: TypeAlias = set[str] | None  # all possible values of an expression; None: unknown
     Found: TypeAlias = tuple[str, Place]
 
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
@@ -27,7 +27,7 @@ _INNER = (*_FUNCTIONS, ast.Lambda, ast.ClassDef)
 _LOOPS = (ast.While, ast.For, ast.AsyncFor)
 _JUMPS = (ast.Return, ast.Raise, ast.Break, ast.Continue)
 _WITH = (ast.With, ast.AsyncWith)
-# What tells of a preempt.
+# Methods that check for a preempt.
 _LOOKS = frozenset({"preempt_requested", "wait_preempt", "service_preempt", "_preempt_requested"})
 _WAITS = frozenset(
     {"wait", "wait_for_result", "wait_for_server", "wait_for_service", "wait_for_message"}
@@ -35,22 +35,22 @@ _WAITS = frozenset(
 # Number of positional arguments before the timeout.
 _BEFORE_TIMEOUT = {"wait_for_service": 1, "wait_for_message": 2}
 _DELAYS = frozenset({"sleep", "join"}) | _WAITS
-_SHORT_S = 1.0  # a loop that is over by then need not look at the preempt
-# Context managers that limit what is awaited inside: of asyncio, async_timeout, anyio and trio.
+_SHORT_S = 1.0  # [s] a shorter loop need not check for a preempt
+# Context managers that limit awaits within them: of asyncio, async_timeout, anyio and trio.
 _LIMITERS = frozenset({"timeout", "timeout_at", "fail_after", "fail_at", "move_on_after"})
 
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """What a function certainly does; None where that cannot be known.
+    """What a function certainly does; None where that is unknown.
 
     Attributes:
         place: Its first line.
-        returns: The strings it returns, with the lines.
+        returns: The strings it returns, with their lines.
         reads: Userdata keys that it uses.
-        reaches: It uses the userdata of some machine past its own keys.
+        reaches: Whether it uses the userdata of some machine beyond its own keys.
         waits: Waits without a timeout: text and line.
-        loops: Loops that wait and look at no preempt: text and line.
+        loops: Loops that wait and never check for a preempt: text and line.
     """
 
     place: Place
@@ -62,15 +62,15 @@ class Code:
 
 
 def look_at(function: Callable[..., Any], *, userdata: int, owner: type | None) -> Code | None:
-    """Return what `function` certainly does; None when it has no source, or is decorated.
+    """Return what `function` certainly does; None if it has no source, or is decorated.
 
     Args:
         function: The function, not bound.
         userdata: Position of its userdata parameter.
-        owner: The state's class, when the function is a method of it.
+        owner: The state's class, if the function is a method of it.
     """
     if hasattr(function, "__wrapped__"):
-        return None  # a decorator may change whatever it does
+        return None  # a decorator may change everything
     parsed = _parse(function)
     if parsed is None:
         return None
@@ -89,7 +89,7 @@ def look_at(function: Callable[..., Any], *, userdata: int, owner: type | None) 
 
 
 def texts_in_constructors(kind: type) -> frozenset[str]:
-    """Return the texts in the `__init__` methods of a state's class and of its bases."""
+    """Return the string literals in the `__init__` methods of a state's class and its bases."""
     found: set[str] = set()
     for cls in kind.__mro__:
         constructor = vars(cls).get("__init__")
@@ -107,7 +107,7 @@ def _parse(function: Any) -> tuple[Function, str] | None:
         file = inspect.getsourcefile(function) or "?"
         module = ast.parse(textwrap.dedent("".join(lines)))
     except (OSError, TypeError, SyntaxError, IndentationError):
-        return None  # built in, typed at a prompt, or part of a longer line: nothing is known
+        return None  # built in, typed at a prompt, or a part of a longer line: unknown
     for node in ast.walk(module):
         if isinstance(node, _FUNCTIONS) and node.name == function.__name__:
             ast.increment_lineno(node, first - 1)
@@ -120,10 +120,10 @@ class _Body:
 
     Args:
         tree: Its syntax tree.
-        file: Where it stands.
+        file: Its file.
         function: The function.
         own: Name of its first parameter, if it is a method.
-        owner: The class then.
+        owner: Its class, if it is a method.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class _Body:
     # -- outcomes ------------------------------------------------------------------------------
 
     def returns(self) -> dict[str, Place] | None:
-        """Return the outcomes it returns, or None if one of them is computed."""
+        """Return the outcomes it returns; None if one of them is computed."""
         if any(isinstance(n, ast.Yield | ast.YieldFrom) for n in self._nodes):
             return None
         constants = self._constants()
@@ -162,8 +162,8 @@ class _Body:
         return found
 
     def _constants(self) -> dict[str, Texts]:
-        """Return the local names, with the strings that they may get."""
-        # Functions inside may bind a name of this one.
+        """Return the local names, with the strings that they may be bound to."""
+        # An inner function may rebind these: their values are unknown.
         found: dict[str, Texts] = {
             name: None
             for node in self._all
@@ -181,14 +181,14 @@ class _Body:
     # -- waits and loops -----------------------------------------------------------------------
 
     def waits(self) -> Iterator[Found]:
-        """Yield calls that wait without a limit."""
+        """Yield calls that wait without a timeout."""
         limited = {id(node) for node in self._limited()}
         awaited = {id(node.value) for node in self._nodes if isinstance(node, ast.Await)}
         for node in self._nodes:
             if not isinstance(node, ast.Call) or id(node) in limited:
                 continue
             if isinstance(self._tree, ast.AsyncFunctionDef) and id(node) not in awaited:
-                continue  # a coroutine, for somebody who may have a limit
+                continue  # a coroutine that is awaited elsewhere, perhaps with a timeout
             name = _called(node)
             if (
                 name in _WAITS
@@ -200,7 +200,7 @@ class _Body:
                 yield f"`{ast.unparse(node)}`", self.place(node)
 
     def _limited(self) -> Iterator[ast.AST]:
-        """Yield the nodes that something around them gives a limit to."""
+        """Yield the nodes whose waiting time is limited by code around them."""
         for node in self._nodes:
             if isinstance(node, ast.Call) and _called(node) == "wait_for" and _has_limit(node, 1):
                 yield from ast.walk(node)
@@ -208,7 +208,7 @@ class _Body:
                 yield from ast.walk(node)
 
     def loops(self) -> Iterator[Found]:
-        """Yield loops that take time and never look at the preempt."""
+        """Yield loops that take time and never check for a preempt."""
         for node in self._nodes:
             if (
                 isinstance(node, ast.While | ast.For)
@@ -219,12 +219,12 @@ class _Body:
                 yield f"the `{kind}` loop", self.place(node)
 
     def _may_look(self, loop: list[ast.AST]) -> bool:
-        """Tell whether the nodes of a loop may look at the preempt."""
+        """Return whether the nodes of a loop may check for a preempt."""
         return (
-            # A preempt cancels the task there.
+            # At an await, a preempt cancels the task.
             any(isinstance(n, ast.Await | ast.AsyncFor | ast.AsyncWith) for n in loop)
             or any(map(_looks, loop))
-            # The state has another name too, or somebody else has it.
+            # The state may be known under another name, or to other code.
             or any(map(_asks_for_state, self._all))
             or _hands_on(self._all, self._own)
             or any(
@@ -235,17 +235,17 @@ class _Body:
         )
 
     def _helper_may_look(self, call: ast.Call) -> bool:
-        """Tell whether a function that is called by its name may look at the preempt."""
+        """Return whether a function called by its name may check for a preempt."""
         if not isinstance(call.func, ast.Name):
             return False
         name, code = call.func.id, self._function.__code__
         if name in (*code.co_varnames, *code.co_cellvars):
-            return True  # any function
+            return True  # a local variable: it may be any function
         cells = dict(zip(code.co_freevars, self._function.__closure__ or (), strict=True))
         try:
             helper = cells[name].cell_contents if name in cells else None
         except ValueError:
-            return True  # not bound yet
+            return True  # a closure variable without a value so far
         helper = helper or self._function.__globals__.get(name)
         if helper is None or inspect.isbuiltin(helper) or inspect.isclass(helper):
             return False
@@ -253,18 +253,18 @@ class _Body:
         return parsed is None or any(_asks_for_state(n) or _looks(n) for n in ast.walk(parsed[0]))
 
     def _method_may_look(self, call: ast.Call) -> bool:
-        """Tell whether it calls a method of the state that may look at the preempt."""
+        """Return whether a call is of a method of the state that may check for a preempt."""
         name = self._own_call(call)
         if name is None or name in _LOOKS or name == "sleep":
             return name is not None
         method = getattr(self._owner, name, None)
         parsed = _parse(method) if inspect.isfunction(method) else None
         if parsed is None:
-            return True  # nothing is known of it
+            return True  # its source is unknown
         tree = parsed[0]
         own = tree.args.args[0].arg if tree.args.args else ""
         nodes = list(ast.walk(tree))
-        # Methods that call further methods of the state are not followed.
+        # Methods that call other methods of the state are not followed: they may check.
         return _hands_on(nodes, own) or any(
             _looks(n)
             or (isinstance(n, ast.Attribute) and n.attr == "sleep")
@@ -278,17 +278,17 @@ class _Body:
 
 
 def _looks(node: ast.AST) -> bool:
-    """Tell whether it names what tells of a preempt; `sleep` may be anybody's."""
+    """Return whether a node names a method that checks; not `sleep`, which others have as well."""
     return isinstance(node, ast.Attribute) and node.attr in _LOOKS
 
 
 def _asks_for_state(node: ast.AST) -> bool:
-    """Tell whether it is `current_state`, with or without a module before it."""
+    """Return whether a node is `current_state`, with or without a module before it."""
     return "current_state" in (getattr(node, "id", None), getattr(node, "attr", None))
 
 
 def _method_of(node: ast.AST, own: str) -> str | None:
-    """Return the name of the method if it is a call `own.method(...)`."""
+    """Return the method's name if the node is a call `own.method(...)`."""
     if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
         return None
     value = node.func.value
@@ -296,7 +296,7 @@ def _method_of(node: ast.AST, own: str) -> str | None:
 
 
 def _hands_on(nodes: list[ast.AST], own: str | None) -> bool:
-    """Tell whether the name `own` stands anywhere but in front of a dot."""
+    """Return whether the name `own` is used anywhere except in front of a dot."""
     parts = {id(n.value) for n in nodes if isinstance(n, ast.Attribute)}
     return any(isinstance(n, ast.Name) and n.id == own and id(n) not in parts for n in nodes)
 
@@ -317,14 +317,14 @@ def _takes_time(loop: ast.While | ast.For) -> bool:
 
 
 def _seconds(delay: ast.Call) -> float:
-    """Return how long a delay is [s], 0 where that is not plain to see."""
+    """Return the length of a delay [s]; 0 if it is not a literal."""
     value = delay.args[0] if len(delay.args) == 1 and _called(delay) == "sleep" else None
     number = value.value if isinstance(value, ast.Constant) else None
     return float(number) if isinstance(number, int | float) else 0.0
 
 
 def _passes(items: ast.expr) -> int:
-    """Return how often a loop over `items` is run, 1 where that is not plain to see."""
+    """Return the number of passes of a loop over `items`; 1 if it is not a literal."""
     if isinstance(items, ast.List | ast.Tuple):
         return len(items.elts)
     if isinstance(items, ast.Call) and _called(items) == "range":
@@ -339,11 +339,11 @@ def _passes(items: ast.expr) -> int:
 
 
 def keys_read(tree: Function, name: str) -> Reads | None:
-    """Return the keys read from the userdata called `name`; None if it goes elsewhere.
+    """Return the keys read from the userdata called `name`; None if it is passed on.
 
-    Left out are keys that may have a value by then, or may do without one: those asked for with
-    `in`, written further up or in the same loop, read where an exception is caught, or read by a
-    function inside.
+    Excluded are keys that may have a value by then, or may go without one: those tested with `in`,
+    written earlier or in the same loop, read where an exception is caught, or read by an inner
+    function.
     """
     nodes = list(ast.walk(tree))
     uses = {node: key for node in nodes if (key := _key(node, name)) is not None}
@@ -353,7 +353,7 @@ def keys_read(tree: Function, name: str) -> Reads | None:
         return None
     reader = _Reader(uses, asked)
     own = set(_own_nodes(tree))
-    reader.write(node for node in nodes if node not in own)  # by a function inside
+    reader.write(node for node in nodes if node not in own)  # by an inner function
     reader.visit_all(tree.body, always=True)
     writes = {key for node, key in uses.items() if isinstance(_context(node), ast.Store)}
     return Reads(
@@ -362,11 +362,11 @@ def keys_read(tree: Function, name: str) -> Reads | None:
 
 
 class _Reader:
-    """Goes through a function in the order in which it runs.
+    """Visits a function in the order of execution.
 
     Args:
         uses: The nodes that are a key of the userdata.
-        asked: Keys that it asks for before it reads them.
+        asked: Keys that it tests for before it reads them.
     """
 
     def __init__(self, uses: dict[ast.AST, str], asked: Iterable[str]) -> None:
@@ -376,20 +376,20 @@ class _Reader:
         self.sometimes: set[str] = set()
 
     def write(self, nodes: Iterable[ast.AST]) -> None:
-        """Note what is written in `nodes`."""
+        """Note the keys written in `nodes`."""
         for node in nodes:
             if node in self._uses and isinstance(_context(node), ast.Store):
                 self._valued.add(self._uses[node])
 
     def visit_all(self, nodes: Iterable[ast.AST], *, always: bool) -> bool:
-        """Visit nodes one after the other; return whether each call gets past them."""
+        """Visit nodes in sequence; return whether every call gets past them."""
         for node in nodes:
             self.visit(node, always=always)
             always = always and not _may_leave(node)
         return always
 
     def visit(self, node: ast.AST, *, always: bool) -> None:
-        """Note what is read in a node.
+        """Note the keys read in a node.
 
         Args:
             node: The node.
@@ -405,11 +405,12 @@ class _Reader:
             for statements in (*(handler.body for handler in node.handlers), node.orelse):
                 self.visit_all(statements, always=False)
             self.visit_all(node.finalbody, always=always and not node.handlers)
-        elif any(_entered(node, {"suppress"})):  # so exceptions end in it
+        elif any(_entered(node, {"suppress"})):
+            # Exceptions end here, so a missing key does no harm.
             self.write(ast.walk(node))
         else:
             if isinstance(node, _LOOPS):
-                self.write(ast.walk(node))  # by an earlier pass
+                self.write(ast.walk(node))  # an earlier pass may have written them
             if isinstance(node, ast.AugAssign):
                 self._read(node.target, always=always)
             surely, branches = _parts(node)
@@ -427,11 +428,11 @@ class _Reader:
 
 
 def _context(node: ast.AST) -> object:
-    """Return whether a name, attribute or item is read, written or deleted there."""
+    """Return the node's context: load, store or delete."""
     return getattr(node, "ctx", None)
 
 
-# The fields of a node that run whenever it does, in that order; the others may run.
+# The fields of a node that are always evaluated, in order of evaluation; the others may be.
 _SURELY: dict[type[ast.AST], tuple[str, ...]] = {
     **dict.fromkeys((ast.If, ast.IfExp, ast.While, ast.Assert), ("test",)),
     **dict.fromkeys((ast.For, ast.AsyncFor), ("iter", "target")),
@@ -442,7 +443,7 @@ _SURELY: dict[type[ast.AST], tuple[str, ...]] = {
 
 
 def _parts(node: ast.AST) -> tuple[list[ast.AST], list[list[ast.AST]]]:
-    """Return what of a node runs whenever it does, in order, and the branches that may."""
+    """Return the parts of a node that are always evaluated, in order, and the branches."""
     if isinstance(node, ast.BoolOp):
         surely: list[Any] = node.values[:1]
     elif isinstance(node, ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp):
@@ -456,14 +457,14 @@ def _parts(node: ast.AST) -> tuple[list[ast.AST], list[list[ast.AST]]]:
     for name, value in ast.iter_fields(node):
         for part in value if isinstance(value, list) else [value]:
             if isinstance(part, ast.AST) and part not in surely:
-                # The statements of a block follow each other; other parts stand for themselves.
+                # The statements of a block form one branch; any other part is a branch of its own.
                 branch = name if isinstance(part, ast.stmt) else part
                 branches.setdefault(branch, []).append(part)
     return surely, [*branches.values()]
 
 
 def _may_leave(statement: ast.AST) -> bool:
-    """Tell whether what comes after a statement may not run."""
+    """Return whether the statements after this one may be skipped."""
     jumps = (ast.Return, ast.Raise) if isinstance(statement, _LOOPS) else _JUMPS
     return isinstance(statement, _JUMPS) or any(
         isinstance(node, jumps) for node in _own_nodes(statement)
@@ -471,7 +472,7 @@ def _may_leave(statement: ast.AST) -> bool:
 
 
 def _key(node: ast.AST, name: str) -> str | None:
-    """Return the key if it is `name.key` or `name["key"]`."""
+    """Return the key if the node is `name.key` or `name["key"]`."""
     value = getattr(node, "value", None)
     if not (isinstance(value, ast.Name) and value.id == name):
         return None
@@ -483,7 +484,7 @@ def _key(node: ast.AST, name: str) -> str | None:
 
 
 def _asked(node: ast.AST, name: str) -> str | None:
-    """Return the key if it is `"key" in name`."""
+    """Return the key if the node is `"key" in name`."""
     if not (isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.In | ast.NotIn)):
         return None
     left, right = node.left, node.comparators[0]
@@ -495,7 +496,7 @@ def _asked(node: ast.AST, name: str) -> str | None:
 
 
 def _own_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes below `tree`, those of functions inside it left out."""
+    """Yield the nodes below `tree`, without those of inner functions."""
     for child in ast.iter_child_nodes(tree):
         yield child
         if not isinstance(child, _INNER):
@@ -503,12 +504,12 @@ def _own_nodes(tree: ast.AST) -> Iterator[ast.AST]:
 
 
 def _called(node: ast.Call) -> str:
-    """Return the last word of what is called."""
+    """Return the last part of the called name."""
     return str(getattr(node.func, "attr", None) or getattr(node.func, "id", ""))
 
 
 def _has_limit(call: ast.Call, position: int) -> bool:
-    """Tell whether a call has an argument there or by name, and it is not None."""
+    """Return whether a call has an argument there or by keyword that is not None."""
     given = [*call.args[position:], *(keyword.value for keyword in call.keywords)]
     return any(not (isinstance(value, ast.Constant) and value.value is None) for value in given)
 
@@ -521,7 +522,7 @@ def _entered(node: ast.AST, names: Collection[str]) -> Iterator[ast.Call]:
 
 
 def _texts(node: ast.AST | None, constants: dict[str, Texts]) -> Texts:
-    """Return the strings that an expression can be, None if that is not known."""
+    """Return the strings that an expression can be; None if unknown."""
     match node:
         case ast.Constant(value=str(text)):
             return {text}
@@ -534,7 +535,7 @@ def _texts(node: ast.AST | None, constants: dict[str, Texts]) -> Texts:
 
 
 def _bindings(node: ast.AST) -> Iterator[tuple[str, ast.expr | None]]:
-    """Yield the names that a node binds, with the value if it is plain to see."""
+    """Yield the names that a node binds, with the value if it is a plain assignment."""
     plain = isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr)
     value = getattr(node, "value", None) if plain else None
     others = (getattr(node, "target", None), getattr(node, "optional_vars", None))
@@ -543,7 +544,7 @@ def _bindings(node: ast.AST) -> Iterator[tuple[str, ast.expr | None]]:
             yield target.id, value
         elif target is not None:
             yield from ((n.id, None) for n in ast.walk(target) if isinstance(n, ast.Name))
-    # Imports, functions, classes, handlers of exceptions and patterns.
+    # Imports, functions, classes, exception handlers and patterns bind names, too.
     name = next(filter(None, (getattr(node, a, None) for a in ("asname", "name", "rest"))), None)
     if isinstance(name, str):
         yield name.partition(".")[0], None

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
-    """Yield what is wrong with the structure."""
+    """Yield the problems of the structure."""
     reached = graph.reachable([graph.start])
     made: dict[str, set[str | None]] = {}  # path of a reached state -> its outcomes there
     for node in map(graph.nodes.__getitem__, reached):
@@ -35,14 +35,14 @@ def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
         yield from _leaf(subject, record)
         if record.kind == "concurrence":
             yield from _concurrence(subject, record)
-        if record.is_container and record is not subject.root:  # whose parent may go on
+        if record.is_container and record is not subject.root:  # after the root, nothing can go on
             yield from _preempts(subject, record)
     yield from _loops(subject, graph, reached)
     yield from _waits(subject, subject.root, limited=False)
 
 
 def _outcomes(subject: Subject, record: StateRecord, made: set[str | None]) -> Iterator[Problem]:
-    """Outcomes that nothing can produce."""
+    """Yield the outcomes that nothing can produce."""
     facts = subject.facts_of(record)
     if not record.is_container and facts.returns is None:
         return
@@ -68,7 +68,7 @@ def _leaf(subject: Subject, record: StateRecord) -> Iterator[Problem]:
 
 
 def _waits(subject: Subject, record: StateRecord, *, limited: bool) -> Iterator[Problem]:
-    """Waits without a timeout, unless a container around them has one."""
+    """Yield the waits without a timeout, unless a container around them has one."""
     details = dict(record.details)
     limited = limited or (record.is_container and "timeout" in details)
     if not limited and "timeout" not in details:
@@ -81,7 +81,7 @@ def _waits(subject: Subject, record: StateRecord, *, limited: bool) -> Iterator[
 
 
 def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Problem]:
-    """States that lead only to each other: nothing but a preempt from outside ends them."""
+    """Yield the loops of states that lead only to each other: only a preempt can end them."""
     can_end = {*graph.ends.values(), *graph.loose}
     before: dict[int, list[int]] = {}
     for number in reached:
@@ -95,7 +95,7 @@ def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Proble
     reported: set[tuple[str, ...]] = set()
     for loop in graph.closed_loops(reached - can_end):
         records = [graph.nodes[number].record for number in loop]
-        # The states of the loop itself; the others are somewhere in them.
+        # The states of the loop itself; the other records are inside them.
         outermost = min(record.path.count("/") for record in records)
         paths = tuple(sorted({r.path for r in records if r.path.count("/") == outermost}))
         parent = paths[0].rpartition("/")[0]
@@ -105,7 +105,7 @@ def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Proble
 
 
 def _is_ended_from_outside(subject: Subject, path: str) -> bool:
-    """Tell whether a timeout, or a callback of a concurrence, ends the container some time."""
+    """Return whether a timeout, or a callback of a concurrence, ends the container at some time."""
     around = [r for r in subject.root.walk() if f"{path}/".startswith(f"{r.path}/")]
     return any("timeout" in dict(record.details) for record in around) or any(
         subject.facts_of(record).cuts for record in around if record.path != path
@@ -113,7 +113,7 @@ def _is_ended_from_outside(subject: Subject, path: str) -> bool:
 
 
 def _endless(graph: Graph, parent: str, paths: tuple[str, ...]) -> Problem:
-    """Return what is wrong with a loop; it is a note for a mission that is to run for ever."""
+    """Return the problem of a loop; only a note if the mission is meant to run for ever."""
     labels = ", ".join(path.rpartition("/")[2] for path in paths)
     text = f"{parent}: {labels} lead only to {'each other' if len(paths) > 1 else 'itself'}"
     begins = {number for path in paths for number in graph.begins(path)}
@@ -128,7 +128,7 @@ def _endless(graph: Graph, parent: str, paths: tuple[str, ...]) -> Problem:
 
 
 def _only_fails(graph: Graph) -> bool:
-    """Tell whether no run without a preempt ends, unless it fails."""
+    """Return whether every run that ends without a preempt is a failure."""
     reached = graph.reachable([graph.start], preempt=False)
     ends = [outcome for outcome, number in graph.ends.items() if number in reached]
     return all(outcome_class(outcome) in {"failure", "preempted"} for outcome in ends)
@@ -136,7 +136,7 @@ def _only_fails(graph: Graph) -> bool:
 
 def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
     facts = subject.facts_of(record)
-    # A callback may decide before the rules are asked.
+    # An outcome callback may decide before the rules are evaluated.
     combined = [] if facts.any_outcome else runs.combinations(record, subject) or []
     reported: set[frozenset[str]] = set()
     for outcomes in combined:
@@ -152,7 +152,7 @@ def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
     waiting = [child for child in record.children if _only_preempt_ends(subject, child)]
     if (
         facts.cuts
-        or len(waiting) == len(record.children)  # it watches as long as the mission runs
+        or len(waiting) == len(record.children)  # it is meant to run as long as the mission
         or _is_ended_from_outside(subject, record.path)
     ):
         return
@@ -170,7 +170,7 @@ def _only_preempt_ends(subject: Subject, record: StateRecord) -> bool:
 
 
 def _preempts(subject: Subject, record: StateRecord) -> Iterator[Problem]:
-    """A preempt that the container passes on to the one around it as something else."""
+    """Yield preempts that a container turns into another outcome, after which others go on."""
     for child, outcome in _preempt_ends(subject, record):
         if outcome != PREEMPTED and _goes_on(subject, record, outcome):
             text = (
@@ -182,7 +182,7 @@ def _preempts(subject: Subject, record: StateRecord) -> Iterator[Problem]:
 
 
 def _goes_on(subject: Subject, record: StateRecord, outcome: str) -> bool:
-    """Tell whether an outcome of a container leads to a further state, here or further up."""
+    """Return whether an outcome of a container leads to another state, here or further up."""
     for parent in subject.root.walk():
         for edge in parent.transitions if record in parent.children else ():
             if (edge.source, edge.outcome) == (record.label, outcome):
@@ -192,7 +192,7 @@ def _goes_on(subject: Subject, record: StateRecord, outcome: str) -> bool:
 
 
 def _preempt_ends(subject: Subject, record: StateRecord) -> Iterator[tuple[str, str]]:
-    """Yield (child, container outcome) for what children that were preempted lead to."""
+    """Yield (child, container outcome) for the outcomes that preempted children lead to."""
     if record.kind == "concurrence":
         facts = subject.facts_of(record)
         if not facts.any_outcome and all(PREEMPTED in c.outcomes for c in record.children):

@@ -1,4 +1,4 @@
-"""Switching rules off, with a reason: on a state, in a comment, or in pyproject.toml."""
+"""Switches rules off, with a reason: for a state, in a comment, or in pyproject.toml."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _COMMENT = re.compile(r"#\s*smachpy:\s*ignore\[([^\]]*)\]\s*(.*)")
 
 
 class IgnoreError(SmachError):
-    """A rule is switched off in a way that makes no sense."""
+    """A rule is switched off incorrectly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +37,8 @@ class Ignore:
 
     Attributes:
         rule: Id of the rule.
-        reason: Why.
-        path: Paths it is off for; `*` and `?` as in file names.
+        reason: The reason.
+        path: Paths for which it is off; `*` and `?` as in file names.
     """
 
     rule: str
@@ -46,7 +46,7 @@ class Ignore:
     path: str = "*"
 
     def covers(self, problem: Problem) -> bool:
-        """Tell whether it switches `problem` off."""
+        """Return whether it switches `problem` off."""
         return self.rule == problem.rule and fnmatch.fnmatchcase(problem.path, self.path)
 
 
@@ -62,7 +62,7 @@ def ignore(state: S, rule: str, reason: str) -> S:
 
 
 def of_state(state: State, function: Callable[..., Any] | None) -> dict[str, str]:
-    """Return rule -> reason for a state: what `ignore` said, and the comments of its code.
+    """Return rule -> reason for a state: from `ignore`, and from the comments in its code.
 
     Args:
         state: The state.
@@ -90,18 +90,19 @@ def _comments(code: Any) -> dict[str, str]:
 
 
 def _lines(code: Any) -> list[str]:
-    """Return the lines of a class or function in a file with such comments; else none."""
+    """Return the lines of a class or function; none if its file has no such comments."""
     try:
-        # To find a class all of its file is parsed, which takes longer than the rest of a check.
+        # `getsourcelines` parses the whole file to find a class, which takes longer than the rest
+        # of a check; so look for a comment first.
         file = linecache.getlines(inspect.getsourcefile(code) or "")
         return inspect.getsourcelines(code)[0] if any(map(_COMMENT.search, file)) else []
     except (OSError, TypeError):
-        return []  # typed at a prompt: there are no comments to be seen
+        return []  # typed at a prompt: no source, no comments
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What pyproject.toml says in [tool.smachpy.check].
+    """The settings in pyproject.toml, [tool.smachpy.check].
 
     Attributes:
         ignores: From `ignore = [{rule = "no-timeout", path = "/PATROL/*", reason = "..."}]`.
@@ -118,7 +119,7 @@ def read_settings(start: Path) -> Settings:
     """Return the settings of the nearest pyproject.toml at or above `start`.
 
     Raises:
-        IgnoreError: they make no sense.
+        IgnoreError: they are invalid.
     """
     for folder in (start, *start.resolve().parents):
         file = folder / "pyproject.toml"
@@ -160,10 +161,10 @@ def _settings(where: str, table: dict[str, Any]) -> Settings:
 
 
 def check_rule(where: str, rule: object) -> None:
-    """Check that there is a rule.
+    """Check that a rule exists.
 
     Raises:
-        IgnoreError: there is none of this name.
+        IgnoreError: it does not.
     """
     if not isinstance(rule, str) or rule not in RULES:
         raise IgnoreError(

@@ -1,7 +1,7 @@
 """Rules about userdata keys: read before written, written and never read.
 
-A variable is a key of one container's userdata. A container copies its input keys in when it
-begins and its output keys out when it ends. A leaf is taken to write all its output keys.
+A variable is a key in one container's userdata. A container copies its input keys in when it
+begins, and its output keys out when it ends. A leaf is assumed to write all its output keys.
 """
 
 from __future__ import annotations
@@ -19,18 +19,22 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
 
 Variable: TypeAlias = tuple[str, str]  # path of the container, key
-MOST_STEPS = 50_000  # moments looked at for a run that shows a problem
+MOST_STEPS = 50_000  # the most moments in the search for a run that shows a problem
 
 
 def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
-    """Yield what is wrong with the keys."""
+    """Yield the problems of the keys."""
     flow = _Flow(subject, graph)
     yield from flow.unset()
     yield from flow.unread()
 
 
 class _Flow:
-    """What is certainly written at each moment."""
+    """The variables that are certainly written at each moment.
+
+    A forward data-flow analysis ("definite assignment"): a variable is written at a moment if it is
+    written on every way there.
+    """
 
     def __init__(self, subject: Subject, graph: Graph) -> None:
         self._subject = subject
@@ -49,12 +53,12 @@ class _Flow:
     # -- one moment ----------------------------------------------------------------------------
 
     def _outer(self, record: StateRecord, key: str) -> Variable | None:
-        """Return the variable of the container around `record` that its `key` stands for."""
+        """Return the variable in the container around `record` for its `key`."""
         parent = self._parents.get(record.path)
         return None if parent is None else (parent.path, dict(record.remapping).get(key, key))
 
     def _pass(self, node: Node, written: frozenset[Variable]) -> frozenset[Variable]:
-        """Return what is written after a moment."""
+        """Return the variables that are written after a moment."""
         record = node.record
         new: set[Variable] = set()
         if node.outcome is None and self._subject.facts_of(record).prepared:
@@ -77,7 +81,7 @@ class _Flow:
         return written | new if new else written
 
     def _solve(self) -> dict[int, frozenset[Variable]]:
-        """Return what is certainly written before each moment, whatever the run."""
+        """Return the variables that are written before each moment, on every way to it."""
         graph = self._graph
         written = {graph.start: self._preset}
         queue = deque([graph.start])
@@ -85,6 +89,8 @@ class _Flow:
             number = queue.popleft()
             after_it = self._pass(graph.nodes[number], written[number])
             for after in graph.after(number):
+                # Where ways meet, only what is written on all of them counts. Sets only shrink, so
+                # the loop ends.
                 old = written.get(after)
                 new = after_it if old is None else old & after_it
                 if new != old:
@@ -93,7 +99,7 @@ class _Flow:
         return written
 
     def _may_be_written(self, variable: Variable, reader: StateRecord, key: str) -> bool:
-        """Tell whether `variable` is written at some moment of some run.
+        """Return whether `variable` is written at any moment of any run.
 
         Args:
             variable: The variable.
@@ -134,7 +140,7 @@ class _Flow:
                 ):
                     continue
                 sure = key in reads.always
-                # What is read in some branch only may go with what was written in some runs only.
+                # A read in a branch may belong to runs in which the key was written before.
                 if sure or (
                     key in reads.sometimes and not self._may_be_written(variable, node.record, key)
                 ):
@@ -158,7 +164,7 @@ class _Flow:
         )
 
     def _beside(self, record: StateRecord, variable: Variable) -> str:
-        """Return the path of a state beside `record` that writes `variable`; "" if none does."""
+        """Return the path of a parallel state that writes `variable`; "" if there is none."""
         path = record.path
         while (parent := self._parents.get(path)) is not None:
             if parent.kind == "concurrence":
@@ -169,7 +175,7 @@ class _Flow:
         return ""
 
     def _writes(self, record: StateRecord) -> Iterator[Variable]:
-        """Yield the variables that a state or a state below it may write."""
+        """Yield the variables that a state, or a state in it, may write."""
         for state in record.walk():
             for key in state.output_keys:
                 outer = self._outer(state, key)
@@ -177,7 +183,7 @@ class _Flow:
                     yield outer
 
     def _witness(self, goal: Node, variable: Variable) -> list[Node]:
-        """Return a shortest run that gets to `goal` with `variable` unwritten."""
+        """Return a shortest run that reaches `goal` with `variable` unwritten."""
         graph = self._graph
         first = (graph.start, self._preset)
         came: dict[tuple[int, frozenset[Variable]], tuple[int, frozenset[Variable]] | None]
@@ -219,7 +225,7 @@ class _Flow:
                 )
 
     def _read(self) -> set[Variable]:
-        """Return the variables that somebody reads."""
+        """Return the variables that are read anywhere."""
         read: set[Variable] = set()
         for record in self._subject.root.walk():
             facts = self._subject.facts_of(record)

@@ -54,9 +54,8 @@ class _Parser(argparse.ArgumentParser):
             names = parse_arguments(args[:end])
             found, unknown = super().parse_known_args(list(names.rest), namespace)
             found.words, found.names = tuple(args[end + 1 :]), names
-        if (
-            unknown
-        ):  # reported here: argparse would report it for the parser above, without its usage
+        # Reported here: argparse would report it for the parser above, without its usage.
+        if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return found, []
 

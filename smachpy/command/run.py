@@ -182,9 +182,8 @@ def _run(args: argparse.Namespace) -> int:
         if args.json:  # standard output is for events only: a mission's prints go to standard error
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         shown = args.time.virtual and args.view
-        if (
-            args.start_robot or shown
-        ):  # before the mission's module is imported: that may join a network
+        # Before the mission's module is imported: that may join a network.
+        if args.start_robot or shown:
             _use_own_network(args, stack)
         return _run_mission(args, events, stack)
 

@@ -131,9 +131,8 @@ class RunState:
             if path == root or path.startswith(below):
                 state.update(since=None, waits=None, **_NOT_ASKED)
         for goal in self.data["goals"].values():
-            if goal["ended"] is None and goal["path"].startswith(
-                below
-            ):  # a late GoalDone corrects it
+            # A late GoalDone corrects it.
+            if goal["ended"] is None and goal["path"].startswith(below):
                 goal.update(status="LOST", text=CUT_SHORT, ended=record["stamp_ns"])
         self._on_entered(record)
 

@@ -1,1 +1,1 @@
-"""A simulated robot on an occupancy map, behind a `move_base` action server."""
+"""A simulated robot on an occupancy map, with a `move_base` action server."""

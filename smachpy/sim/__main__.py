@@ -1,4 +1,4 @@
-"""`python -m smachpy.sim` is `smachpy robot`."""
+"""`python -m smachpy.sim` runs `smachpy robot`."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The battery: energy that drains or fills at a known power, worked out only when asked."""
+"""The battery: its energy changes at a known power, and is computed only on demand."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _SECONDS_PER_HOUR = 3600.0
 
 
 class Battery:
-    """How full the battery is, as a function of time.
+    """The battery's charge as a function of time.
 
-    Between two changes of power the charge is a straight line, so an idle robot costs nothing.
+    Between two changes of power the charge is linear, so an idle robot needs no computation.
 
     Threads: every method may be called from any thread.
     """
@@ -30,24 +30,24 @@ class Battery:
 
     @property
     def power(self) -> float:
-        """What flows in [W]; negative while it drains."""
+        """The power that flows in [W]; negative while it drains."""
         return self._power
 
     def charge(self, now: float) -> float:
-        """Return how full it is at time `now` [s]: 0 to 1."""
+        """Return the charge at time `now` [s], 0 to 1."""
         with self._lock:
             return self._at(now) / self._capacity
 
     def drive(self, now: float, share: float) -> None:
-        """Drain from now on for driving at `share` (0 to 1) of full speed."""
+        """From now on, drain as for driving at `share` (0 to 1) of full speed."""
         self._flow(now, -self.config.idle_power - self.config.drive_power * share)
 
     def fill(self, now: float) -> None:
-        """Charge from now on."""
+        """From now on, charge."""
         self._flow(now, self.config.charge_power)
 
     def seconds_until(self, level: float, now: float) -> float:
-        """Return how long [s] until it is as full as `level`, which may be never (inf)."""
+        """Return the time until its charge is `level` [s]; infinite if it never is."""
         with self._lock:
             missing = level * self._capacity - self._at(now)
         if missing <= 0.0:

@@ -1,7 +1,7 @@
-"""Nav2's behaviors without a map: turn on the spot, back up. Scripts of commands, as `navigation`.
+"""Nav2's behaviors that need no map: turn on the spot, back up. Scripts as in `navigation`.
 
-Each `next` returns the command for one control step; the value returned at the end says what went
-wrong, "" for nothing. The robot stands then.
+Each `next` returns the command for one control step; the script returns an error text, "" for none.
+The robot stands still then.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ if TYPE_CHECKING:
     from smachpy.sim.navigation import Command
     from smachpy.sim.world import Robot
 
-_SHARE: Final = 0.8  # of the braking power that is counted on
+_SHARE: Final = 0.8  # fraction of the braking power that is counted on
 _SLOWEST_TURN: Final = 0.05  # [rad/s]
-_KEPT_AWAY: Final = 0.1  # [m] from what is behind
+_KEPT_AWAY: Final = 0.1  # [m] distance to things behind
 
 
 def spin(robot: Robot, angle: float) -> Generator[Command, None, str]:
-    """Turn by `angle` [rad] on the spot, anticlockwise when positive; may be several turns."""
+    """Turn by `angle` [rad] on the spot, anticlockwise if positive; several turns are possible."""
     body, limits = robot.body, robot.config.robot
     turned, yaw = 0.0, body.yaw
     while abs(angle - turned) > robot.config.control.yaw_tolerance / 2.0:
         left = angle - turned
+        # w^2 = 2 a phi: the turn rate from which it can stop within the remaining angle.
         rate = math.sqrt(2.0 * _SHARE * limits.turn_acceleration * abs(left)) * _SHARE
         yield 0.0, math.copysign(max(_SLOWEST_TURN, min(rate, limits.max_turn_rate)), left)
         turned += wrap_angle(body.yaw - yaw)
@@ -38,7 +39,7 @@ def spin(robot: Robot, angle: float) -> Generator[Command, None, str]:
 
 
 def back_up(robot: Robot, distance: float, speed: float) -> Generator[Command, None, str]:
-    """Drive `distance` [m] backwards at `speed` [m/s] at most, while there is room behind."""
+    """Drive `distance` [m] backwards at `speed` [m/s] at most, while there is space behind."""
     body = robot.body
     x, y = body.x, body.y
     trouble = ""

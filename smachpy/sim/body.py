@@ -10,14 +10,14 @@ from smachpy.sim.geometry import Pose2D, wrap_angle
 if TYPE_CHECKING:
     from smachpy.sim.config import RobotConfig
 
-_STILL = 1e-9  # [m/s, rad/s] slower than this is standing
+_STILL = 1e-9  # [m/s, rad/s] below this it counts as standing
 
 
 class Body:
-    """Where the robot is and how it moves.
+    """The robot's pose and motion.
 
     Attributes:
-        name: What the robot is called.
+        name: The robot's name.
         radius: [m].
         x: [m], map frame.
         y: [m], map frame.
@@ -38,7 +38,7 @@ class Body:
 
     @property
     def pose(self) -> Pose2D:
-        """Where it is."""
+        """Its pose."""
         return Pose2D(self.x, self.y, self.yaw)
 
     @property
@@ -62,14 +62,15 @@ class Body:
         half = 0.5 * self.turn_rate * dt
         heading = self.yaw + half
         length = self.speed * dt
-        if abs(half) > 1e-6:  # noqa: PLR2004  the chord of the arc, which is shorter
+        # It moves along an arc; the straight line between its ends is shorter by sin(h)/h.
+        if abs(half) > 1e-6:  # noqa: PLR2004
             length *= math.sin(half) / half
         self.x += length * math.cos(heading)
         self.y += length * math.sin(heading)
         self.yaw = wrap_angle(self.yaw + 2.0 * half)
 
     def braking_distance(self) -> float:
-        """Return how far [m] it rolls when it brakes now."""
+        """Return the braking distance from the current speed [m]."""
         return self.speed * self.speed / (2.0 * self._limits.braking)
 
 

@@ -1,4 +1,4 @@
-"""CSV files read as the YAML file that says the same: a list of mappings, with their lines."""
+"""Reads CSV files like the equivalent YAML file: as a list of mappings, with line numbers."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _EXPECTED: Final = "a header line that names the columns, such as name,x,y,yaw"
 
 
 def read_csv(path: Path, key: str, texts: Container[str] = ()) -> CommentedMap:
-    """Return the rows of a CSV file as a list of mappings under `key`; empty cells are left out.
+    """Return the rows of a CSV file as a list of mappings under `key`, without empty cells.
 
-    Cells that are numbers become numbers, except in the columns named in `texts`. Blank lines and
-    lines that begin with # are skipped; inside quotes they belong to the cell.
+    Numeric cells become numbers, except in the columns of `texts`. Blank lines and lines that begin
+    with # are skipped, except inside quotes, where they belong to the cell.
 
     Raises:
         InputFileError: it cannot be read, or the rows do not fit the header line.
@@ -55,7 +55,7 @@ def read_csv(path: Path, key: str, texts: Container[str] = ()) -> CommentedMap:
 
 
 def _records(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number of the first line of each record, and its cells.
+    """Yield each record with the number of its first line.
 
     Raises:
         csv.Error: a quote is not closed, or a cell is too long.
@@ -68,7 +68,7 @@ def _records(text: str) -> Iterator[tuple[int, list[str]]]:
             if not inside:
                 if not line.strip() or line.lstrip().startswith("#"):
                     continue
-                inside, first = True, number  # until the reader has the whole record
+                inside, first = True, number  # until the reader returns the record
             yield line
 
     for cells in csv.reader(lines(), skipinitialspace=True, strict=True):
@@ -89,7 +89,7 @@ def _as_yaml(
     rows: list[tuple[int, list[str]]],
     texts: Container[str],
 ) -> CommentedMap:
-    """Return the rows as YAML that has each of them in its line of the file, for the errors."""
+    """Return the rows as YAML with the same line numbers as the CSV file, for errors."""
     at, header = columns
     lines = [""] * (at - 1) + [f"{_quoted(key)}:{'' if rows else ' []'}"]
     for number, cells in rows:
@@ -110,7 +110,7 @@ def _as_scalar(cell: str, value: str | float | None) -> str:
 
 
 def _number(cell: str) -> int | float | None:
-    if not cell.isascii() or "_" in cell:  # Python would read these too
+    if not cell.isascii() or "_" in cell:  # Python's int() accepts "1_000" and other digits
         return None
     for kind in (int, float):
         try:
@@ -121,6 +121,6 @@ def _number(cell: str) -> int | float | None:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as YAML reads it back; JSON would split characters past U+FFFF in two."""
+    """Return a text as a YAML string; JSON would split characters beyond U+FFFF in two."""
     inside = (f"\\U{ord(c):08x}" if c > "\uffff" else json.dumps(c)[1:-1] for c in text)
     return f'"{"".join(inside)}"'

@@ -1,4 +1,4 @@
-"""YAML files read with every problem found at once, each with its file, line and field."""
+"""Reads YAML files and reports all problems at once, each with file, line and field."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-REQUIRED: Final = object()  # the default of a field that must be there
+REQUIRED: Final = object()  # the default of a required field
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The numbers a field may hold; None leaves a side open.
+    """The range of a number; None leaves a side open.
 
     Attributes:
         low: Smallest value allowed.
@@ -34,7 +34,7 @@ class Limits:
     high: float | None = None
 
     def allow(self, value: float) -> bool:
-        """Tell whether `value` lies inside; a value that is not finite never does."""
+        """Return whether `value` is in the range; a value that is not finite never is."""
         return (
             is_finite(value)
             and (self.low is None or value >= self.low)
@@ -55,15 +55,15 @@ ANY_NUMBER: Final = Limits()
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing wrong in a file.
+    """One problem in a file.
 
     Attributes:
         file: The file as the user named it.
-        line: Line number from 1; 0 when the whole file is meant.
-        field: Dotted path of the field; "" when the whole file is meant.
-        got: What stands there.
-        expected: What should.
-        hint: The way out, a sentence; may be "".
+        line: Line number from 1; 0 for the whole file.
+        field: Dotted path of the field; "" for the whole file.
+        got: The value.
+        expected: What was expected.
+        hint: A sentence with advice; may be "".
     """
 
     file: str
@@ -83,8 +83,8 @@ class Problem:
 class Section:
     """One mapping of a YAML file.
 
-    Its getters never raise: they note the problem and return a harmless value, so that one run
-    finds all of them. `Document.check` raises at the end.
+    Its getters never raise: they record a problem and return a harmless value, so that one pass
+    finds all problems. `Document.check` raises them at the end.
     """
 
     def __init__(self, document: Document, field: str, data: CommentedMap, line: int) -> None:
@@ -99,7 +99,7 @@ class Section:
 
     @property
     def problem_count(self) -> int:
-        """How many problems were found in the file so far."""
+        """The number of problems in the file so far."""
         return len(self._document.problems)
 
     def path(self, key: str) -> str:
@@ -107,14 +107,14 @@ class Section:
         return f"{self._field}.{key}" if self._field else key
 
     def line(self, key: str) -> int:
-        """Return the line of `key`, of the section when it is not there."""
+        """Return the line of `key`; that of the section if the key is missing."""
         try:
             return int(self._data.lc.key(key)[0]) + 1
-        except (KeyError, TypeError):  # a mapping that is not in the file has no lines at all
+        except (KeyError, TypeError):  # a mapping that is not from the file has no line numbers
             return self._line
 
     def problem(self, key: str, expected: str, hint: str = "") -> None:
-        """Note that the value of `key` is wrong."""
+        """Record a problem with the value of `key`."""
         got = repr(_plain(self._data[key])) if key in self._data else "nothing"
         self._document.problems.append(
             Problem(self._document.name, self.line(key), self.path(key), got, expected, hint)
@@ -151,7 +151,7 @@ class Section:
         return False
 
     def text(self, key: str, default: object, choices: Sequence[str] = ()) -> str:
-        """Return a text that is not empty, one of `choices` if there are any."""
+        """Return a non-empty text; one of `choices`, if given."""
         value = self._take(key, default)
         if isinstance(value, str) and value.strip() and (not choices or value in choices):
             return str(value)
@@ -201,11 +201,11 @@ class Section:
         return rows
 
     def allow(self, *keys: str) -> None:
-        """Count `keys` as known: those that are read only when they are there."""
+        """Count `keys` as known: optional keys that are read only if present."""
         self._seen.update(keys)
 
     def close(self) -> None:
-        """Note every key that nobody asked for."""
+        """Record a problem for each key that was not read."""
         for key in self._data:
             if key not in self._seen:
                 hint = did_you_mean(key, sorted(self._seen)).lstrip()
@@ -228,11 +228,11 @@ class Section:
 
 
 class Document:
-    """A YAML file whose top is a mapping, or a CSV file, whose rows are a list in one.
+    """A YAML file with a mapping at the top, or a CSV file, whose rows become a list in one.
 
     Attributes:
         name: The file as the user named it.
-        problems: What was found wrong so far.
+        problems: The problems so far.
         top: The mapping.
     """
 
@@ -241,8 +241,8 @@ class Document:
 
         Args:
             path: The file.
-            csv_rows: The key under which the rows of a CSV file are found; "": no CSV file will do.
-            csv_texts: Columns of a CSV file that hold texts, whatever they look like.
+            csv_rows: The key for the rows of a CSV file; "": a CSV file is not accepted.
+            csv_texts: Columns of a CSV file that are text, even if they look like numbers.
 
         Raises:
             InputFileError: it cannot be read or is not YAML with a mapping at the top.
@@ -252,7 +252,7 @@ class Document:
         self.top = Section(self, "", self._read(path, csv_rows, csv_texts), 1)
 
     def check(self) -> None:
-        """Raise what was found.
+        """Raise the problems, if there are any.
 
         Raises:
             InputFileError: with all problems.
@@ -288,7 +288,7 @@ class Document:
 
 
 def is_finite(value: float) -> bool:
-    """Tell whether `value` is a number that a float can hold."""
+    """Return whether `value` is a finite number that fits a float."""
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
@@ -305,7 +305,7 @@ def _is_number(value: object) -> bool:
 
 
 def _plain(value: object) -> object:
-    """Return YAML data as the plain Python data it stands for, for messages."""
+    """Return YAML data as plain Python data, for messages."""
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, list):

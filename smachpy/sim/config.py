@@ -1,6 +1,6 @@
-"""Every parameter of the simulated robot, with its unit, its limits and its default.
+"""All parameters of the simulated robot, with units, limits and defaults.
 
-The YAML file has one section per class here, one line per field:
+The YAML file has one section per class and one line per field:
 
     robot:
       radius: 0.25        # [m]
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 S = TypeVar("S")
 
 
-def _quantity(  # the one way to declare a parameter
+def _quantity(
     default: float,
     unit: str,
     doc: str,
@@ -132,11 +132,11 @@ class BatteryConfig:
 
 @dataclass(frozen=True, slots=True)
 class SimConfig:
-    """All of it.
+    """All parameters.
 
     Attributes:
-        start: Where the robot stands when the process starts, in the map frame.
-        dock: Where it stands while it charges, in the map frame; None when there is no dock.
+        start: The robot's start pose, in the map frame.
+        dock: Its pose while it charges, in the map frame; None if it has no dock.
     """
 
     robot: RobotConfig = RobotConfig()
@@ -150,10 +150,10 @@ class SimConfig:
 
 
 def load_config(path: Path) -> SimConfig:
-    """Read a robot's YAML file; sections and fields that are left out keep their defaults.
+    """Read a robot's YAML file; missing sections and fields keep their defaults.
 
     Raises:
-        InputFileError: with every problem found.
+        InputFileError: the file has problems; all are listed.
     """
     document = Document(path)
     top = document.top
@@ -174,7 +174,7 @@ def load_config(path: Path) -> SimConfig:
 
 
 def read_pose(section: Section) -> Pose2D:
-    """Read the fields x [m], y [m] and yaw [rad, 0 when left out], and close the section."""
+    """Read the fields x [m], y [m] and yaw [rad, default 0], and close the section."""
     x = section.number("x", REQUIRED, unit="m")
     y = section.number("y", REQUIRED, unit="m")
     yaw = section.number("yaw", 0.0, unit="rad")

@@ -1,4 +1,4 @@
-"""Where the robot's centre may be, and what being there costs."""
+"""Where the robot's centre may be, and the cost of being there."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     from smachpy.sim.config import PlannerConfig
     from smachpy.sim.floor import Sighting, Thing
 
-_WIDE_BERTH = 0.02  # [m] besides the margin, to what moves
-_SHY = 0.4  # [m] further out than needed, it is dearer to pass something that moves
-_SHY_COST = 2.0  # what a metre costs more right beside it
-_FEW = 10  # points for which an array is not worth it
-_CORNER = 1.5  # the corners of a square are so much farther away than its sides
+_WIDE_BERTH = 0.02  # [m] added to the margin around moving things
+_SHY = 0.4  # [m] beyond that, passing a moving thing costs more
+_SHY_COST = 2.0  # extra cost of a metre right next to it
+_FEW = 10  # with fewer points a loop is faster than an array
+_CORNER = 1.5  # a bit more than sqrt(2): the corners of a square are that much farther away
 _DECAY = 3.0  # the extra cost falls to exp(-3), a twentieth, at `wall_distance`
 
 
 class Costmap(Floor):
-    """A floor inflated by the robot's body.
+    """A floor, inflated by the robot's body.
 
-    Immutable: obstacles that appear make a new one.
+    Immutable: new obstacles need a new one.
 
     Attributes:
         blocked: bool (rows, columns): the robot's centre must not be here.
-        cost: float32 (rows, columns): what a metre costs here, 1 in the open.
+        cost: float32 (rows, columns): the cost of a metre, 1 in the open.
     """
 
     def __init__(
@@ -54,12 +54,13 @@ class Costmap(Floor):
         self.index_cells()
 
     def cut(self, middle: tuple[float, float], reach: float, discs: Iterable[Sighting]) -> Costmap:
-        """Return the part around a point, with things in it that move: blocked where they are now.
+        """Return the part around a point, with moving things blocked where they are now.
 
         Args:
             middle: (x, y) [m], on the map.
-            reach: How far it extends on each side [m].
-            discs: Each inflated by this robot's body and margin; close by, a metre costs more.
+            reach: Its extent on each side [m].
+            discs: The moving things; inflated by this robot's body and margin, with extra cost
+                close by.
         """
         grid = self.map
         row, column = grid.row_column(*middle)
@@ -78,7 +79,7 @@ class Costmap(Floor):
         return part
 
     def put(self, disc: Sighting) -> None:
-        """Block the cells that something round blocks; for new parts only."""
+        """Block the cells around a moving thing; only for a part that is being made."""
         grid = self.map
         inner = disc.radius + self.radius + _WIDE_BERTH
         outer = inner + _SHY
@@ -95,8 +96,8 @@ class Costmap(Floor):
         self.cost[r0:r1, c0:c1] += extra.astype(np.float32)
 
     def index_cells(self) -> None:
-        """Make the tables for looking cells up."""
-        # Looked up one at a time by the control loop: bytes answer faster than an array.
+        """Make the tables for cell look-up."""
+        # The control loop looks up single cells: bytes are faster for that than an array.
         self._free = (~self.blocked).tobytes()
         grid = self.map
         self._height, self._width = grid.height, grid.width
@@ -104,20 +105,20 @@ class Costmap(Floor):
         self._ux, self._uy = math.cos(origin.yaw) * scale, math.sin(origin.yaw) * scale
 
     def is_free(self, x: float, y: float) -> bool:
-        """Tell whether the robot's centre may be at this point of the map frame."""
+        """Return whether the robot's centre may be at this point of the map frame."""
         index = self._index(x, y)
         return index >= 0 and self._free[index] == 1
 
     def touches(self, x: float, y: float) -> bool:
-        """Tell whether the body (without margin) would overlap something solid here.
+        """Return whether the body (without margin) would overlap something solid here.
 
-        Half a cell's overlap is forgiven: the map knows no better.
+        An overlap of half a cell is tolerated: the map is no more precise.
         """
         index = self._index(x, y)
         return index < 0 or self._touching[index] == 1
 
     def _index(self, x: float, y: float) -> int:
-        """Return the number of the cell at a point, counted row by row; -1 outside the map."""
+        """Return the index of the cell at a point, row by row; -1 outside the map."""
         origin = self.map.origin
         dx, dy = x - origin.x, y - origin.y
         column = math.floor(self._ux * dx + self._uy * dy)
@@ -141,7 +142,7 @@ class Costmap(Floor):
         return length * float(self.cost[rows, columns].mean())
 
     def are_free(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell for many points of the map frame whether the robot's centre may be there."""
+        """Return for many points of the map frame whether the robot's centre may be there."""
         origin = self.map.origin
         dx, dy = x - origin.x, y - origin.y
         columns = np.floor(self._ux * dx + self._uy * dy).astype(np.intp)
@@ -152,7 +153,7 @@ class Costmap(Floor):
         return free
 
     def polyline_is_free(self, points: Sequence[tuple[float, float]]) -> bool:
-        """Tell whether every point (x, y) of a way may be driven over."""
+        """Return whether every point (x, y) of a way is free."""
         if len(points) < _FEW:
             return all(self.is_free(x, y) for x, y in points)
         places = np.array(points)
@@ -160,7 +161,7 @@ class Costmap(Floor):
 
 
 def _clearance(solid: NDArray[np.bool_], resolution: float) -> NDArray[np.float64]:
-    """Return the distance [m] from each cell's centre to the next solid cell or the map's edge."""
+    """Return the distance from each cell's centre to the next solid cell or the map's edge [m]."""
     walled = np.pad(solid, 1, constant_values=True)
     cells = distance_transform_edt(~walled)[1:-1, 1:-1]
     clearance: NDArray[np.float64] = (cells - 0.5) * resolution
@@ -168,7 +169,7 @@ def _clearance(solid: NDArray[np.bool_], resolution: float) -> NDArray[np.float6
 
 
 def _cost(room: NDArray[np.float64], config: PlannerConfig) -> NDArray[np.float32]:
-    """Return what a metre costs, from the room [m] left beside the body."""
+    """Return the cost of a metre, for the space left beside the body [m]."""
     if config.wall_distance == 0 or config.wall_weight == 0:
         return np.ones(room.shape, dtype=np.float32)
     share = np.clip(room, 0.0, config.wall_distance) / config.wall_distance

@@ -1,4 +1,4 @@
-"""Doors that open and close, and docks."""
+"""Doors that open and close."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ _HALF_THICKNESS: Final = 0.05  # [m] of a door's leaf
 
 
 class Door:
-    """A door in a doorway. It stands in the way until it is wholly open.
+    """A door in a doorway. It blocks the doorway until it is completely open.
 
-    Threads: as its world says; `is_open` may be read from any thread.
+    Threads: as for its world; `is_open` may be read from any thread.
 
     Attributes:
         name: One word.
         bar: Its leaf when closed.
         travel: How long it takes to open or to close [s].
-        share: How far open it is, 0 to 1.
+        share: How far it is open, 0 to 1.
     """
 
     def __init__(
@@ -44,19 +44,19 @@ class Door:
 
     @property
     def is_open(self) -> bool:
-        """Whether a robot can go through."""
+        """Whether a robot can drive through."""
         return self.share >= 1.0
 
     @property
     def is_moving(self) -> bool:
-        """Whether it opens or closes."""
+        """Whether it is opening or closing."""
         return self.share != (1.0 if self._opening else 0.0)
 
     def set(self, *, opening: bool) -> str:
         """Open or close it.
 
         Returns:
-            Why it does not, "" when it does: it closes on nobody.
+            Why it does not move; "" if it does. It does not close on anybody.
         """
         if not opening and self.is_open:
             someone = self._world.who_is_at(self.bar)

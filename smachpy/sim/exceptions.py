@@ -1,4 +1,4 @@
-"""What the simulated robot and the readers of its files raise.
+"""The exceptions of the simulated robot and of its file readers.
 
 smachpy.exceptions.MissionError
 ├── InputFileError        a YAML file, map or waypoint list is wrong: all problems at once
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class InputFileError(MissionError):
-    """A file that a user wrote is wrong.
+    """A user's file has problems.
 
     Attributes:
         problems: Every problem found, in the order of the file.

@@ -1,4 +1,4 @@
-"""What is solid on a floor, and where a robot can stand."""
+"""The solid parts of a floor, and where a robot can stand."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from smachpy.sim.config import PlannerConfig
     from smachpy.sim.occupancy import OccupancyMap
 
-SOLID_FROM = 50  # `scale` and `raw` maps: this occupancy and more counts as solid
+SOLID_FROM = 50  # in `scale` and `raw` maps, cells with this occupancy or more are solid
 
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """Where something that moves was seen last.
+    """The last known position of a moving thing.
 
     Attributes:
         x: [m], map frame.
         y: [m], map frame.
         radius: [m].
-        name: What to call it.
+        name: Its name.
     """
 
     x: float
@@ -53,11 +53,11 @@ class Obstacle(NamedTuple):
     radius: float
 
     def gap(self, x: float, y: float) -> float:
-        """Return the distance [m] from a point to its surface, negative inside."""
+        """Return the distance from a point to its surface [m], negative inside."""
         return math.hypot(self.x - x, self.y - y) - self.radius
 
     def covers(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which of many points lie inside."""
+        """Return which of many points are inside."""
         return np.hypot(x - self.x, y - self.y) <= self.radius
 
     def middle(self) -> tuple[float, float]:
@@ -65,7 +65,7 @@ class Obstacle(NamedTuple):
         return self.x, self.y
 
     def reach(self) -> float:
-        """Return how far [m] it extends from its middle."""
+        """Return its extent from its middle [m]."""
         return self.radius
 
 
@@ -78,7 +78,7 @@ class Bar(NamedTuple):
         x1: The other end [m].
         y1: [m].
         radius: Half its thickness [m].
-        name: What to call it.
+        name: Its name.
     """
 
     x0: float
@@ -89,7 +89,7 @@ class Bar(NamedTuple):
     name: str
 
     def gap(self, x: float, y: float) -> float:
-        """Return the distance [m] from a point to its surface, negative inside."""
+        """Return the distance from a point to its surface [m], negative inside."""
         ux, uy = self.x1 - self.x0, self.y1 - self.y0
         square = ux * ux + uy * uy
         along = ((x - self.x0) * ux + (y - self.y0) * uy) / square if square else 0.0
@@ -97,7 +97,7 @@ class Bar(NamedTuple):
         return math.hypot(self.x0 + along * ux - x, self.y0 + along * uy - y) - self.radius
 
     def covers(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which of many points lie inside."""
+        """Return which of many points are inside."""
         ux, uy = self.x1 - self.x0, self.y1 - self.y0
         square = ux * ux + uy * uy or 1.0
         along = np.clip(((x - self.x0) * ux + (y - self.y0) * uy) / square, 0.0, 1.0)
@@ -108,7 +108,7 @@ class Bar(NamedTuple):
         return (self.x0 + self.x1) / 2.0, (self.y0 + self.y1) / 2.0
 
     def reach(self) -> float:
-        """Return how far [m] it extends from its middle."""
+        """Return its extent from its middle [m]."""
         return math.hypot(self.x1 - self.x0, self.y1 - self.y0) / 2.0 + self.radius
 
 
@@ -119,10 +119,10 @@ class Floor:
     """A map with obstacles, for a robot of a certain size.
 
     Attributes:
-        map: The map beneath.
-        radius: Body and margin [m]: nothing solid may be nearer to the robot's centre than this.
-        obstacles: What was added to the map.
-        solid: bool (rows, columns): walls, obstacles and what is unknown.
+        map: The map.
+        radius: Body and margin [m]: the robot's centre must be at least this far from solid things.
+        obstacles: The things added to the map.
+        solid: bool (rows, columns): walls, obstacles and unknown cells.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class Floor:
         """Return the cell (row, column) of a place where the robot is to stand.
 
         Raises:
-            NavigationError: it cannot stand there; the text says why.
+            NavigationError: it cannot; the text says why.
         """
         cell = self.map.cell(x, y)
         where = f"goal ({x:.2f}, {y:.2f})"
@@ -163,7 +163,7 @@ class Floor:
         return cell
 
     def clearance(self, row: int, column: int) -> float:
-        """Return the room [m] around a cell's centre, looked for no farther than the radius."""
+        """Return the free distance around a cell's centre [m], measured up to the radius."""
         resolution = self.map.resolution
         reach = math.ceil(self.radius / resolution) + 1
         r0, c0 = max(0, row - reach), max(0, column - reach)

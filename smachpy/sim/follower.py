@@ -1,4 +1,4 @@
-"""Follow a way: turn towards it, drive along it, stop on the goal, turn to the goal's heading."""
+"""Follows a way: turn towards it, drive along it, stop at the goal, turn to its heading."""
 
 from __future__ import annotations
 
@@ -24,35 +24,35 @@ if TYPE_CHECKING:
 
 _CREEP: Final = 0.06  # [m/s] slowest approach, so that the goal is reached in finite time
 _CREEP_TURN: Final = 0.08  # [rad/s] the same for the last turn
-_FACING: Final = 0.15  # [rad] a turn on the spot ends this near to the way's heading
-_SHARE: Final = 0.8  # of the braking and turning power that the plan counts on
-_TINY: Final = 1e-3  # [m] the point steered to counts as no nearer
-_REACHED: Final = 0.02  # [m] a point steered to that is nearer has no direction
+_FACING: Final = 0.15  # [rad] a turn on the spot ends this close to the way's heading
+_SHARE: Final = 0.8  # fraction of the braking and turning power that the plan counts on
+_TINY: Final = 1e-3  # [m] smallest distance to the target point: no division by zero
+_REACHED: Final = 0.02  # [m] a closer target point gives no direction
 _STRAIGHT: Final = 1e-4  # [1/m] less curvature than this needs no slowing down
 _BEND_REACH: Final = 4  # points on each side over which a bend is measured
 
 
 class Stage(Enum):
-    """What the follower is doing."""
+    """The stages of following a way."""
 
     TURN = auto()  # on the spot, towards the way
     DRIVE = auto()
-    BRAKE = auto()  # on the goal
+    BRAKE = auto()  # at the goal
     FACE = auto()  # on the spot, to the goal's heading
     DONE = auto()
 
 
 class Follower:
-    """Turns the place of a body on one way into commands.
+    """Computes commands from the position of a body on one way.
 
     Source of the steering law: R. C. Coulter, "Implementation of the Pure Pursuit Path Tracking
     Algorithm", CMU-RI-TR-92-01.
 
     Attributes:
-        stage: What it is doing.
+        stage: The current stage.
         points: The way, (x, y) [m].
-        robot: The limits it keeps to.
-        control: How it follows.
+        robot: The robot's limits.
+        control: The control parameters.
     """
 
     def __init__(
@@ -82,20 +82,21 @@ class Follower:
         return self._lengths[-1] - self._lengths[self._at]
 
     def rest(self, distance: float = math.inf) -> Sequence[tuple[float, float]]:
-        """Return the points still ahead, of the next `distance` metres."""
+        """Return the points ahead, for the next `distance` metres."""
         end = bisect.bisect_right(self._lengths, self._lengths[self._at] + distance)
         return self.points[self._at : end]
 
     def ahead(self, distance: float) -> tuple[Floats, Floats]:
-        """Return the points (n, 2) of the next `distance` metres, and how far each is [m]."""
+        """Return the points (n, 2) of the next `distance` metres, with their distances [m]."""
         here = self._lengths[self._at]
         end = bisect.bisect_right(self._lengths, here + distance)
         return self._xy[self._at : end], self._along[self._at : end] - here
 
     def command(self, body: Body) -> tuple[float, float]:
-        """Return the speed [m/s] and turn rate [rad/s] to steer with now; moves the stage on."""
+        """Return the next speed [m/s] and turn rate [rad/s]; may change the stage."""
         stage = self.stage
-        if stage is Stage.DRIVE or stage is Stage.TURN:  # not in a set: this runs at every step
+        # Faster than a set: this runs at every step.
+        if stage is Stage.DRIVE or stage is Stage.TURN:
             return self._go(body)
         if stage is Stage.BRAKE:
             if not body.standing:
@@ -119,7 +120,7 @@ class Follower:
         target_x, target_y = self.points[self._look(body.speed)]
         distance = math.hypot(target_x - x, target_y - y)
         if distance < _REACHED and self._ahead < len(self.points) - 1:
-            # The way comes back to where it was: it stands on both ends of the bend.
+            # The way returns to this place: skip the bend, whose both ends are here.
             self._at = self._ahead
             return self._go(body)
         error = wrap_angle(math.atan2(target_y - y, target_x - x) - body.yaw)
@@ -127,6 +128,7 @@ class Follower:
             return 0.0, self._turn(error)
         speed = min(self._limits[self._at], math.sqrt(self._stopping * left))
         speed = max(speed, _CREEP)
+        # Pure pursuit: the arc through the target point has the curvature 2 sin(error) / distance.
         turn_rate = speed * 2.0 * math.sin(error) / max(_TINY, distance)
         most = self._fastest_turn
         if turn_rate > most or turn_rate < -most:
@@ -135,7 +137,10 @@ class Follower:
         return speed, turn_rate
 
     def _must_turn(self, error: float) -> bool:
-        """Tell whether the heading is so far off that it has to turn on the spot."""
+        """Return whether the heading is so wrong that it has to turn on the spot.
+
+        Two thresholds: with one, it would switch back and forth between turning and driving.
+        """
         if self.stage is Stage.TURN:
             if abs(error) < _FACING:
                 self.stage = Stage.DRIVE
@@ -144,7 +149,7 @@ class Follower:
         return self.stage is Stage.TURN
 
     def _turn(self, error: float) -> float:
-        """Return the turn rate for a turn by `error` [rad] that ends at rest."""
+        """Return the turn rate for a turn by `error` [rad] that ends at rest (w^2 = 2 a phi)."""
         rate = math.sqrt(2.0 * _SHARE * self.robot.turn_acceleration * abs(error)) * _SHARE
         return math.copysign(max(_CREEP_TURN, min(rate, self.robot.max_turn_rate)), error)
 
@@ -175,7 +180,7 @@ class Follower:
         return ahead
 
     def _overshot(self, x: float, y: float, left: float) -> bool:
-        """Tell whether it is at the end of the way and the goal is no longer in front."""
+        """Return whether it is at the end of the way and the goal is no longer ahead."""
         last = len(self.points) - 1
         if self._at < last or left > self.control.xy_tolerance or last == 0:
             return False
@@ -206,10 +211,11 @@ def _speed_limits(points: Floats, lengths: Floats, robot: RobotConfig) -> Floats
 
 
 def _bends(points: Floats) -> Floats:
-    """Return the curvature [1/m] at each point but the first and last few."""
+    """Return the curvature at each point except the first and last few [1/m]."""
     u = points[_BEND_REACH:-_BEND_REACH] - points[: -2 * _BEND_REACH]
     v = points[2 * _BEND_REACH :] - points[_BEND_REACH:-_BEND_REACH]
-    # Of the circle through three points.
+    # The circle through three points has the curvature 4 area / (product of the three sides);
+    # `area` here is twice that of the triangle.
     w = u + v
     product = np.sqrt((u * u).sum(axis=1) * (v * v).sum(axis=1) * (w * w).sum(axis=1))
     area = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

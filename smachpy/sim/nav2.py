@@ -1,6 +1,6 @@
-"""The robot as a Nav2 robot on a network of ROS 2: `navigate_to_pose`, `spin` and `back_up`.
+"""The robot as a Nav2 robot on a ROS 2 network: `navigate_to_pose`, `spin` and `back_up`.
 
-A stand-in for those who have no robot. Its topics are those of `nav2_topics`.
+A replacement for a real robot. Its topics are those of `nav2_topics`.
 
 Source:
     https://docs.nav2.org (interfaces and error codes), nav2_behaviors (what `back_up` takes).
@@ -21,11 +21,11 @@ from smachpy.sim.battery import Battery
 from smachpy.sim.behaviors import back_up, spin
 from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import ORIGIN, wrap_angle
-from smachpy.sim.nav2_topics import Nav2Topics, fill_pose, set_time
+from smachpy.sim.nav2_topics import NS, Nav2Topics, fill_pose, set_time
 from smachpy.sim.navigation import STOP
 from smachpy.sim.pilot import Pilot
 from smachpy.sim.server import MAP_FRAME, read_pose
-from smachpy.sim.stepper import Stepper
+from smachpy.sim.stepper import JUST_PAST, Stepper
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,24 +35,22 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from smachpy.sim.world import Robot
 
-    Order = Callable[[Callable[[str], object]], object]  # starts the pilot; tells it the end
+    Order = Callable[[Callable[[str], object]], object]  # starts the pilot, which reports its end
 
-_JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
-_NS: Final = 1_000_000_000
 _UNKNOWN: Final = {"navigate_to_pose": 9000, "spin": 700, "back_up": 710}
-"""Nav2's error code of each action for "something else went wrong"."""
+"""Nav2's error code of each action for an error without a code of its own."""
 _TIMEOUT: Final = {"navigate_to_pose": 9003, "spin": 701, "back_up": 711}
 _INVALID_INPUT: Final = 713
 _COLLISION_AHEAD: Final = 714
 _TAKEN: Final = "another behavior has taken over"
 
 
-class _Stopped(Exception):  # noqa: N818  no error: the goal was asked to stop
-    """The goal is to stop."""
+class _Stopped(Exception):  # noqa: N818  not an error: the goal was cancelled
+    """The goal was cancelled."""
 
 
 class _Behavior:
-    """One action: its server, and the goal of it that the pilot carries out."""
+    """One action: its server, and the state of its goal."""
 
     def __init__(
         self, name: str, action: Any, execute: Callable[[Any], object], node: Node
@@ -67,24 +65,24 @@ class _Behavior:
         self.target = ORIGIN  # of navigate_to_pose
 
     def result(self, elapsed: float, code: int = 0, text: str = "") -> Any:
-        """Return a result message; definitions of older distributions have fewer fields."""
+        """Return a result message; the definitions of older distributions have fewer fields."""
         result = self.action.Result()
         if hasattr(result, "total_elapsed_time"):
-            set_time(result.total_elapsed_time, round(elapsed * _NS))
+            set_time(result.total_elapsed_time, round(elapsed * NS))
         if hasattr(result, "error_code"):
             result.error_code, result.error_msg = code, text
         return result
 
 
 class Nav2Server:
-    """Serves one robot as Nav2 does, on the ROS 2 network that the node's configuration says.
+    """Serves one robot like Nav2, on the ROS 2 network of the node's configuration.
+
+    Its battery does not drain: Nav2 has no action with which a mission could charge it.
 
     Args:
         robot: The robot; nothing else may steer it.
-        node: Where it is on the network; None takes the node in force.
-        stepper: Lets time pass for it and for others; None makes one for this robot alone.
-
-    Its battery does not drain: Nav2 has no action by which a mission could charge it.
+        node: Its node; None uses the current one.
+        stepper: Steps this robot and others; None makes one for this robot alone.
 
     Raises:
         ConfigError: there are several ROS 2 networks, and none has the names.
@@ -127,7 +125,7 @@ class Nav2Server:
         return self._robot
 
     def start(self) -> None:
-        """Show the robot on the network and take goals.
+        """Offer the robot on the network and accept goals.
 
         Raises:
             ServerConflictError: another server has one of the names.
@@ -137,10 +135,10 @@ class Nav2Server:
         self._stepper.add(self)
 
     def wait(self) -> None:
-        """Wait until `close` was called.
+        """Wait until `close` is called.
 
         Raises:
-            ServerConflictError: see `start`.
+            ServerConflictError: as for `start`.
 
         Blocks: until then.
         """
@@ -148,14 +146,14 @@ class Nav2Server:
 
     @property
     def conflict(self) -> ServerConflictError | None:
-        """Why it left its names by itself; else None."""
+        """Why it gave up its names; None if it has not."""
         errors = (b.server.action_server.error for b in self._behaviors.values())
         return next((error for error in errors if error is not None), None)
 
     def close(self) -> None:
-        """Stop taking goals; running ones are aborted. A second call does nothing.
+        """Stop accepting goals; running ones are aborted. A second call does nothing.
 
-        Blocks: until the robot's threads have seen it, two seconds at most.
+        Blocks: until the robot's threads have ended, two seconds at most.
         """
         self._closing.set()
         for behavior in self._behaviors.values():
@@ -167,7 +165,7 @@ class Nav2Server:
             self._stepper.close()
         self._topics.close()
 
-    # -- goals: each on its server's thread ----------------------------------------------------
+    # -- goals: each in its server's thread ----------------------------------------------------
 
     def _navigate(self, goal: Any) -> None:
         behavior = self._behaviors["navigate_to_pose"]
@@ -217,10 +215,10 @@ class Nav2Server:
         """Give the pilot an order, wait for its end, and end the goal accordingly.
 
         Args:
-            behavior: Whose goal it is.
+            behavior: The goal's action.
             order: Starts the pilot.
-            allowance: It fails when it takes longer than this [s].
-            code: Nav2's error code when the pilot reports trouble.
+            allowance: The goal fails if it takes longer than this [s].
+            code: Nav2's error code if the pilot reports an error.
 
         Blocks: until the goal has ended.
         """
@@ -249,11 +247,11 @@ class Nav2Server:
         order: Order,
         until: float,
     ) -> str:
-        """Return what went wrong, "" for nothing.
+        """Return the error; "" for none.
 
         Raises:
-            TimeoutError: it has not ended by then.
-            _Stopped: it is to stop.
+            TimeoutError: it did not end in time.
+            _Stopped: it was cancelled.
         """
         ended: list[str] = []
 
@@ -266,6 +264,7 @@ class Nav2Server:
             behavior.begun, behavior.from_pose = self._clock.now(), self._robot.body.pose
             self._turned, self._yaw = 0.0, self._robot.body.yaw
             order(done)
+        # The goal of another action gives way: its thread sees that `_busy` is no longer its own.
         if before is not None:
             before.wake.set()
         self._stepper.wake()
@@ -289,16 +288,16 @@ class Nav2Server:
         return ended[0]
 
     def _on_speed(self, command: tuple[float, float]) -> None:
-        """Drive by hand; a speed that is no finite number stops."""
+        """Drive by hand; a speed that is not finite stops the robot."""
         finite = all(math.isfinite(value) for value in command)
         with self._stepper.lock:
             self._pilot.override(self._clock.now(), command if finite else STOP)
         self._stepper.wake()
 
-    # -- steps: the stepper's thread -----------------------------------------------------------
+    # -- steps: in the stepper's thread --------------------------------------------------------
 
     def is_busy(self, now: float) -> bool:
-        """Tell whether the robot moves, is to move, or looks about for somebody."""
+        """Return whether the robot moves, is to move, or has subscribers to its scans."""
         return self._pilot.is_busy(now) or self._topics.is_watched()
 
     def step(self, now: float, dt: float) -> None:
@@ -311,12 +310,13 @@ class Nav2Server:
         self._yaw = yaw
 
     def report(self, now: float) -> None:
-        """Send feedback, odometry, transforms and scans where they are due; tell what has ended."""
+        """Publish everything that is due, and report orders that have ended."""
         self._topics.report(now)
-        if now - self._reported > self._feedback_period - _JUST_PAST:
+        if now - self._reported > self._feedback_period - JUST_PAST:
             self._reported = now
             self._publish_feedback(now)
         with self._stepper.lock:
+            # Called without the lock below: a callback may give the next order, which needs it.
             ended = self._pilot.take_ends()
         for tell in ended:
             tell()
@@ -338,13 +338,13 @@ class Nav2Server:
             straight = body.pose.distance(behavior.target)
             left = follower.remaining if follower is not None else straight
             feedback.distance_remaining = left
-            set_time(feedback.navigation_time, round((now - behavior.begun) * _NS))
+            set_time(feedback.navigation_time, round((now - behavior.begun) * NS))
             seconds = left / self._robot.config.robot.max_speed
-            set_time(feedback.estimated_time_remaining, round(seconds * _NS))
+            set_time(feedback.estimated_time_remaining, round(seconds * NS))
         behavior.server.publish_feedback(feedback)
 
 
 def allowance_of(goal: Any) -> float:
-    """Return how long a goal may take [s]; Nav2 takes 0 for "as long as it likes"."""
+    """Return how long a goal may take [s]; in Nav2 0 means no limit."""
     allowance = goal.time_allowance
-    return float(allowance.sec + allowance.nanosec / _NS) or math.inf
+    return float(allowance.sec + allowance.nanosec / NS) or math.inf

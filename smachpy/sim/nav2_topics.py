@@ -1,6 +1,6 @@
 """The topics of a Nav2 robot: `odom`, `tf`, `scan`, `plan`, `map`, `cmd_vel`.
 
-And the service by which programs wait for its start-up, `lifecycle_manager_navigation/is_active`.
+And the service with which programs wait for its start-up, `lifecycle_manager_navigation/is_active`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from actionlib_core.pubsub.topic import Publisher, Subscriber
 from smachpy.sim.geometry import ORIGIN, Pose2D, quaternion_of
 from smachpy.sim.scanner import Scanner
 from smachpy.sim.server import BASE_FRAME, MAP_FRAME, ODOM_FRAME
+from smachpy.sim.stepper import JUST_PAST
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,22 +24,21 @@ if TYPE_CHECKING:
     from smachpy.sim.stepper import Stepper
     from smachpy.sim.world import Robot
 
-_JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
-_NS: Final = 1_000_000_000
+NS: Final = 1_000_000_000
 
 
 class Nav2Topics:
-    """Publishes where one robot is and what it sees.
+    """Publishes a robot's pose and what it sees.
 
     Args:
         robot: The robot.
-        stepper: Moves it; its lock is held while the robot is looked at.
-        node: Where it is on the network.
-        distro: Whose definitions of messages.
-        on_speed: Called with each speed and turn rate [m/s, rad/s] that is to be driven by hand, in
-            the subscriber's thread.
+        stepper: Moves it; its lock is held while the robot is read.
+        node: Its node.
+        distro: The ROS 2 release whose message definitions are used.
+        on_speed: Called with each speed and turn rate [m/s, rad/s] from `cmd_vel`, in the
+            subscriber's thread.
 
-    Threads: `report` is the stepper's; the other methods may be called from any thread.
+    Threads: `report` is called in the stepper's thread; the other methods in any thread.
     """
 
     def __init__(
@@ -55,7 +55,8 @@ class Nav2Topics:
         self._scanner = Scanner(robot)
         self._odom_period = 1.0 / robot.config.control.feedback_rate
         self._told = self._scanned = -math.inf
-        # Chosen by the distribution while it runs, so no type checker knows their fields.
+        # The classes depend on the distribution at run time, so type checkers do not know their
+        # fields.
         message: Callable[[str], Any] = partial(ros2.get_message, distro=distro)
         trigger: Any = ros2.get_service("std_srvs/Trigger", distro)
         self._transform = message("geometry_msgs/TransformStamped")
@@ -67,7 +68,7 @@ class Nav2Topics:
         self._path = message("nav_msgs/Path")
         self._stamped = message("geometry_msgs/PoseStamped")
         self._plan = Publisher("plan", self._path, node=node)
-        self._way: tuple[tuple[float, float], ...] = ()  # the plan that was told
+        self._way: tuple[tuple[float, float], ...] = ()  # the plan that was published last
         grid = message("nav_msgs/OccupancyGrid")
         self._map = Publisher("map", grid, latch=True, node=node)
         self._publish_map(grid())
@@ -92,16 +93,16 @@ class Nav2Topics:
         self._active.close()
 
     def is_watched(self) -> bool:
-        """Tell whether somebody wants to know what the robot sees."""
+        """Return whether the scans have subscribers."""
         return self._scan.get_num_connections() > 0
 
     def report(self, now: float) -> None:
-        """Publish what is due by `now` [s]."""
-        if now - self._told > self._odom_period - _JUST_PAST:
+        """Publish everything that is due at `now` [s]."""
+        if now - self._told > self._odom_period - JUST_PAST:
             self._told = now
             self._publish_odometry()
         rate = self._robot.config.scan.rate
-        if now - self._scanned > 1.0 / rate - _JUST_PAST and self.is_watched():
+        if now - self._scanned > 1.0 / rate - JUST_PAST and self.is_watched():
             self._scanned = now
             self._publish_scan()
         self._report_plan()
@@ -114,7 +115,7 @@ class Nav2Topics:
         fill_pose(odom.pose.pose, body.pose)
         odom.twist.twist.linear.x, odom.twist.twist.angular.z = body.speed, body.turn_rate
         self._odom.publish(odom)
-        # The odometry does not drift: its frame lies on that of the map.
+        # The odometry does not drift: its frame coincides with the map's.
         frames = (MAP_FRAME, ODOM_FRAME, ORIGIN), (ODOM_FRAME, BASE_FRAME, body.pose)
         transforms = []
         for frame, child, pose in frames:
@@ -144,7 +145,7 @@ class Nav2Topics:
         self._scan.publish(scan)
 
     def _report_plan(self) -> None:
-        """Publish the way that it follows when there is another one; none once it has ended."""
+        """Publish the robot's way if it has changed; an empty one at its end."""
         with self._stepper.lock:
             follower = self._robot.follower
             way = tuple(follower.points) if follower is not None else ()
@@ -170,18 +171,18 @@ class Nav2Topics:
         self._map.publish(grid)
 
     def fill_header(self, header: Any, frame: str) -> None:
-        """Set the frame and the time, which is now."""
+        """Set the frame and the current time."""
         set_time(header.stamp, self._clock.time_ns())
         header.frame_id = frame
 
 
 def set_time(message: Any, nanoseconds: int) -> None:
-    """Set a Time or Duration of ROS 2."""
-    message.sec, message.nanosec = divmod(nanoseconds, _NS)
+    """Fill a Time or Duration of ROS 2."""
+    message.sec, message.nanosec = divmod(nanoseconds, NS)
 
 
 def fill_pose(message: Any, pose: Pose2D) -> None:
-    """Set a Pose of ROS 2."""
+    """Fill a Pose of ROS 2."""
     message.position.x, message.position.y = pose.x, pose.y
     turn = message.orientation
     turn.x, turn.y, turn.z, turn.w = quaternion_of(pose.yaw)

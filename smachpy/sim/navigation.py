@@ -1,7 +1,7 @@
-"""One drive from here to a goal, as a script: plan, follow, plan again, recover, give up.
+"""One drive to a goal, as a script: plan, follow, plan again, recover, give up.
 
-`drive_to` is a generator. Each `next` returns the command for one control step; between two of
-them the robot has moved. It knows nothing of clocks, threads or actions.
+`drive_to` is a generator. Each `next` returns the command for one control step; between two calls
+the robot has moved. It is independent of clocks, threads and actions.
 """
 
 from __future__ import annotations
@@ -25,36 +25,36 @@ if TYPE_CHECKING:
 Command = tuple[float, float]  # speed [m/s], turn rate [rad/s]
 STOP: Final[Command] = (0.0, 0.0)
 _LOOK_EVERY: Final = 4  # control steps between two looks around
-_CREEP_OUT: Final = 0.5  # [m] of a way that may lead out of somewhere too narrow
-_LATE_FACTOR: Final = 20.0  # a drive may take so many times its shortest time
-_LATE_SECONDS: Final = 60.0  # and this [s] besides
-_SEARCH_RATE: Final = 0.7  # share of the turn rate used to look around
-_HEED: Final = 1.5  # [m] ahead, besides braking: closer than this, others on the way matter
-_KEPT_AWAY: Final = 0.1  # [m] it stops so far before somebody
-_NO_CREEPING: Final = 0.03  # [m] more than that, and it stays where it is
-_SHARE: Final = 0.8  # of the braking power that is counted on
-_RETHINK: Final = 0.5  # [s] between two searches for a way around somebody
-_HOLD: Final = 1.0  # [s] it stands before somebody until it tries something else
-_CLOSER: Final = 1e-3  # [m] nearer than now: to drive off from somebody is no meeting
-_PROGRESS: Final = 1.0  # [m] driven since it was held up last: a new matter
-_YIELD_WAIT: Final = 6.0  # [s] it waits at most where it made room
+_CREEP_OUT: Final = 0.5  # [m] at the start of a way may lead out of a place that is too narrow
+_LATE_FACTOR: Final = 20.0  # a drive may take this many times its shortest time
+_LATE_SECONDS: Final = 60.0  # [s] and this much more
+_SEARCH_RATE: Final = 0.7  # fraction of the turn rate used to look around
+_HEED: Final = 1.5  # [m] beyond the braking distance: within this, others on the way matter
+_KEPT_AWAY: Final = 0.1  # [m] distance at which it stops in front of others
+_NO_CREEPING: Final = 0.03  # [m] with less space than this beyond that distance it stays
+_SHARE: Final = 0.8  # fraction of the braking power that is counted on
+_RETHINK: Final = 0.5  # [s] between two searches for a way around others
+_HOLD: Final = 1.0  # [s] it waits in front of others before it tries something else
+_CLOSER: Final = 1e-3  # [m] a point is a meeting only if it is closer than now: see `_gap`
+_PROGRESS: Final = 1.0  # [m] after this way, being held up counts as new
+_YIELD_WAIT: Final = 6.0  # [s] it waits at most where it has made space
 
 
 class End(Enum):
-    """How following a way ended."""
+    """The end of following a way."""
 
     ARRIVED = auto()
-    CHANGED = auto()  # something that stands blocks the way
+    CHANGED = auto()  # a standing thing blocks the way
     BUMPED = auto()
-    HELD = auto()  # somebody stands in the way
+    HELD = auto()  # another robot or moving thing is in the way
 
 
 def drive_to(robot: Robot, goal: Pose2D) -> Generator[Command]:
-    """Yield commands until the robot stands on `goal`.
+    """Yield commands until the robot stands at `goal`.
 
     Raises:
-        NavigationError: the goal cannot be reached, or only after too many recoveries. The robot
-            may still be moving then.
+        NavigationError: the goal cannot be reached, or not within the allowed recoveries. The
+            robot may still be moving then.
     """
     try:
         yield from _drive_to(robot, goal)
@@ -83,7 +83,7 @@ def _try(robot: Robot, goal: Pose2D, patience: _Patience) -> Generator[Command, 
     """Plan a way and follow it.
 
     Returns:
-        "" when it arrived, None when another way is to be tried at once, else what went wrong.
+        "" on arrival, None to try another way at once, else the error.
     """
     try:
         way = robot.planner.plan((robot.body.x, robot.body.y), (goal.x, goal.y))
@@ -92,6 +92,7 @@ def _try(robot: Robot, goal: Pose2D, patience: _Patience) -> Generator[Command, 
             raise
         doors = robot.closed_doors()
         return f"{error}; closed: {doors}" if doors else str(error)
+    # Only with others around: the middle of a corridor is the best way for a single robot.
     if len(robot.world.robots) > 1:
         way = keep_right(robot.planner.costmap, way)
     end = yield from _follow(robot, way, goal)
@@ -106,13 +107,13 @@ def _try(robot: Robot, goal: Pose2D, patience: _Patience) -> Generator[Command, 
 
 
 def brake(robot: Robot) -> Generator[Command]:
-    """Yield commands until the robot stands."""
+    """Yield commands until the robot stands still."""
     while not robot.body.standing:
         yield STOP
 
 
 class _Patience:
-    """Tells when a robot has stood long enough before those in its way."""
+    """Decides when a robot has waited long enough for others in its way."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -120,7 +121,7 @@ class _Patience:
         self._odometer = -math.inf
 
     def trouble(self) -> str:
-        """Return what is in the way, when it has been for too long; else ""."""
+        """Return what has been in the way for too long; else ""."""
         robot = self._robot
         if robot.odometer - self._odometer > _PROGRESS:
             self._since, self._odometer = robot.now, robot.odometer
@@ -135,13 +136,13 @@ class _Patience:
 def _follow(
     robot: Robot, way: list[Point], goal: Pose2D, *, asked: bool = False
 ) -> Generator[Command, None, End]:
-    """Follow a way, around those who stand on it if there is room.
+    """Follow a way, and drive around others on it if there is space.
 
     Args:
-        robot: It drives.
-        way: Where.
-        goal: Its end, and the heading there.
-        asked: It makes room for somebody, and does not stop for more requests.
+        robot: The robot.
+        way: The way.
+        goal: Its end, with the heading there.
+        asked: Whether the robot is making space, and therefore ignores other requests.
     """
     follower = Follower(way, goal, robot.config.robot, robot.config.control)
     count, longest, dt = 0, _longest(robot, follower.remaining), _dt(robot)
@@ -152,6 +153,7 @@ def _follow(
         if follower.stage is Stage.DONE:
             return End.ARRIVED
         if robot.traffic or gap < math.inf:
+            # Measured at every second step and estimated in between, to save time.
             gap = _gap(robot, follower) if count % 2 == 0 else gap - abs(robot.body.speed) * dt
             if gap < math.inf and robot.now > think:
                 around = _around(robot, follower)
@@ -178,9 +180,9 @@ def _follow(
 
 
 def _gap(robot: Robot, follower: Follower) -> float:
-    """Return how far [m] along the way it can go before it meets somebody; notes whom.
+    """Return how far along the way it can go before it meets others [m], and note whom.
 
-    Who is too far off to matter now does not count: infinite. Neither does who is only left behind.
+    Infinite if nobody is close enough to matter, or if it only drives away from them.
     """
     body, margin = robot.body, robot.config.planner.margin
     far = body.braking_distance() + _HEED
@@ -195,7 +197,8 @@ def _gap(robot: Robot, follower: Follower) -> float:
     points, lengths = follower.ahead(far)
     found = math.inf
     for seen, now, reach in near:
-        # To come no nearer than it is now is no meeting: it only drives off.
+        # Points that are no closer to the other than the robot is now do not count: it is only
+        # driving away from it.
         dx, dy = points[:, 0] - seen.x, points[:, 1] - seen.y
         meets = dx * dx + dy * dy < min(reach, now - _CLOSER) ** 2
         first = int(meets.argmax())
@@ -210,7 +213,7 @@ def _around(robot: Robot, follower: Follower) -> list[Point] | None:
 
 
 def _safe_speed(robot: Robot, gap: float) -> float:
-    """Return the speed [m/s] from which it can stop within a gap [m]."""
+    """Return the speed from which it can stop within a gap [m] (v^2 = 2 a s)."""
     if math.isinf(gap):
         return gap
     if gap < _KEPT_AWAY + _NO_CREEPING:
@@ -219,7 +222,7 @@ def _safe_speed(robot: Robot, gap: float) -> float:
 
 
 def _give_way(robot: Robot) -> Generator[Command]:
-    """Make room for who asked for it, or ask who stands in the way; wait a moment."""
+    """Make space if asked to, else ask the robot in the way; wait a moment."""
     yield from brake(robot)
     other = robot.asked_by()
     if other is not None:
@@ -231,7 +234,7 @@ def _give_way(robot: Robot) -> Generator[Command]:
 
 
 def _make_room(robot: Robot, other: Robot) -> Generator[Command]:
-    """Drive off another robot's way and wait there until it has passed."""
+    """Leave another robot's way and wait until it has passed."""
     here = (robot.body.x, robot.body.y)
     clearance = other.body.radius + robot.planner.costmap.radius + _KEPT_AWAY
     robot.look()
@@ -255,7 +258,7 @@ def _stand(robot: Robot, seconds: float) -> Generator[Command]:
 
 
 def _longest(robot: Robot, distance: float) -> float:
-    """Return the control steps after which a drive over `distance` metres has gone wrong."""
+    """Return the number of control steps after which a drive over `distance` metres fails."""
     limits = robot.config.robot
     seconds = distance / limits.max_speed + 2.0 * math.pi / limits.max_turn_rate
     return (_LATE_FACTOR * seconds + _LATE_SECONDS) / _dt(robot)
@@ -266,7 +269,7 @@ def _dt(robot: Robot) -> float:
 
 
 def _is_clear(costmap: Costmap, way: list[Point]) -> bool:
-    """Tell whether the way is free; its beginning may lead out of somewhere too narrow."""
+    """Return whether the way is free; its start may lead out of a place that is too narrow."""
     start = 0
     while start < len(way) - 1 and not costmap.is_free(*way[start]):
         if math.dist(way[0], way[start]) > _CREEP_OUT:
@@ -276,7 +279,7 @@ def _is_clear(costmap: Costmap, way: list[Point]) -> bool:
 
 
 def _recover(robot: Robot) -> Generator[Command]:
-    """Stop, back up, turn round once, wait a little, forget what is out of sight."""
+    """Stop, back up, turn once around, wait a little, forget things that are out of sight."""
     config = robot.config
     yield from brake(robot)
     yield from _back_up(robot)
@@ -292,7 +295,7 @@ def _recover(robot: Robot) -> Generator[Command]:
 
 
 def _back_up(robot: Robot) -> Generator[Command]:
-    """Drive back, as far as set and as long as there is room behind."""
+    """Drive back by the configured distance, while there is space behind."""
     body, distance = robot.body, robot.config.recovery.back_up
     x, y = body.x, body.y
     costmap, radius = robot.planner.costmap, robot.config.robot.radius

@@ -1,4 +1,4 @@
-"""Occupancy maps in the form of ROS `map_server`: a YAML file beside a PGM or PNG image."""
+"""Occupancy maps in the format of ROS `map_server`: a YAML file beside a PGM or PNG image."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 UNKNOWN: Final = -1
 FREE: Final = 0
 OCCUPIED: Final = 100
-MAX_CELLS: Final = 64_000_000  # an image larger than this is refused
+MAX_CELLS: Final = 64_000_000  # a larger image is refused before it fills the memory
 _TRANSPARENT: Final = 0.999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OccupancyMap:
-    """A grid of what is known about the floor.
+    """A grid of the known floor.
 
     Attributes:
         cells: int8 (rows, columns), row 0 at the bottom: 0 free to 100 occupied, -1 unknown.
@@ -85,7 +85,7 @@ def load_map(path: Path) -> OccupancyMap:
     Source: http://wiki.ros.org/map_server, "Map format" and "Value interpretation".
 
     Raises:
-        InputFileError: with the file and field of every problem.
+        InputFileError: a file has problems; each is listed with its line and field.
     """
     document = Document(path)
     top = document.top
@@ -115,7 +115,7 @@ def load_map(path: Path) -> OccupancyMap:
 
 
 def _occupancy(pixels: NDArray[np.float64], occupied: float, free: float) -> NDArray[np.int8]:
-    """Interpret shades as map_server's `scale` does; between the thresholds 1 to 99."""
+    """Interpret shades as map_server's mode `scale`; between the thresholds 1 to 99."""
     share = (255.0 - pixels) / 255.0
     between = 1.0 + 98.0 * (share - free) / (occupied - free)
     cells = np.where(share > occupied, OCCUPIED, np.where(share < free, FREE, between))
@@ -123,7 +123,7 @@ def _occupancy(pixels: NDArray[np.float64], occupied: float, free: float) -> NDA
 
 
 def _raw(pixels: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Take shades 0 to 100 as occupancy, everything else as unknown."""
+    """Interpret shades 0 to 100 as occupancy, all others as unknown."""
     return np.where(pixels <= OCCUPIED, pixels, UNKNOWN).astype(np.int8)
 
 
@@ -161,7 +161,7 @@ def _channels(picture: object) -> NDArray[np.float64]:
     from PIL import Image
 
     assert isinstance(picture, Image.Image)
-    if picture.mode.startswith("I"):  # 16 bits a pixel
+    if picture.mode.startswith("I"):  # 16 bits per pixel: 65535 / 255 = 257
         return np.asarray(picture, dtype=np.float64)[:, :, None] / 257.0
     if picture.mode == "P":
         picture = picture.convert("RGBA" if "transparency" in picture.info else "RGB")

@@ -1,4 +1,4 @@
-"""Decides what one robot does next: an override, the drive to its goal, or a stop."""
+"""Decides on a robot's next command: an override, the drive to its goal, or a stop."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
     from smachpy.sim.navigation import Command
     from smachpy.sim.world import Robot
 
-_LOOKED_AHEAD: Final = 0.15  # [m] besides the braking distance, when it is driven by hand
-_BATTERY_EVERY: Final = 4  # steps between two looks at the battery
-_SHARE: Final = 0.8  # of the braking power that is counted on
+_LOOKED_AHEAD: Final = 0.15  # [m] beyond the braking distance, when driven by hand
+_BATTERY_EVERY: Final = 4  # steps between two checks of the battery
+_SHARE: Final = 0.8  # fraction of the braking power that is counted on
 
 
 class Pilot:
     """Steers one robot, one control step at a time.
 
-    An override (somebody drives by hand) goes before the drive to a goal, which waits meanwhile and
-    is planned anew from where the override left the robot. A robot with nothing to do brakes.
+    An override (driving by hand) has priority over the drive to a goal, which waits and is planned
+    again from where the override left the robot. A robot without an order brakes.
 
-    Threads: none of its own; the owner's lock keeps the calls apart.
+    Threads: none of its own; the owner serialises the calls with its lock.
 
     Attributes:
-        robot: What it steers.
+        robot: The robot.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -47,31 +47,31 @@ class Pilot:
     # -- orders --------------------------------------------------------------------------------
 
     def drive(self, goal: Pose2D, done: Callable[[str], object]) -> None:
-        """Drive to `goal` in place of what it does; nobody is told the end of that.
+        """Drive to `goal` instead of the current order, whose end is not reported.
 
         Args:
             goal: In the map frame.
-            done: Called once at the end, by `take_ends`, with what went wrong; "" for nothing.
+            done: Called once at the end, by `take_ends`, with an error text; "" for none.
         """
         self._goal, self._done = goal, done
         self._script, self._plan_anew = self._journey(goal), False
 
     def run(self, script: Generator[Command, None, str], done: Callable[[str], object]) -> None:
-        """Follow a script of commands in place of what it does; arguments as `drive`.
+        """Follow a script of commands instead of the current order; arguments as for `drive`.
 
         Args:
-            script: Yields a command for each control step; returns what went wrong, "" for nothing.
-            done: See `drive`.
+            script: Yields a command for each control step; returns an error text, "" for none.
+            done: As for `drive`.
         """
         self._goal, self._done = None, done
         self._script, self._plan_anew = script, False
 
     def stop(self, done: Callable[[str], object]) -> None:
-        """Brake in place of what it does; `done("")` is called when it stands."""
+        """Brake instead of the current order; `done("")` is called when the robot stands."""
         self.run(self._halt(), done)
 
     def let_go(self) -> None:
-        """Drop what it does without telling anybody; it brakes unless there is a new order."""
+        """Drop the current order without a report; the robot brakes unless it gets a new one."""
         self._goal = self._done = self._script = None
 
     def override(self, now: float, command: Command) -> None:
@@ -80,13 +80,13 @@ class Pilot:
         self._override_until = now + self.robot.config.control.override_time
 
     def plan_anew(self) -> None:
-        """Choose the way to the goal again, from what the robot knows now."""
+        """Plan the way to the goal again, with what the robot knows now."""
         self._plan_anew = self._goal is not None
 
     # -- steps ---------------------------------------------------------------------------------
 
     def is_busy(self, now: float) -> bool:
-        """Tell whether steps would change anything."""
+        """Return whether steps would change anything."""
         return (
             self._script is not None or now < self._override_until or not self.robot.body.standing
         )
@@ -97,14 +97,16 @@ class Pilot:
         self.robot.step(now, dt, self._command(now))
 
     def take_ends(self) -> list[Callable[[], object]]:
-        """Return the calls that tell what has ended since; to be made without any lock."""
+        """Return the callbacks of orders that have ended; to be called without a lock."""
         ended, self._ended = self._ended, []
         return ended
 
     def _command(self, now: float) -> Command:
         if now < self._override_until:
             if self._goal is None:
-                self._end("")  # an order to stop: somebody else says now when it stands
+                self._end(
+                    ""
+                )  # an order to stop is over: the override decides now when the robot stands
             self.plan_anew()
             return self._by_hand(now)
         if self._script is None:
@@ -123,7 +125,7 @@ class Pilot:
         self.let_go()
 
     def _journey(self, goal: Pose2D) -> Generator[Command, None, str]:
-        """Drive to `goal`; returns what went wrong, at rest."""
+        """Drive to `goal`; return the error text when the robot stands."""
         try:
             for count, command in enumerate(drive_to(self.robot, goal)):
                 if count % _BATTERY_EVERY == 0:
@@ -143,10 +145,10 @@ class Pilot:
         return ""
 
     def _by_hand(self, now: float) -> Command:
-        """Return the override, slowed down so that it ends before what stands in the way.
+        """Return the override, slowed down so that the robot stops before an obstacle.
 
-        It ends where it could be sent to as well: the margin of goals away, and two cells more,
-        as bodies and goals are measured in cells.
+        It stops where a goal could be, too: at the margin of goals and two cells more, because
+        bodies and goals are measured in cells.
         """
         speed, turn_rate = self._override
         robot = self.robot

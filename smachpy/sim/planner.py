@@ -1,4 +1,4 @@
-"""The cheapest way over the floor: Dijkstra on the cells, then a smooth line."""
+"""Plans the cheapest way over the floor: Dijkstra on the cells, then a smooth line."""
 
 from __future__ import annotations
 
@@ -27,26 +27,27 @@ Point = tuple[float, float]  # (x, y) [m], map frame
 Cell = tuple[int, int]  # (row, column)
 
 _NEIGHBOURS: Final = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
-_KEPT_FIELDS: Final = 64  # trees kept, one per goal cell: 0.7 MB each for the office
-_KEPT_WAYS: Final = 256  # finished ways kept, one per start cell and goal
+_KEPT_FIELDS: Final = 64  # trees that are kept, one per goal cell: 0.7 MB each for the office
+_KEPT_WAYS: Final = 256  # finished ways that are kept, one per start cell and goal
 _SPACING: Final = 0.05  # [m] between the points of a finished way
 _ROUNDS: Final = 3  # of corner cutting
 _SLACK: Final = 1.02  # a straight line may cost this much more than the bends it replaces
-_AROUND: Final = 3.0  # [m] on each side: where a way around something that moves is looked for
+_AROUND: Final = 3.0  # [m] on each side: the area of the search for a way around moving things
 _LANE_STEPS: Final = (0.1, 0.2, 0.3, 0.4)  # [m] to the right
-_LANE_SPARE: Final = 0.05  # [m] this much farther must be free as well
+_LANE_SPARE: Final = 0.05  # [m] beyond the lane that must be free as well
 _TAPER: Final = 20  # points over which a shift grows
 _DIRECTION: Final = 4  # points on each side over which the direction of a way is measured
-_EVERY: Final = 3  # of the points of a way that is to be left: enough to tell how far off it is
-_SQUEEZE: Final = 0.2  # [m] a robot so near to something that moves may drive off
-_RESCUE: Final = 0.5  # [m] a robot that stands too near to something may creep out of it
+_EVERY: Final = 3  # points of a way to be left, of which one is tested: they are 5 cm apart
+_SQUEEZE: Final = 0.2  # [m] a robot this close to a moving thing may drive away from it
+_RESCUE: Final = 0.5  # [m] a robot that stands too close to something may creep out
 
 
 class Planner:
     """Finds ways on one costmap.
 
-    The search runs backwards from the goal over the whole floor, so that its tree answers every
-    start; trees and ways of the last goals are kept, so a patrol's second round is nearly free.
+    The search runs backwards from the goal over the whole floor, so that its tree is valid for
+    every start. Trees and ways of the last goals are kept, so a patrol's second round costs almost
+    nothing.
 
     Threads: every method may be called from any thread; one plans at a time.
     """
@@ -62,8 +63,8 @@ class Planner:
         """Return the way from `start` to `goal`: points about 5 cm apart, both ends included.
 
         Raises:
-            NavigationError: the goal is outside the map, in something solid, too near to it, or
-                cannot be reached.
+            NavigationError: the goal is outside the map, in something solid, too close to it, or
+                out of reach.
         """
         target = self.costmap.check_place(*goal)
         source = self._start_cell(start)
@@ -79,17 +80,17 @@ class Planner:
     def around(
         self, start: Point, rest: Sequence[Point], discs: Iterable[Sighting]
     ) -> list[Point] | None:
-        """Return a way that leaves `rest`, passes the discs and comes back to it.
+        """Return a way that leaves `rest`, passes the moving things and comes back to it.
 
         Only a few metres around `start` are searched.
 
         Args:
-            start: Where the robot is.
-            rest: The way from there on.
-            discs: What moves, where it is now.
+            start: The robot's position.
+            rest: The way from there.
+            discs: The moving things, where they are now.
 
         Returns:
-            The new way to the end of `rest`; None when there is none.
+            The new way to the end of `rest`; None if there is none.
         """
         window = _Window(self.costmap.cut(start, _AROUND, discs), start)
         back = window.rejoin(rest)
@@ -105,15 +106,15 @@ class Planner:
     def refuge(
         self, start: Point, avoid: Sequence[Point], clearance: float, discs: Iterable[Sighting]
     ) -> list[Point] | None:
-        """Return the way to the nearest place that is off somebody's way.
+        """Return the way to the nearest place that is not on another robot's way.
 
         Only a few metres around `start` are searched.
 
         Args:
-            start: Where the robot is.
-            avoid: The way to get off.
-            clearance: How far from it [m] is far enough.
-            discs: What moves, where it is now.
+            start: The robot's position.
+            avoid: The other robot's way.
+            clearance: The distance from it that is enough [m].
+            discs: The moving things, where they are now.
         """
         window = _Window(self.costmap.cut(start, _AROUND, discs), start)
         if not avoid or window.source is None:
@@ -144,7 +145,7 @@ class Planner:
         return _smooth(self.costmap, corners)
 
     def _start_cell(self, start: Point) -> Cell:
-        """Return the cell to search from: the robot's own, or the nearest one that is free."""
+        """Return the cell to search from: the robot's own, or the nearest free one."""
         cell = self.costmap.map.cell(*start)
         if cell is None:
             raise NavigationError(
@@ -175,7 +176,7 @@ class Planner:
         return cells
 
     def _tree(self, target: Cell) -> NDArray[np.int32]:
-        """Return for each cell the next one on the way to `target`, negative where none is."""
+        """Return for each cell the next one on the way to `target`; negative if there is none."""
         tree = self._trees.get(target)
         if tree is None:
             if self._graph is None:
@@ -191,7 +192,7 @@ class Planner:
 
 
 def keep_right(costmap: Costmap, way: list[Point]) -> list[Point]:
-    """Shift a way to the right where there is room, so that two who meet can pass."""
+    """Shift a way to the right where there is space, so that two robots can pass."""
     points = np.array(way)
     if len(points) < 2 * _TAPER:
         return way
@@ -206,6 +207,7 @@ def keep_right(costmap: Costmap, way: list[Point]) -> list[Point]:
         moved = points + (step + _LANE_SPARE) * right
         free &= costmap.are_free(moved[:, 0], moved[:, 1])
         shift[free] = step
+    # The shift fades out at both ends, and changes smoothly in between.
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) / _TAPER
     shift = np.minimum(shift, _LANE_STEPS[-1] * np.clip(ends - 0.5, 0.0, 1.0))
     shift = uniform_filter1d(minimum_filter1d(shift, _TAPER), _TAPER)
@@ -217,11 +219,11 @@ def keep_right(costmap: Costmap, way: list[Point]) -> list[Point]:
 
 
 class _Window:
-    """The part of a costmap a few metres around a robot, to search in.
+    """The part of a costmap a few metres around a robot.
 
     Attributes:
         costmap: That part.
-        source: The free cell at the robot or close by; None when there is none.
+        source: The free cell at the robot or close to it; None if there is none.
     """
 
     def __init__(self, costmap: Costmap, middle: Point) -> None:
@@ -234,11 +236,11 @@ class _Window:
             self.source = _nearest_free(costmap.blocked, cell, _SQUEEZE, resolution)
 
     def index(self, cell: Cell) -> int:
-        """Return the number of a cell, as `search` counts them."""
+        """Return the index of a cell in the results of `search`."""
         return cell[0] * self._width + cell[1]
 
     def rejoin(self, rest: Sequence[Point]) -> int | None:
-        """Return the index of the last point of a way that is inside; None if that is not free."""
+        """Return the index of the last point of a way inside; None if that point is not free."""
         found = None
         for i, point in enumerate(rest):
             cell = self.costmap.map.cell(*point)
@@ -248,7 +250,7 @@ class _Window:
         return found
 
     def search(self, root: Cell) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """Return for each cell the cost to get to `root`, and the next cell on the way there."""
+        """Return for each cell the cost to reach `root`, and the next cell on the way."""
         graph = _graph(self.costmap.blocked, self.costmap.cost)
         cost, tree = dijkstra(graph, indices=self.index(root), return_predecessors=True)
         return cost, tree
@@ -269,7 +271,10 @@ class _Window:
 
 
 def _straighten(costmap: Costmap, cells: list[Cell]) -> list[Cell]:
-    """Replace bends by straight lines wherever those cost no more."""
+    """Replace bends by straight lines where those cost no more.
+
+    Doubling, then bisection, finds the farthest cell: testing all cells would be quadratic.
+    """
     rows, columns = np.array(cells, dtype=np.intp).T
     steps = np.hypot(np.diff(rows), np.diff(columns))
     along = costmap.cost[rows, columns]
@@ -285,7 +290,7 @@ def _straighten(costmap: Costmap, cells: list[Cell]) -> list[Cell]:
         while jump * 2 <= last - here and may_cut(here, here + jump * 2):
             jump *= 2
         low, high = here + jump, min(here + jump * 2, last)
-        while low < high:  # the farthest cell that can be reached straight
+        while low < high:
             middle = (low + high + 1) // 2
             if may_cut(here, middle):
                 low = middle
@@ -297,7 +302,7 @@ def _straighten(costmap: Costmap, cells: list[Cell]) -> list[Cell]:
 
 
 def _smooth(costmap: Costmap, corners: list[Point]) -> list[Point]:
-    """Cut the corners (Chaikin) as far as that stays free, then space the points evenly."""
+    """Cut the corners (Chaikin) as long as the way stays free, then space the points evenly."""
     points = corners
     for _ in range(_ROUNDS):
         rounder = _cut_corners(points)

@@ -1,4 +1,4 @@
-"""How far one can see: rays over the map, and against round and straight things."""
+"""Casts rays over the map and against round and straight things."""
 
 from __future__ import annotations
 
@@ -20,33 +20,35 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-_SHORTEST: Final = 0.5  # cells: a ray makes no shorter steps
+_SHORTEST: Final = 0.5  # [cells] the shortest step of a ray, so that it always advances
 _TINY: Final = 1e-12
 
 
 class Raycaster:
-    """Casts rays over one map; what is unknown on it hides nothing.
+    """Casts rays over one map; unknown cells hide nothing.
 
-    Threads: any number may cast at the same time.
+    Threads: any number of threads may cast at the same time.
     """
 
     def __init__(self, grid: OccupancyMap) -> None:
         self._grid = grid
         solid = np.pad(grid.cells >= SOLID_FROM, 1, constant_values=True)  # the edge ends a ray
-        # A ray may go this many cells from anywhere in a cell without meeting a solid one.
+        # Sphere tracing: from anywhere in a cell, a ray may advance by this many cells without
+        # meeting a solid one. The diagonal of a cell is subtracted, as distances are between
+        # centres.
         distances = distance_transform_edt(~solid) - math.sqrt(2.0)
         self._step = np.where(solid, -1.0, np.maximum(distances, _SHORTEST)).astype(np.float32)
 
     def cast(self, x: float, y: float, bearings: Floats, reach: float) -> Floats:
-        """Return for each bearing [rad, map frame] the distance [m] to the first wall.
+        """Return the distance to the first wall for each bearing [m; rad, map frame].
 
-        Infinite where there is none within `reach` [m]. The map's edge counts as a wall.
+        Infinite if there is none within `reach` [m]. The map's edge counts as a wall.
         """
         grid = self._grid
         origin = grid.origin
         c, s = math.cos(origin.yaw), math.sin(origin.yaw)
         dx, dy = x - origin.x, y - origin.y
-        # In cells, of the padded map.
+        # In cells. The table is padded by one cell, hence the + 1 below.
         column, row = (c * dx + s * dy) / grid.resolution, (c * dy - s * dx) / grid.resolution
         far = reach / grid.resolution
         result = np.full(bearings.shape, np.inf)
@@ -66,7 +68,7 @@ class Raycaster:
         return result
 
     def sees(self, x: float, y: float, points: Floats) -> NDArray[np.bool_]:
-        """Tell which points (n, 2) no wall hides."""
+        """Return which points (n, 2) are not hidden by a wall."""
         dx, dy = points[:, 0] - x, points[:, 1] - y
         distances = np.hypot(dx, dy)
         if not distances.size:
@@ -77,9 +79,9 @@ class Raycaster:
 
 
 def cast_at(things: Iterable[Thing], x: float, y: float, bearings: Floats) -> Floats:
-    """Return for each bearing [rad] the distance [m] to the first of `things`, else infinity.
+    """Return the distance to the first of `things` for each bearing [m; rad], else infinity.
 
-    A ray that begins inside one meets it at once, at distance 0.
+    It is 0 for a ray that starts inside a thing.
     """
     ux, uy = np.cos(bearings), np.sin(bearings)
     nearest = np.full(bearings.shape, np.inf)
@@ -118,7 +120,7 @@ def _sides(bar: Bar) -> tuple[tuple[float, float, float, float], ...]:
 
 
 def _meet_disc(dx: float, dy: float, radius: float, ux: Floats, uy: Floats) -> Floats:
-    """Return where rays from the origin meet a disc around (dx, dy)."""
+    """Return the distances at which rays from the origin meet a disc around (dx, dy)."""
     square = dx * dx + dy * dy - radius * radius
     if square <= 0.0:
         return np.zeros(ux.shape)
@@ -131,7 +133,7 @@ def _meet_disc(dx: float, dy: float, radius: float, ux: Floats, uy: Floats) -> F
 def _meet_line(
     line: tuple[float, float, float, float], x: float, y: float, ux: Floats, uy: Floats
 ) -> Floats:
-    """Return where rays from (x, y) meet a line between two points."""
+    """Return the distances at which rays from (x, y) meet a line between two points."""
     ax, ay = line[0] - x, line[1] - y
     bx, by = line[2] - line[0], line[3] - line[1]
     cross = ux * by - uy * bx

@@ -1,4 +1,4 @@
-"""The simulated robot as a child process that never outlives its parent."""
+"""Runs the simulated robot as a child process that never outlives its parent."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RobotProcess", "end_with_stdin"]
 
-_BAD_INPUT: Final = 2  # its exit code when something it was given does not fit
+_BAD_INPUT: Final = 2  # its exit code for bad input
 
 
 class RobotProcess(ChildProcess):
@@ -21,7 +21,8 @@ class RobotProcess(ChildProcess):
     Args:
         arguments: Further arguments for it (`--map`, `--config`, `--pose`, ...).
         on_change: Called when the robot is ready, and when the process has ended.
-        module: What to run. It prints a line when it is ready, and ends with its standard input.
+        module: The module to run. It prints a line when it is ready, and ends with its standard
+            input.
 
     Threads: `on_change` is called from threads of the clock.
     """
@@ -37,10 +38,10 @@ class RobotProcess(ChildProcess):
         self._on_refusal: Callable[[], object] = lambda: None
 
     def check(self) -> None:
-        """Raise when it ended by itself.
+        """Raise if it has ended by itself.
 
         Raises:
-            MissionError: with what it said.
+            MissionError: with the text that it printed.
         """
         if self.exit_code:
             raise MissionError(
@@ -49,14 +50,14 @@ class RobotProcess(ChildProcess):
             )
 
     def on_refusal(self, callback: Callable[[], object]) -> None:
-        """Call `callback`, in a thread of the clock, when it ends because it may not be there."""
+        """Call `callback`, in a thread of the clock, if it ends as `refused` says."""
         self._on_refusal = callback
 
     def refused(self) -> bool:
-        """Tell whether it ended by itself because it may not be there: `check` says why."""
+        """Return whether it ended because of bad input or its name; `check` says why."""
         return self.exit_code == _BAD_INPUT
 
     def on_end(self) -> None:
-        """Tell of a refusal."""
+        """Report a refusal."""
         if self.refused():
             self._on_refusal()

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 class Scanner:
-    """Measures how far it is to walls, obstacles, doors, and to all that moves.
+    """Measures the distances to walls, obstacles, doors and moving things.
 
     Args:
-        robot: It stands in the middle of this one.
+        robot: The robot; the scanner is at its centre.
 
     Attributes:
         first: Angle of the first ray [rad], in the robot's frame.
@@ -36,11 +36,11 @@ class Scanner:
         self._angles: NDArray[np.float64] = self.first + self.step * np.arange(
             config.rays, dtype=np.float64
         )
-        # The same robot measures the same noise in every run.
+        # Seeded with the name: a robot measures the same noise in every run.
         self._random = np.random.default_rng(zlib.crc32(robot.name.encode()))
 
     def scan(self) -> NDArray[np.float64]:
-        """Return the range [m] of each ray; infinite where it meets nothing within its reach."""
+        """Return the range of each ray [m]; infinite if it meets nothing within its reach."""
         robot, config = self._robot, self._config
         world, body, reach = robot.world, robot.body, config.range_max
         x, y = body.x, body.y

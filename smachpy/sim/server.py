@@ -1,4 +1,4 @@
-"""The robot on the network: actions `move_base` and `charge`, topics, a service."""
+"""Offers the robot on the network: actions `move_base` and `charge`, topics, a service."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from smachpy.sim.interfaces import ChargeAction, ChargeFeedback, ChargeResult
 from smachpy.sim.navigation import STOP
 from smachpy.sim.pilot import Pilot
 from smachpy.sim.scanner import Scanner
-from smachpy.sim.stepper import Stepper
+from smachpy.sim.stepper import JUST_PAST, Stepper
 from smachpy.sim.world import AT_DOCK
 
 if TYPE_CHECKING:
@@ -49,24 +49,23 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 MAP_FRAME: Final = "map"
-ODOM_FRAME: Final = "odom"  # the same place as the map frame: the odometry does not drift
+ODOM_FRAME: Final = "odom"  # coincides with the map frame: the odometry does not drift
 BASE_FRAME: Final = "base_link"
-_UNHEARD: Final = 10  # battery periods between two messages that nobody hears
+_UNHEARD: Final = 10  # battery periods between two messages without subscribers
 _CHARGE_PERIOD: Final = 0.5  # [s] between two feedback messages of `charge`
-_JUST_PAST: Final = 1e-3  # [s] waited longer, as a rounding error would never pass
-_SHORTEST_ROTATION: Final = 1e-3  # a quaternion shorter than this is no rotation
+_SHORTEST_ROTATION: Final = 1e-3  # a shorter quaternion is not a rotation
 
 
 class RobotServer:
     """Serves one robot.
 
-    A stepper's thread moves the robot; the goal's own thread only waits for the end. A robot that
-    stands costs a battery message now and then, and none while nobody listens.
+    A stepper's thread moves the robot; the goal's thread only waits for the end. A robot that
+    stands still publishes only its battery, and rarely if there are no subscribers.
 
     Args:
         robot: The robot; nothing else may steer it.
-        node: Where it is on the network; None takes the node in force.
-        stepper: Lets time pass for it and for others; None makes one for this robot alone.
+        node: Its node; None uses the current one.
+        stepper: Steps this robot and others; None makes one for this robot alone.
 
     Threads: `start` and `close` may be called from any thread.
     """
@@ -93,7 +92,7 @@ class RobotServer:
         self._battery = Publisher("battery", BatteryState, latch=True, node=self._node)
         self._scan = Publisher("scan", LaserScan, node=self._node)
         self._plan = Publisher("plan", Path, latch=True, node=self._node)
-        self._way: tuple[tuple[float, float], ...] = ()  # the plan that was told
+        self._way: tuple[tuple[float, float], ...] = ()  # the plan that was published last
         self._move = SimpleActionServer(
             "move_base", MoveBaseAction, self._drive, auto_start=False, node=self._node
         )
@@ -109,7 +108,7 @@ class RobotServer:
         return self._robot
 
     def start(self) -> None:
-        """Show the robot on the network and take goals.
+        """Offer the robot on the network and accept goals.
 
         Raises:
             ServerConflictError: another server has one of the names.
@@ -130,10 +129,10 @@ class RobotServer:
         self._stepper.add(self)
 
     def wait(self) -> None:
-        """Wait until `close` was called.
+        """Wait until `close` is called.
 
         Raises:
-            ServerConflictError: an older robot of this name was found after all.
+            ServerConflictError: an older robot of the same name was found later.
 
         Blocks: until then.
         """
@@ -141,13 +140,13 @@ class RobotServer:
 
     @property
     def conflict(self) -> ServerConflictError | None:
-        """Why it left its names by itself: an older robot of this name was found; else None."""
+        """Why it gave up its names to an older robot; None if it has not."""
         return self._move.action_server.error or self._charge.action_server.error
 
     def close(self) -> None:
-        """Stop taking goals; a running one is aborted. A second call does nothing.
+        """Stop accepting goals; a running one is aborted. A second call does nothing.
 
-        Blocks: until the robot's threads have seen it, two seconds at most.
+        Blocks: until the robot's threads have ended, two seconds at most.
         """
         self._closing.set()
         self._wake.set()
@@ -160,10 +159,10 @@ class RobotServer:
         for part in self._parts:
             part.unregister() if isinstance(part, (Publisher, Subscriber)) else part.close()
 
-    # -- steps: the stepper's thread -----------------------------------------------------------
+    # -- steps: in the stepper's thread --------------------------------------------------------
 
     def is_busy(self, now: float) -> bool:
-        """Tell whether the robot moves, is to move, or looks about for somebody."""
+        """Return whether the robot moves, is to move, or has subscribers to its scans."""
         return self._pilot.is_busy(now) or self._scan.get_num_connections() > 0
 
     def step(self, now: float, dt: float) -> None:
@@ -173,27 +172,29 @@ class RobotServer:
             self._pilot.step(now, dt)
 
     def report(self, now: float) -> None:
-        """Send feedback, odometry and battery where they are due; tell what has ended."""
+        """Publish everything that is due, and report orders that have ended."""
         moved, self._moved = self._moved, False
-        due = moved and now - self._fed_back > self._feedback_period - _JUST_PAST
+        due = moved and now - self._fed_back > self._feedback_period - JUST_PAST
         if due:
             self._fed_back = now
             self._publish_feedback()
-        # Who comes later gets the last one, so it is never old, even when nobody listens.
+        # Latched: later subscribers get the last message, so it must have the final pose even if
+        # nobody has subscribed so far.
         if due or (moved and (self._robot.body.standing or self._odom.get_num_connections())):
             self._publish_odometry()
         self._report_scan(now)
         self._report_plan()
         self._report_battery(now)
         with self._stepper.lock:
+            # Called without the lock below: a callback may give the next order, which needs it.
             ended = self._pilot.take_ends()
         for tell in ended:
             tell()
 
     def _report_scan(self, now: float) -> None:
-        """Publish a scan when it is due and somebody listens."""
+        """Publish a scan if it is due and has subscribers."""
         config = self._robot.config.scan
-        if now - self._scanned < 1.0 / config.rate - _JUST_PAST:
+        if now - self._scanned < 1.0 / config.rate - JUST_PAST:
             return
         if not self._scan.get_num_connections():
             return
@@ -214,7 +215,7 @@ class RobotServer:
         )
 
     def _report_plan(self) -> None:
-        """Publish the way that it follows when there is another one; none once it has ended."""
+        """Publish the robot's way if it has changed; an empty one at its end."""
         with self._stepper.lock:
             follower = self._robot.follower
             way = tuple(follower.points) if follower is not None else ()
@@ -263,7 +264,7 @@ class RobotServer:
             self._move.set_succeeded(text="arrived")
 
     def _give_way(self) -> None:
-        """End the goal that was asked to stop."""
+        """End a goal that was cancelled or replaced, or whose robot is closing."""
         if self._closing.is_set():
             self._move.set_aborted(text="the robot is shutting down")
         else:
@@ -273,8 +274,8 @@ class RobotServer:
         """Give the pilot an order and wait for its end.
 
         Returns:
-            What went wrong, "" for nothing; None when a newer goal waits, the goal is to stop while
-            it drives, or the robot closes.
+            The error, "" for none; None if a newer goal waits, the goal is cancelled while the
+            robot drives, or the robot is closed.
 
         Blocks: until then.
         """
@@ -343,7 +344,7 @@ class RobotServer:
                 return
             charge = battery.charge(self._clock.now())
             self._charge.publish_feedback(ChargeFeedback(charge=charge, seconds_left=left))
-            self._charge_wake.wait(min(left + _JUST_PAST, _CHARGE_PERIOD))
+            self._charge_wake.wait(min(left + JUST_PAST, _CHARGE_PERIOD))
             if not self._closing.is_set():
                 self._charge_wake.clear()
         self._charge.set_succeeded(self._charge_result(), text="charged")
@@ -372,10 +373,10 @@ class RobotServer:
     # -- battery -------------------------------------------------------------------------------
 
     def _report_battery(self, now: float) -> None:
-        """Publish the battery when it is due, seldom while nobody listens."""
+        """Publish the battery if it is due; rarely without subscribers."""
         period = self._robot.config.battery.period
         since = now - self._battery_told
-        if since < period - _JUST_PAST:
+        if since < period - JUST_PAST:
             return
         if self._battery.get_num_connections() or since > _UNHEARD * period:
             self._battery_told = now
@@ -412,7 +413,7 @@ class RobotServer:
 
 
 def map_publisher(floor: OccupancyMap, node: Node) -> Publisher:
-    """Show a floor on the topic `map`, for those who come later too; returns what ends that."""
+    """Publish a map on the latched topic `map`; return the publisher."""
     stamp = Time(0, node.clock.time_ns())
     publisher = Publisher("map", OccupancyGrid, latch=True, node=node)
     publisher.publish(
@@ -438,12 +439,12 @@ def read_pose(stamped: Any, robot: Robot, namespace: str) -> Pose2D:
     """Return a goal's pose in the map frame.
 
     Args:
-        stamped: A PoseStamped, of ROS 1 or 2.
-        robot: In whose frame it may be.
-        namespace: Of the robot's node; its frame may have it in front.
+        stamped: A PoseStamped of ROS 1 or 2.
+        robot: The robot; the pose may be in its frame.
+        namespace: The namespace of the robot's node; its frame may have it as a prefix.
 
     Raises:
-        NavigationError: the frame is unknown or the pose is none.
+        NavigationError: the frame is unknown, or the pose is invalid.
     """
     position, turn = stamped.pose.position, stamped.pose.orientation
     values = (position.x, position.y, turn.x, turn.y, turn.z, turn.w)

@@ -1,4 +1,4 @@
-"""A whole world on the network: robots in their namespaces, doors, moving obstacles."""
+"""Offers a world on the network: robots in their namespaces, doors, moving obstacles."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ class Simulation:
     """Serves a world: each robot in its namespace, the doors under `doors/NAME`.
 
     Args:
-        world: The world; its robots must be on it already.
-        node: Where it is on the network; the robots get nodes on the same session.
-        on_ros2: The robots are Nav2's, each in its namespace on the network of ROS 2 that the
-            node's configuration says; the doors stay where they are. Each robot joins the networks
-            by itself then, if the node has done so.
+        world: The world with its robots.
+        node: Its node; the robots get nodes on the same session.
+        on_ros2: The robots are Nav2 robots, each in its namespace on the ROS 2 network of the
+            node's configuration; the doors stay on this network. If the node has opened its own
+            transport, each robot opens one, too.
 
     Raises:
         MissionError: the robots' control rates differ.
 
-    Threads: one steps all robots; `start` and `close` may be called from any thread.
+    Threads: one thread steps all robots; `start` and `close` may be called from any thread.
 
     Attributes:
         world: The world.
         servers: The robots' servers by name.
-        stepper: Lets time pass; hold its lock to change the world while it runs.
+        stepper: Steps the world; hold its lock to change the world while it runs.
     """
 
     def __init__(self, world: World, *, node: Node | None = None, on_ros2: bool = False) -> None:
@@ -67,7 +67,7 @@ class Simulation:
 
     @property
     def node(self) -> Node:
-        """Where it is on the network."""
+        """Its node."""
         return self._node
 
     @property
@@ -76,7 +76,7 @@ class Simulation:
         return {robot.name: robot for robot in self.world.robots}
 
     def start(self) -> None:
-        """Show everything on the network.
+        """Offer everything on the network.
 
         Raises:
             ServerConflictError: another robot has one of the names.
@@ -115,12 +115,12 @@ class Simulation:
         server.start()
 
     def remove(self, name: str) -> None:
-        """Take a robot off the network and off the floor, as if it had been carried away.
+        """Remove a robot from the network and the floor, as if it had been carried away.
 
         Raises:
             KeyError: there is no robot of that name.
 
-        Blocks: two seconds at most.
+        Blocks: for two seconds at most.
         """
         robot = self.robots[name]
         self.servers.pop(name).close()
@@ -128,10 +128,10 @@ class Simulation:
             self.world.leave(robot)
 
     def wait(self) -> None:
-        """Wait until it was closed.
+        """Wait until it is closed.
 
         Raises:
-            ServerConflictError: an older robot of one of the names was found after all.
+            ServerConflictError: an older robot of the same name was found later.
 
         Blocks: until then.
         """
@@ -140,16 +140,16 @@ class Simulation:
             raise self._conflict
 
     def check_names(self) -> None:
-        """End the wait when a robot had to leave its name to an older one."""
+        """End `wait` if a robot had to give up its name to an older one."""
         for server in tuple(self.servers.values()):
             if server.conflict is not None and self._conflict is None:
                 self._conflict = server.conflict
                 self._closing.set()
 
     def close(self) -> None:
-        """Take everything off the network; running goals are aborted. A second call does nothing.
+        """Leave the network; running goals are aborted. A second call does nothing.
 
-        Blocks: until the threads have seen it, a few seconds at most.
+        Blocks: until the threads have ended, a few seconds at most.
         """
         if self._closed:
             return
@@ -164,7 +164,7 @@ class Simulation:
 
 
 class _Surroundings:
-    """What is on the floor besides the robots, as the stepper and the network see it."""
+    """Everything on the floor except the robots, for the stepper and the network."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -210,7 +210,7 @@ class _DoorServer:
         self.report()
 
     def report(self) -> None:
-        """Publish whether it is open, when that has changed."""
+        """Publish whether it is open, if that has changed."""
         is_open = self._door.is_open
         if is_open is not self._told:
             self._told = is_open
@@ -240,17 +240,17 @@ def simulation(
     robots: int = 1,
     node: Node | None = None,
 ) -> Iterator[Simulation]:
-    """Run a world inside this process for the length of a `with` block.
+    """Run a world in this process for the duration of a `with` block.
 
     Args:
-        world: A world, what it begins with, or the file that says it; None takes the office with
-            `robots` robots, robot_0 at its dock.
-        robots: How many, where `world` says nothing.
-        node: Where it is on the network; None takes the node in force.
+        world: A world, its specification, or a world file; None takes the office with `robots`
+            robots, robot_0 at its dock.
+        robots: Number of robots, if `world` is None.
+        node: Its node; None uses the current one.
 
     Raises:
-        InputFileError: a file is wrong.
-        NavigationError: a robot cannot stand where it begins.
+        InputFileError: a file has problems.
+        NavigationError: a robot cannot stand at its start pose.
         ServerConflictError: another robot has one of the names.
 
     Blocks: at the end of the block, until the threads have ended.
@@ -268,7 +268,7 @@ def office(robots: int = 1) -> WorldSpec:
     """Return the office with some robots: robot_0 at the dock, the others around it.
 
     Raises:
-        NavigationError: there is no room for so many.
+        NavigationError: there is not enough space.
     """
     grid = load_map(OFFICE_MAP)
     return WorldSpec("office", grid, place_robots(grid, load_config(OFFICE_ROBOT), robots))

@@ -1,4 +1,4 @@
-"""Lets time pass for simulated robots: one thread steps all of them."""
+"""Steps simulated robots through time: one thread steps all of them."""
 
 from __future__ import annotations
 
@@ -8,37 +8,39 @@ from typing import TYPE_CHECKING, Final, Protocol
 if TYPE_CHECKING:
     from actionlib_core.clock import Clock, Task
 
-_LATE: Final = 0.5  # [s] a loop this late gives the lost time up instead of hurrying after it
-_REPORTS: Final = 10.0  # [Hz] while something is busy; an order waits so long at most
-_IDLE_PERIOD: Final = 0.5  # [s] between two reports when nothing is busy
-_STOPS_IN: Final = 1.0  # [s] `close` waits so long for the thread
+JUST_PAST: Final = 1e-3  # [s] tolerance of due times: a rounding error must not skip one
+_LATE: Final = 0.5  # [s] a loop that is later than this drops the lost time instead of catching up
+_REPORTS: Final = 10.0  # [Hz] while anything is busy; also the longest delay of an order
+_IDLE_PERIOD: Final = 0.5  # [s] between two reports if nothing is busy
+_STOPS_IN: Final = 1.0  # [s] `close` waits for the thread at most this long
 
 
 class Stepped(Protocol):
     """Something that changes with time."""
 
     def is_busy(self, now: float) -> bool:
-        """Tell whether steps would change anything; called with the stepper's lock."""
+        """Return whether steps would change anything; called with the stepper's lock."""
 
     def step(self, now: float, dt: float) -> None:
-        """Go on from `now` [s] by `dt` seconds; called with the stepper's lock."""
+        """Advance from `now` [s] by `dt` seconds; called with the stepper's lock."""
 
     def report(self, now: float) -> None:
-        """Tell others what they should know by `now` [s]; called without any lock."""
+        """Publish what is due at `now` [s]; called without a lock."""
 
 
 class Stepper:
-    """Steps what was added, in the order it was added, while any of it is busy.
+    """Steps the added things, in the order in which they were added, while any of them is busy.
 
-    A few steps are made at once and time then catches up with them, so that the thread wakes for
-    reports, not for steps. When nothing is busy it wakes twice a second, for reports only.
+    It makes a batch of steps at once and then waits until time has caught up, so the thread wakes
+    up for reports and not for every step. If nothing is busy it wakes up twice a second, for
+    reports.
 
     Args:
-        clock: Whose time it is.
-        rate: Steps a second [Hz].
+        clock: The clock.
+        rate: Steps per second [Hz].
 
-    Threads: every method may be called from any thread. `lock` keeps steps and orders apart; the
-        clock is never waited for while it is held.
+    Threads: every method may be called from any thread. `lock` separates steps from orders; it is
+        never held while waiting for the clock.
 
     Attributes:
         lock: Held during the steps.
@@ -56,7 +58,7 @@ class Stepper:
         self._closing = False
 
     def add(self, thing: Stepped) -> None:
-        """Step `thing` from now on; the first one starts the thread."""
+        """Step `thing` from now on; the first call starts the thread."""
         with self.lock:
             self._things = (*self._things, thing)
             if self._task is None:
@@ -64,12 +66,12 @@ class Stepper:
         self._wake.set()
 
     def remove(self, thing: Stepped) -> None:
-        """Step `thing` no more; nothing happens when it was not there."""
+        """Stop stepping `thing`, if it was added."""
         with self.lock:
             self._things = tuple(other for other in self._things if other is not thing)
 
     def wake(self) -> None:
-        """Something has become busy."""
+        """Note that something has become busy."""
         self._wake.set()
 
     def close(self) -> None:
@@ -84,7 +86,7 @@ class Stepper:
 
     def _run(self) -> None:
         clock = self._clock
-        reached = clock.now()  # the steps have come so far
+        reached = clock.now()  # the time up to which steps have been made
         while not self._closing:
             if clock.now() - reached > _LATE:
                 reached = clock.now()
@@ -99,12 +101,12 @@ class Stepper:
                 thing.report(reached)
 
     def _catch_up(self, until: float) -> None:
-        """Wait until the clock shows `until`, less when it is to end."""
+        """Wait until the clock shows `until`, or until the end."""
         while not self._closing and (wait := until - self._clock.now()) > 0.0:
             self._clock.sleep(wait)
 
     def _step(self, now: float) -> bool:
-        """Make one batch of steps; tells whether anything took part."""
+        """Make one batch of steps; return whether anything was busy."""
         with self.lock:
             busy = [thing for thing in self._things if thing.is_busy(now)]
             for i in range(self._batch if busy else 0):

@@ -1,4 +1,4 @@
-"""A picture of a drive: the floor, the way that was driven, the goals."""
+"""Draws a picture of a drive: the floor, the driven way, the goals."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
 Colour = tuple[int, int, int]
 
 WIDTH: Final = 1600  # [pixels] of the finished picture, the longer side
-_SMOOTH: Final = 2  # drawn this many times larger, then scaled down
+_SMOOTH: Final = 2  # drawn larger by this factor, then scaled down: Pillow's lines are jagged
 _FLOOR: Final[Colour] = (250, 249, 246)
 _WALL: Final[Colour] = (52, 58, 70)
 _OUTSIDE: Final[Colour] = (226, 228, 232)
-_START: Final[Colour] = (38, 103, 191)  # the colour of the way where it begins
+_START: Final[Colour] = (38, 103, 191)  # colour of the way at its start
 _END: Final[Colour] = (214, 72, 42)
 _REACHED: Final[Colour] = (46, 125, 50)
 _MISSED: Final[Colour] = (176, 60, 60)
 _INK: Final[Colour] = (40, 44, 52)
 _PAPER: Final[Colour] = (255, 255, 255)
 _LEGEND_PX: Final = 56
-# Of several robots, in this order, then again; distinct also to most colour-blind eyes.
+# For several robots, in this order, repeated; distinct for most colour-blind readers as well.
 _ROBOTS: Final[tuple[Colour, ...]] = (
     (31, 119, 180),
     (230, 97, 1),
@@ -46,17 +46,17 @@ _ROBOTS: Final[tuple[Colour, ...]] = (
     (160, 150, 20),
     (0, 160, 175),
 )
-_AT_DOCK: Final = 0.5  # [m] goals nearer to the charger than this need no mark of their own
+_AT_DOCK: Final = 0.5  # [m] goals closer to the charger than this get no mark
 
 
 @dataclass(frozen=True, slots=True)
 class GoalMark:
-    """A goal as the picture shows it.
+    """A goal in the picture.
 
     Attributes:
-        pose: Where it is, in the map frame.
+        pose: Its pose in the map frame.
         label: A few words.
-        reached: Whether the robot got there.
+        reached: Whether the robot reached it.
     """
 
     pose: Pose2D
@@ -79,9 +79,9 @@ def draw_track(
     Args:
         path: The file to write; its folder must exist.
         grid: The floor.
-        track: The places driven over, (x, y) [m] in the map frame, in order.
-        goals: The goals, in order; goals at one place are drawn as one, as the last one went.
-        dock: Where the charger stands.
+        track: The positions of the robot, (x, y) [m] in the map frame, in order.
+        goals: The goals, in order; goals at one place are drawn as one, with the last one's result.
+        dock: Position of the charger.
         robot_radius: [m], for the robot at the end of its way.
         title: A line below the picture.
 
@@ -109,14 +109,14 @@ def draw_tracks(
     robot_radius: float = 0.25,
     title: str = "",
 ) -> None:
-    """Write a picture of the ways of several robots, each in a colour of its own.
+    """Draw the ways of several robots, each in its own colour.
 
     Args:
         path: The file to write; its folder must exist.
         grid: The floor.
-        tracks: By the robot's name: the places driven over, (x, y) [m] in the map frame, in order.
-        lost: The robots that were lost where their track ends; they get a cross.
-        docks: Where the chargers stand.
+        tracks: By the robot's name: its positions, (x, y) [m] in the map frame, in order.
+        lost: Robots that were lost at the end of their track; they get a cross.
+        docks: Positions of the chargers.
         robot_radius: [m], for the robots at the ends of their ways.
         title: A line below the picture.
 
@@ -138,7 +138,7 @@ def draw_tracks(
 
 
 class _Canvas:
-    """The picture while it is drawn, `_SMOOTH` times too large."""
+    """The picture during drawing, larger by `_SMOOTH`."""
 
     def __init__(self, grid: OccupancyMap) -> None:
         self._grid = grid
@@ -149,7 +149,7 @@ class _Canvas:
         self._metre = self._scale / grid.resolution
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a point of the map frame lies in the picture."""
+        """Return the pixel of a point in the map frame."""
         origin = self._grid.origin
         dx, dy = x - origin.x, y - origin.y
         c, s = math.cos(origin.yaw), math.sin(origin.yaw)
@@ -157,7 +157,7 @@ class _Canvas:
         return u * self._metre, self._image.height - v * self._metre
 
     def track(self, track: Sequence[tuple[float, float]], colour: Colour | None = None) -> None:
-        """Draw the way, from the colour of its start to that of its end, or in one colour."""
+        """Draw the way, with colours from start to end, or in one colour."""
         points = [self.pixel(x, y) for x, y in track]
         width = max(2, round(0.09 * self._metre))
         for shade, extra in ((_PAPER, 2 * _SMOOTH), (colour, 0)):
@@ -180,7 +180,7 @@ class _Canvas:
             self._goal(goal, ",".join(numbers), font, bold)
 
     def robot(self, track: Sequence[tuple[float, float]], radius: float) -> None:
-        """Draw the robot where it ended: a disc, wide enough to be seen around a goal."""
+        """Draw the robot at its end: a disc, large enough to be seen around a goal."""
         x, y = track[-1]
         self._dot(self.pixel(x, y), (radius + 0.2) * self._metre, _END, outline=_PAPER)
 
@@ -215,7 +215,7 @@ class _Canvas:
         number: str,
         lost: bool,
     ) -> None:
-        """Draw one of several robots where it ended, with its number; a lost one with a cross."""
+        """Draw one of several robots at its end, with its number; a lost one with a cross."""
         x, y = self.pixel(*at)
         size = (radius + 0.15) * self._metre
         self._dot((x, y), size, colour, outline=_PAPER)
@@ -230,7 +230,7 @@ class _Canvas:
     def finish_several(
         self, title: str, legend: Sequence[tuple[str, Colour, float]]
     ) -> Image.Image:
-        """Scale down and add the lines below: name, colour and metres of each robot."""
+        """Scale down and add the legend: name, colour and metres of each robot."""
         columns = 5
         rows = -(-len(legend) // columns)
         picture, draw, middle = self._with_lines(title, rows)
@@ -243,7 +243,7 @@ class _Canvas:
         return picture
 
     def _with_lines(self, title: str, rows: int) -> tuple[Image.Image, ImageDraw.ImageDraw, int]:
-        """Scale down; return the picture, what draws on it and the middle of its first line."""
+        """Scale down; return the picture, its drawing context and the middle of its first line."""
         size = (self._image.width // _SMOOTH, self._image.height // _SMOOTH)
         height = size[1] + _LEGEND_PX + 28 * rows
         picture = Image.new("RGB", (size[0], height), _PAPER)
@@ -254,7 +254,7 @@ class _Canvas:
         return picture, draw, middle
 
     def finish(self, title: str, length: float) -> Image.Image:
-        """Scale down and add the line below."""
+        """Scale down and add the legend."""
         picture, draw, middle = self._with_lines(title, 0)
         size = picture.size
         left = size[0] - 480

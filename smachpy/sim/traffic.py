@@ -1,4 +1,4 @@
-"""What moves on the floor besides the robot itself: other robots and moving obstacles."""
+"""Moving things on the floor: other robots and moving obstacles."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from smachpy.sim.world import World
 
 _ACCELERATION: Final = 1.0  # [m/s^2] of moving obstacles
-_KEPT_AWAY: Final = 0.15  # [m] they stop so far before a robot
+_KEPT_AWAY: Final = 0.15  # [m] distance at which they stop in front of a robot
 
 
 class Disc(Protocol):
-    """Something round that moves.
+    """A round thing that moves.
 
     Attributes:
-        name: What to call it.
+        name: Its name.
         x: [m], map frame.
         y: [m], map frame.
         radius: [m].
@@ -34,12 +34,12 @@ class Mover:
     """A moving obstacle: it walks from place to place in straight lines, and waits for robots.
 
     Args:
-        world: The floor it walks on.
-        name: What to call it.
-        places: Where it walks, (x, y) [m]; the first is where it begins.
+        world: Its floor.
+        name: Its name.
+        places: Where it walks, (x, y) [m], beginning at the first place.
         radius: [m].
         speed: [m/s].
-        loop: From the last place straight to the first; else back the way it came.
+        loop: Walk from the last place to the first; otherwise back the same way.
     """
 
     def __init__(
@@ -72,6 +72,7 @@ class Mover:
         if left > 0.0:
             self._heading = math.atan2(y - self.y, x - self.x)
         room = self._room()
+        # v^2 = 2 a s: the speed from which it can stop within the free distance.
         wanted = min(self._top, math.sqrt(2.0 * _ACCELERATION * room))
         self._speed = min(self._speed + _ACCELERATION * dt, wanted)
         way = min(self._speed * dt, left)
@@ -81,7 +82,7 @@ class Mover:
             self._next = (self._next + 1) % len(self._places)
 
     def _room(self) -> float:
-        """Return how far [m] it can walk straight on before it meets a robot."""
+        """Return how far it can walk straight on before it meets a robot [m]."""
         ux, uy = math.cos(self._heading), math.sin(self._heading)
         far = self._top * self._top / (2.0 * _ACCELERATION) + _KEPT_AWAY
         room = far

@@ -1,4 +1,4 @@
-"""The floor as it really is, the robots on it, and what each of them knows of it."""
+"""The real floor, the robots on it, and what each robot knows about the floor."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from smachpy.sim.occupancy import OccupancyMap
     from smachpy.sim.traffic import Disc
 
-AT_DOCK: Final = 0.2  # [m] the charger reaches this far
-_KEPT_PLANNERS: Final = 8  # of the last sets of obstacles
-_REMEMBERED: Final = 2.0  # times its sight: what moves farther off is forgotten
-_TOLD: Final = 4.0  # [m] of its way that a robot tells others
-_ASKED: Final = 3.0  # [s] that a request for room counts
+AT_DOCK: Final = 0.2  # [m] reach of the charger
+_KEPT_PLANNERS: Final = 8  # sets of obstacles whose planner is kept; making one takes long
+_REMEMBERED: Final = 2.0  # times the robot's sight: farther moving things are forgotten
+_TOLD: Final = 4.0  # [m] of its way that a robot shares with others
+_ASKED: Final = 3.0  # [s] after which a request for space expires
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +42,8 @@ class Dock:
     """A place where any robot may charge, one at a time.
 
     Attributes:
-        name: One word; "" for a robot's own.
-        pose: Where the robot stands while it charges, in the map frame.
+        name: One word; "" for a robot's own dock.
+        pose: The robot's pose while it charges, in the map frame.
     """
 
     name: str
@@ -51,19 +51,19 @@ class Dock:
 
 
 class World:
-    """A map, what stands and moves on it, and the robots; robots alike share their planners.
+    """A map, the things on it, and the robots; robots of the same kind share their planners.
 
-    Threads: `add_obstacle` and `remove_obstacle` may be called while robots drive. The rest is
-    changed by one thread at a time: `Stepper.lock` keeps them apart.
+    Threads: `add_obstacle` and `remove_obstacle` may be called while robots drive. Everything else
+    is changed by one thread at a time, under `Stepper.lock`.
 
     Attributes:
-        map: What was known from the start.
-        obstacles: What stands there besides, closed doors included. Replaced as a whole, never
-            changed in place.
-        robots: In the order they came.
+        map: The map known from the start.
+        obstacles: Other things that stand there, including closed doors. The tuple is replaced,
+            never changed, so that readers need no lock.
+        robots: In the order in which they were added.
         movers: The moving obstacles.
         doors: By name.
-        docks: Where any robot may charge.
+        docks: Docks for any robot.
     """
 
     def __init__(self, grid: OccupancyMap) -> None:
@@ -78,7 +78,7 @@ class World:
         self._planners: OrderedDict[tuple[object, ...], Planner] = OrderedDict()
         self._rays: Raycaster | None = None
 
-    # -- what is there -------------------------------------------------------------------------
+    # -- contents ------------------------------------------------------------------------------
 
     def add_obstacle(self, x: float, y: float, radius: float) -> Obstacle:
         """Put a round obstacle on the floor."""
@@ -87,17 +87,17 @@ class World:
         return obstacle
 
     def remove_obstacle(self, obstacle: Obstacle) -> None:
-        """Take it away again; nothing happens when it is not there."""
+        """Remove an obstacle, if it is there."""
         self.remove_thing(obstacle)
 
     def add_thing(self, thing: Thing) -> None:
-        """Put anything on the floor; nothing happens when it is there."""
+        """Put a thing on the floor, unless it is there."""
         with self._lock:
             if thing not in self.obstacles:
                 self.obstacles = (*self.obstacles, thing)
 
     def remove_thing(self, thing: Thing) -> None:
-        """Take it away again; nothing happens when it is not there."""
+        """Remove a thing, if it is there."""
         with self._lock:
             self.obstacles = tuple(o for o in self.obstacles if o != thing)
 
@@ -113,9 +113,9 @@ class World:
 
         Args:
             name: One word.
-            ends: Where its leaf is when closed.
+            ends: The position of its leaf when closed.
             travel: How long it takes to open or to close [s].
-            is_open: How it begins.
+            is_open: Its initial state.
         """
         door = self.doors[name] = Door(self, name, ends, travel=travel, is_open=is_open)
         return door
@@ -129,36 +129,36 @@ class World:
         speed: float = 0.8,
         loop: bool = False,
     ) -> Mover:
-        """Let a moving obstacle walk from place to place; see `Mover`."""
+        """Add a moving obstacle that walks from place to place; see `Mover`."""
         mover = Mover(self, name, places, radius=radius, speed=speed, loop=loop)
         self.movers = (*self.movers, mover)
         self.discs = (*self.discs, mover)
         return mover
 
     def add_dock(self, name: str, pose: Pose2D) -> Dock:
-        """Put a dock on the floor, where any robot may charge."""
+        """Add a dock at which any robot may charge."""
         dock = Dock(name, pose)
         self.docks = (*self.docks, dock)
         return dock
 
     def enter(self, robot: Robot) -> None:
-        """Take a robot in."""
+        """Add a robot."""
         self.robots = (*self.robots, robot)
         self.discs = (*self.discs, robot.body)
 
     def leave(self, robot: Robot) -> None:
-        """Take a robot off the floor; nothing happens when it was not there."""
+        """Remove a robot, if it is there."""
         self.robots = tuple(other for other in self.robots if other is not robot)
         self.discs = tuple(disc for disc in self.discs if disc is not robot.body)
 
     # -- time ----------------------------------------------------------------------------------
 
     def is_changing(self) -> bool:
-        """Tell whether anything but the robots moves."""
+        """Return whether anything except the robots moves."""
         return bool(self.movers) or any(door.is_moving for door in self.doors.values())
 
     def step(self, dt: float) -> None:
-        """Let `dt` seconds pass for everything but the robots."""
+        """Advance everything except the robots by `dt` seconds."""
         for mover in self.movers:
             mover.step(dt)
         for door in self.doors.values():
@@ -168,13 +168,13 @@ class World:
 
     @property
     def rays(self) -> Raycaster:
-        """Rays over the map, made when they are first asked for."""
+        """The map's ray caster, made at the first use."""
         if self._rays is None:
             self._rays = Raycaster(self.map)
         return self._rays
 
     def who_is_at(self, thing: Thing) -> str:
-        """Return the name of somebody who touches a thing; "" for nobody."""
+        """Return the name of a robot or moving obstacle that touches a thing; "" for none."""
         for disc in self.discs:
             if thing.gap(disc.x, disc.y) <= disc.radius:
                 return disc.name
@@ -190,7 +190,7 @@ class World:
     def planner(
         self, body_radius: float, config: PlannerConfig, obstacles: tuple[Thing, ...]
     ) -> Planner:
-        """Return the planner for a body among these obstacles; robots alike share it."""
+        """Return the planner for a body among these obstacles; robots of one kind share it."""
         key = (body_radius, config, frozenset(obstacles))
         with self._lock:
             planner = self._planners.get(key)
@@ -205,22 +205,22 @@ class World:
 
 
 class Robot:
-    """One robot: body, battery, and what it knows of the floor.
+    """One robot: its body, its battery, and what it knows about the floor.
 
     Threads: one thread steers it at a time; pose and battery may be read from any thread.
 
     Attributes:
-        world: The floor it is on.
-        name: What it is called.
-        body: Where it is and how it moves.
-        battery: How full it is.
-        planner: Finds ways among what stands still, as far as the robot knows.
-        traffic: What moves, where the robot saw it last.
+        world: Its floor.
+        name: Its name.
+        body: Its pose and motion.
+        battery: Its battery.
+        planner: Finds ways among the standing things that it knows.
+        traffic: The moving things, where it saw them last.
         bumped: Whether its last step was stopped by something solid.
         odometer: Distance driven [m].
-        follower: Follows its way; None when it has none.
-        held_by: Who stands in its way, as far as it has looked.
-        rank: Its right of way, the lowest goes first: who set out first.
+        follower: Follows its way; None if it has none.
+        held_by: What stands in its way, as far as it has looked.
+        rank: Its right of way: the lowest rank goes first, which is who set out first.
         now: Time of its last step [s].
     """
 
@@ -270,11 +270,14 @@ class Robot:
         body.advance(dt)
         self.bumped = False
         if (body.x != x or body.y != y) and self._hits(x, y, body.x, body.y):
+            # The whole step is taken back: a body that stays where it hit would overlap the
+            # obstacle.
             body.x, body.y, body.yaw, body.speed = x, y, yaw, 0.0
             self.bumped = True
         speed = abs(body.speed)
         self.odometer += speed * dt
         share = speed / self.config.robot.max_speed
+        # Only when the power changes: the battery computes its charge from the last change.
         if share != self._share:
             self._share = share
             self.battery.drive(now, share)
@@ -282,7 +285,7 @@ class Robot:
     def room(self, command: tuple[float, float], beside: float) -> float:
         """Return the free distance [m] ahead on the arc of a command (speed, turn rate).
 
-        Looked for no farther than it takes to brake, and `beside` [m] more.
+        It looks no farther than the braking distance and `beside` [m] more.
         """
         speed, turn_rate = command
         body = self.body
@@ -301,18 +304,19 @@ class Robot:
             done += abs(step)
         return done
 
-    # -- knowing -------------------------------------------------------------------------------
+    # -- knowledge -----------------------------------------------------------------------------
 
     def look(self) -> bool:
-        """Compare the floor in sight with what is known.
+        """Compare the visible floor with what is known.
 
         Returns:
-            Whether something that stands appeared or went; `planner` then knows it.
+            Whether a standing thing appeared or disappeared; `planner` takes account of it then.
         """
         self._watch_traffic()
         real, known = self.world.obstacles, self._known
         if real == known:
             return False
+        # A known thing stays known until its place is seen without it.
         seen = tuple(o for o in real if o in known or self._sees(o))
         seen += tuple(o for o in known if o not in real and not self._sees(o))
         if seen == known:
@@ -322,46 +326,46 @@ class Robot:
         return True
 
     def forget(self) -> None:
-        """Forget what stood or moved there and is out of sight: it may have gone."""
+        """Forget all things that are out of sight: they may be gone."""
         self._known = tuple(o for o in self._known if self._sees(o))
         self.planner = self._planner(self._known)
         self.traffic.clear()
         self.look()
 
     def nearest_dock(self) -> Dock | None:
-        """Return the dock nearest to it, its own or one for all; None when there is none."""
+        """Return the nearest dock, its own or a common one; None if there is none."""
         docks = list(self.world.docks)
         if self.config.dock is not None:
             docks.append(Dock("", self.config.dock))
         return min(docks, key=lambda dock: self.body.pose.distance(dock.pose), default=None)
 
     def ahead(self) -> Sequence[tuple[float, float]]:
-        """Return the next metres of the way that it follows; empty when there is none."""
+        """Return the next metres of its way; empty if it has none."""
         return self.follower.rest(_TOLD) if self.follower is not None else ()
 
     # -- right of way --------------------------------------------------------------------------
 
     def set_out(self) -> None:
-        """A drive begins now."""
+        """Note the start of a drive."""
         self.rank = (self.now, self.world.robots.index(self))
         self._asked_by = None
 
     def asked_by(self) -> Robot | None:
-        """Return the robot that has lately asked this one for room."""
+        """Return the robot that has recently asked this one for space, if any."""
         other = self._asked_by
         if other is None or self.now > self._asked_until or other.follower is None:
             return None
         return other
 
     def ask_for_room(self) -> None:
-        """Ask the robot that stands in the way to make room, if this one set out before it."""
+        """Ask the robot in the way to make space, if this one set out before it."""
         seen = self.held_by
         for other in self.world.robots:
             if seen is not None and other.name == seen.name and self.rank < other.rank:
                 other.hear(self)
 
     def hear(self, other: Robot) -> None:
-        """Be asked for room by another robot."""
+        """Note a request for space by another robot."""
         self._asked_by, self._asked_until = other, self.now + _ASKED
 
     def check_place(self, x: float, y: float) -> None:
@@ -374,7 +378,7 @@ class Robot:
 
     @property
     def known_obstacles(self) -> tuple[Thing, ...]:
-        """What it has seen that stands there and is not on the map."""
+        """The standing things that it has seen and that are not on the map."""
         return self._known
 
     def closed_doors(self) -> str:
@@ -385,17 +389,19 @@ class Robot:
         return self.world.planner(self.config.robot.radius, self.config.planner, obstacles)
 
     def _others(self) -> list[Disc]:
-        """Return whatever else moves on the floor."""
+        """Return all other moving things on the floor."""
         return [disc for disc in self.world.discs if disc is not self.body]
 
     def _sees(self, thing: Thing) -> bool:
         return thing.gap(self.body.x, self.body.y) <= self.config.robot.sight
 
     def _watch_traffic(self) -> None:
-        """Note where those are that move, as far as they are in sight."""
+        """Note the positions of the visible moving things."""
         traffic, sight = self.traffic, self.config.robot.sight
         x, y = self.body.x, self.body.y
         close = [d for d in self._others() if math.hypot(d.x - x, d.y - y) - d.radius <= sight]
+        # Things remembered at a place that is now visible are dropped there: if they still are
+        # there, they are seen again below.
         remembered = []
         for disc, seen in list(traffic.items()):
             distance = math.hypot(seen.x - x, seen.y - y)
@@ -403,6 +409,7 @@ class Robot:
                 del traffic[disc]
             elif distance <= sight:
                 remembered.append((disc, seen))
+        # One call for all: the rays are cast together as arrays.
         visible = self._which_are_visible([*close, *(seen for _, seen in remembered)])
         for (disc, _), clear in zip(remembered, visible[len(close) :], strict=True):
             if clear:
@@ -412,7 +419,7 @@ class Robot:
                 traffic[disc] = Sighting(disc.x, disc.y, disc.radius, disc.name)
 
     def _which_are_visible(self, places: Sequence[Disc | Sighting]) -> Sequence[bool]:
-        """Tell which places no wall hides."""
+        """Return which places are not hidden by a wall."""
         if not places:
             return ()
         points = np.array([(place.x, place.y) for place in places])
@@ -422,7 +429,7 @@ class Robot:
     # -- touching ------------------------------------------------------------------------------
 
     def _hits(self, x: float, y: float, new_x: float, new_y: float) -> bool:
-        """Tell whether the body would run into something; out of something it may always go."""
+        """Return whether the body would run into something; it may always move out of something."""
         if self._touches(new_x, new_y) and not self._touches(x, y):
             self.held_by = None
             return True
@@ -430,13 +437,14 @@ class Robot:
         for disc in self._others():
             dx, dy, reach = disc.x - new_x, disc.y - new_y, disc.radius + radius
             square = dx * dx + dy * dy
+            # Only a collision if it gets closer: two that overlap must be able to part.
             if square < reach * reach and square < (disc.x - x) ** 2 + (disc.y - y) ** 2:
                 self.held_by = Sighting(disc.x, disc.y, disc.radius, disc.name)
                 return True
         return False
 
     def _touches(self, x: float, y: float) -> bool:
-        """Tell whether a body at (x, y) would overlap something that stands there."""
+        """Return whether a body at (x, y) would overlap a standing thing."""
         if self.planner.costmap.touches(x, y):
             return True
         radius = self.body.radius

@@ -1,4 +1,4 @@
-"""World files: a map, robots, moving obstacles, doors and docks, in one YAML file."""
+"""Reads world files: a map, robots, moving obstacles, doors and docks, in one YAML file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _RADIUS: Final = Limits(above=0, high=5)
 _SECONDS: Final = Limits(low=0, high=600)
 _CHARGE: Final = Limits(low=0, high=1)
 _SHORTEST_DOOR: Final = 0.1  # [m]
-_APART: Final = 0.5  # [m] between the bodies of robots that are placed by number
+_APART: Final = 0.5  # [m] between the bodies of robots that are placed automatically
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +37,8 @@ class RobotSpec:
     """A robot of a world.
 
     Attributes:
-        name: Its namespace: one word.
-        pose: Where it begins, in the map frame.
+        name: Its namespace, one word.
+        pose: Its start pose, in the map frame.
         config: Its parameters.
     """
 
@@ -70,12 +70,12 @@ class DoorSpec:
 
 @dataclass(frozen=True, slots=True)
 class WorldSpec:
-    """All that a world begins with.
+    """The initial state of a world.
 
     Attributes:
-        name: What to call it in messages: the file's name.
+        name: Its name in messages: the file's name.
         grid: The map.
-        robots: In the order of their right to be first.
+        robots: In the order of their right of way.
         movers: Moving obstacles.
         doors: Doors.
         docks: Docks for any robot.
@@ -89,10 +89,10 @@ class WorldSpec:
     docks: tuple[Dock, ...] = ()
 
     def build(self, now: float) -> World:
-        """Make the world as it begins at time `now` [s].
+        """Make the world at time `now` [s].
 
         Raises:
-            NavigationError: a robot or a moving obstacle cannot stand where it begins.
+            NavigationError: a robot or moving obstacle cannot stand at its start.
         """
         world = World(self.grid)
         for robot in self.robots:
@@ -116,10 +116,10 @@ class WorldSpec:
 
 
 def load_world(path: Path) -> WorldSpec:
-    """Read a world file; the files it names are beside it.
+    """Read a world file; paths in it are relative to its folder.
 
     Raises:
-        InputFileError: with the file, line and field of every problem.
+        InputFileError: a file has problems; each is listed with its line and field.
     """
     document = Document(path)
     top = document.top
@@ -146,12 +146,12 @@ def load_world(path: Path) -> WorldSpec:
 def place_robots(
     grid: OccupancyMap, config: SimConfig, count: int, *, first: int = 0
 ) -> tuple[RobotSpec, ...]:
-    """Place robots robot_0, robot_1, ... on free places, beginning where `config` starts.
+    """Place robots robot_0, robot_1, ... at free places, starting where `config` says.
 
-    Each begins as near to that start as the others leave room.
+    Each is as close to that start as the others allow.
 
     Raises:
-        NavigationError: there is no room for so many.
+        NavigationError: there is not enough space.
     """
     floor = Floor(grid, config.robot.radius, config.planner)
     step = 2.0 * config.robot.radius + _APART
@@ -178,7 +178,7 @@ def _is_standing_room(floor: Floor, pose: Pose2D) -> bool:
 
 
 def _spiral(middle: Pose2D, step: float, reach: float) -> Iterator[Pose2D]:
-    """Yield the places of a square grid around `middle`, ring by ring."""
+    """Yield the places of a square grid around `middle`, ring by ring from the inside."""
     for ring in range(1, math.ceil(reach / step) + 1):
         for i in range(-ring, ring + 1):
             for j in range(-ring, ring + 1):
@@ -187,13 +187,13 @@ def _spiral(middle: Pose2D, step: float, reach: float) -> Iterator[Pose2D]:
 
 
 class _Names:
-    """Finds names that are given twice, or are none."""
+    """Finds invalid names, and names that are used twice."""
 
     def __init__(self) -> None:
         self._lines: dict[tuple[str, str], int] = {}
 
     def read(self, section: Section, kind: str, default: str) -> str:
-        """Return the name of a section, one word."""
+        """Return the name in a section."""
         name = section.text("name", default)
         try:
             check_base_name(name, f"{kind} name")
@@ -237,7 +237,7 @@ def _robot(
 
 
 def _standing(row: Section, config: SimConfig, grid: OccupancyMap) -> Pose2D:
-    """Read a pose where the robot can stand; the section is not closed."""
+    """Read a pose at which the robot can stand; the section stays open."""
     x = row.number("x", REQUIRED, unit="m")
     y = row.number("y", REQUIRED, unit="m")
     yaw = row.number("yaw", 0.0, unit="rad")

@@ -1,12 +1,12 @@
-"""Testing missions: virtual time, scripted servers, stand-ins, all runs, coverage.
+"""Tests missions: virtual time, scripted servers, doubles, exploration, coverage.
 
-Under pytest the fixtures `mission`, `action_server`, `service_server` and `topic` are there without
-an import (`smachpy.testing.plugin`). Elsewhere:
+Under pytest the fixtures `mission`, `action_server`, `service_server` and `topic` are available
+without an import (`smachpy.testing.plugin`). Elsewhere:
 
     with mission_kit() as mission:
         run = mission(machine)
 
-or `MissionTestCase` for unittest. The rest of this package is imported when it is used.
+or `MissionTestCase` for unittest. The modules of this package are imported when they are used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Testing missions with unittest."""
+"""Tests missions with unittest."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 class MissionTestCase(unittest.TestCase):
     """A test case with `self.mission`, a `MissionKit` for each test.
 
-    Under pytest its options hold: coverage, rate and seeds. With `--mission-seeds` each test runs
-    with one after the other, up to the first that fails; it is skipped if it skips with each.
+    Under pytest, its options apply: coverage, rate and seeds. With `--mission-seeds` each test runs
+    with one seed after another, until one fails; it is skipped if it skips with every seed.
 
     Attributes:
-        seed: Picks the interleaving of all tests of the class; None: as the session says.
+        seed: Seed for all tests of the class; None: as in the session.
         mission: Runs machines; has `action_server`, `service_server`, `topic`, `replace`,
             `preempt`, `interrupt` and `explore`.
     """
@@ -59,19 +59,19 @@ class MissionTestCase(unittest.TestCase):
 
 
 class _Part:
-    """A test's result as it is with one of its seeds; the rest is that of the test.
+    """Collects a test's result with one of its seeds, and passes on what counts for the test.
 
-    Only the last seed tells of what is no failure: pytest takes what comes first for the whole
-    test, and a skip would hide the failure with a later seed.
+    Only the last seed may report something else than a failure: pytest takes the first report for
+    the whole test, and a skip would hide a failure with a later seed.
 
     Args:
-        result: That of the test.
-        is_last: No seed comes after this one.
-        all_skip: The test skipped with all seeds before.
+        result: The result of the test.
+        is_last: Whether this is the last seed.
+        all_skip: Whether the test skipped with all previous seeds.
 
     Attributes:
-        failed: The test failed.
-        skipped: It, or a part of it, skipped.
+        failed: Whether the test failed.
+        skipped: Whether it, or a subtest, skipped.
     """
 
     def __init__(self, result: unittest.TestResult, *, is_last: bool, all_skip: bool) -> None:
@@ -116,6 +116,6 @@ class _Part:
 
 
 def _is_skip(kind: type[BaseException]) -> bool:
-    """Tell whether it is pytest's own skip, which is an error to unittest."""
+    """Return whether this is pytest's own skip, which unittest reports as an error."""
     pytest = sys.modules.get("pytest")
     return pytest is not None and issubclass(kind, pytest.skip.Exception)

@@ -1,4 +1,4 @@
-"""`smachpy test`: pytest, with the mission fixtures and mission coverage."""
+"""`smachpy test`: runs pytest, with the mission fixtures and mission coverage."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Add the command."""
     parser = subparsers.add_parser(
         "test",
-        help="test missions: pytest by another name",
+        help="test missions with pytest",
         usage="%(prog)s [WORD ...]",
-        epilog="All words go to pytest: smachpy test tests -k patrol --mission-coverage. For the "
-        "options of missions see 'robot missions' in pytest --help.",
+        epilog="All words are passed to pytest: smachpy test tests -k patrol --mission-coverage. "
+        "The options for missions are listed under 'robot missions' in pytest --help.",
     )
     parser.set_defaults(run=run, all_words=())
 
@@ -33,6 +33,7 @@ def run_pytest(arguments: Sequence[str]) -> int:
     """
     import pytest
 
-    # `smachpy` is imported by now, so pytest cannot rewrite its asserts, and says so once a module.
+    # `smachpy` is already imported, so pytest cannot rewrite its asserts, and warns once per
+    # module.
     quiet = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
     return int(pytest.main(["-W", quiet, *arguments]))

@@ -1,4 +1,4 @@
-"""Mission coverage: which states, outcomes, edges, preempt points and timeouts the tests ran."""
+"""Mission coverage: the states, outcomes, edges, preempt points and timeouts that tests ran."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KINDS = ("states", "outcomes", "edges", "preempts", "timeouts")
 
 @dataclass(slots=True)
 class Measured:
-    """What was run of one machine.
+    """The coverage of one machine.
 
     Attributes:
         record: The machine.
@@ -43,11 +43,11 @@ class Measured:
         return _items(self.record, kind)
 
     def missed(self, kind: str) -> list[str]:
-        """Return what was not run."""
+        """Return the items of a kind that were not run."""
         return [item for item in self.items(kind) if item not in self.taken[kind]]
 
     def counts(self, kind: str) -> tuple[int, int]:
-        """Return how many items of a kind were run, of how many."""
+        """Return how many items of a kind were run, and how many there are."""
         items = self.items(kind)
         return sum(item in self.taken[kind] for item in items), len(items)
 
@@ -65,7 +65,7 @@ class Measured:
 
 
 class Coverage:
-    """What was run of all machines of a test session."""
+    """The coverage of all machines of a test session."""
 
     def __init__(self) -> None:
         self._machines: dict[str, Measured] = {}
@@ -76,8 +76,10 @@ class Coverage:
         return sorted(self._machines.values(), key=lambda machine: machine.name)
 
     def add(self, run: Run) -> None:
-        """Take a run in."""
-        record = run.whole or run.record  # a container counts as one whatever stands in for it
+        """Add a run."""
+        record = (
+            run.whole or run.record
+        )  # as without doubles: they do not make another machine of it
         measured = self._of(record)
         measured.runs += 1
         active: dict[str, None] = {}
@@ -96,13 +98,15 @@ class Coverage:
                 measured.count("states", event.path)
                 measured.count("outcomes", f"{event.path} -{event.outcome}->")
             elif isinstance(event, PreemptRequested):
+                # The request counts as well as the outcome: a leaf may end otherwise at that
+                # moment.
                 if event.path in leaves and event.path in active:
                     measured.count("preempts", event.path)
             elif isinstance(event, Preempted) and event.label:
                 measured.count("preempts", f"{event.path}/{event.label}")
 
     def merge(self, other: Coverage) -> None:
-        """Take over what another process measured."""
+        """Add the coverage of another process."""
         for found in other.machines:
             measured = self._of(found.record)
             measured.runs += found.runs
@@ -119,7 +123,7 @@ class Coverage:
     # -- reports -------------------------------------------------------------------------------
 
     def table(self) -> str:
-        """Return the figures for a terminal."""
+        """Return the figures as a table for a terminal."""
         if not self._machines:
             return "no mission ran"
         rows: list[tuple[str, ...]] = [("machine", "runs", *KINDS, "all")]
@@ -161,7 +165,7 @@ class Coverage:
         }
 
     def to_json(self) -> str:
-        """Return everything, to be merged elsewhere."""
+        """Return everything, for `from_json` in another process."""
         return json.dumps([[asdict(m.record), m.runs, m.taken] for m in self.machines])
 
     @classmethod
@@ -175,7 +179,7 @@ class Coverage:
 
 
 def _key(record: StateRecord) -> str:
-    """Return what tells machines apart: name and structure, whatever stands in for its states."""
+    """Return a key for a machine: its name and structure, independent of the doubles in it."""
     return hashlib.sha256(_bare(record).to_json().encode()).hexdigest()
 
 
@@ -205,6 +209,6 @@ def _items(record: StateRecord, kind: str) -> list[str]:
             for state in states
             for edge in state.transitions
         ]
-    if kind == "preempts":  # leaves that take time: those that can end 'preempted'
+    if kind == "preempts":  # a leaf without the outcome 'preempted' takes no time
         return [s.path for s in states if not s.is_container and "preempted" in s.outcomes]
     return [s.path for s in states if "timeout" in dict(s.details) or s.path in own]

@@ -1,4 +1,4 @@
-"""Mission coverage as a page: the figures, and each machine as a heat picture."""
+"""Writes mission coverage as a page: the figures, and each machine as a heat picture."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ td:first-child, th:first-child { text-align: left; } tr + tr { border-top: 1px s
 td div { height: 1em; background: #d7301f; } td div div { background: #31a354; }
 .cold { color: #b2182b; } svg { max-width: 100%; height: auto; }
 """
-_HOTTEST = 5  # visits that a picture tells apart; more look like this
+_HOTTEST = 5  # visits that the picture distinguishes; more look the same
 
 
 def write_page(coverage: Coverage, file: Path) -> None:
-    """Write the page; machines are drawn when a drawing package is installed."""
+    """Write the page, with pictures if a drawing package is installed."""
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8><title>Mission coverage</title>",
         f"<style>{_STYLE}</style><h1>Mission coverage</h1>",
@@ -52,7 +52,7 @@ def _bar(run: int, total: int) -> str:
 
 
 def _heat(machine: Measured) -> str:
-    """Return the machine as SVG, states and edges marked by how often they ran."""
+    """Return the machine as SVG, with states and edges marked by how often they ran."""
     with tempfile.TemporaryDirectory() as folder:
         drawn = draw_run(machine.record, _events(machine), Path(folder) / "heat.svg")
         if drawn is None:
@@ -62,7 +62,7 @@ def _heat(machine: Measured) -> str:
 
 
 def _events(machine: Measured) -> list[Event]:
-    """Return events that stand for what ran."""
+    """Return events from which a picture of the coverage can be drawn."""
     events: list[Event] = []
     for state in machine.record.walk():
         for outcome in state.outcomes:

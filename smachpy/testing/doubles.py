@@ -1,4 +1,4 @@
-"""Doubles of states, and putting them in their places."""
+"""Doubles of states, and their exchange in machines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from smachpy.introspection import StateRecord
 
-    # Name of a state, what makes its double, and the list that gets it.
+    # Name of a state, the function that makes its double, and the list that receives it.
     Replacement: TypeAlias = tuple[str, Callable[[Any], "Double"], list["Double"]]
 
 S = TypeVar("S", bound=State)
@@ -29,14 +29,14 @@ class DoubleError(SmachError):
 
 
 class Double(State):
-    """Stands for a state: the same outcomes, keys and options, and a script for what it does.
+    """Replaces a state: it has the same outcomes, keys and options, and follows a script.
 
     Args:
         state: The state.
-        outcomes: What it returns, run after run; the last one is repeated.
+        outcomes: Its outcomes, run after run; the last one is repeated.
         duration: How long each run takes [s]; a preempt ends it early.
         writes: Userdata that it writes.
-        execute: Does the work in place of the script; called with the userdata. It may be async.
+        execute: A function of the userdata instead of the script; it may be async.
 
     Attributes:
         runs: How often it ran.
@@ -55,7 +55,7 @@ class Double(State):
         super().__init__(
             known, state.get_registered_input_keys(), state.get_registered_output_keys()
         )
-        self._stands_for = state
+        self._replaced = state
         self._script = deque(outcomes)
         self._duration = duration
         self._writes = dict(writes or {})
@@ -64,6 +64,7 @@ class Double(State):
         self._smachpy.options = get_options(state)
         self._check(known)
         if inspect.iscoroutinefunction(execute):
+            # The machine asks whether `execute` is a coroutine function before it calls it.
             self.execute = self._execute_async  # type: ignore[method-assign, assignment]
 
     async def _execute_async(self, ud: Any) -> str:
@@ -74,7 +75,7 @@ class Double(State):
         return outcome
 
     def _check(self, known: tuple[str, ...]) -> None:
-        name = type(self._stands_for).__name__
+        name = type(self._replaced).__name__
         unknown = [outcome for outcome in self._script if outcome not in known]
         if unknown:
             raise DoubleError(
@@ -99,7 +100,7 @@ class Double(State):
             if inspect.iscoroutine(outcome):
                 outcome.close()
             raise DoubleError(
-                f"double of {type(self._stands_for).__name__}: execute: got {outcome!r} from "
+                f"double of {type(self._replaced).__name__}: execute: got {outcome!r} from "
                 f"{self._work!r}; expected an outcome. Try a function made with `async def`."
             )
         if (
@@ -115,7 +116,7 @@ class Double(State):
 
     @property
     def script(self) -> tuple[str, ...]:
-        """What it returns from here on; set it to begin again."""
+        """The remaining outcomes; set it to start again."""
         return tuple(self._script)
 
     @script.setter
@@ -123,18 +124,18 @@ class Double(State):
         self._script = deque(outcomes)
 
     def describe_details(self) -> Any:
-        """Return those of the state it stands for."""
-        return self._stands_for.describe_details()
+        """Return the details of the replaced state."""
+        return self._replaced.describe_details()
 
 
 class Places:
-    """Exchanges states of machines, and puts everything back."""
+    """Exchanges states of machines, and restores them."""
 
     def __init__(self) -> None:
         self._before: list[tuple[Container, str, State]] = []
 
     def put(self, root: Container, path: str, make: Callable[[Any], S]) -> S:
-        """Put what `make` gives for the state at `path` in its place.
+        """Replace the state at `path` by the result of `make`.
 
         Raises:
             UnknownStateError: there is no such state.
@@ -152,7 +153,7 @@ class Places:
         return self.exchange(container, labels[-1], make)
 
     def exchange(self, container: Container, label: str, make: Callable[[Any], S]) -> S:
-        """Put what `make` gives for a child in its place."""
+        """Replace a child by the result of `make`."""
         state = container[label]
         double = make(state)
         self._before.append((container, label, state))
@@ -160,11 +161,12 @@ class Places:
         return double
 
     def describe_whole(self, root: Container) -> StateRecord | None:
-        """Return what `root` is without the doubles; None when there are none."""
+        """Return the record of `root` without doubles; None if there are none."""
         if not self._before:
             return None
         doubles = [(container, label, container[label]) for container, label, _ in self._before]
         try:
+            # Backwards: a place that was exchanged twice gets its first state last.
             for container, label, state in reversed(self._before):
                 container._smachpy_exchange(label, state)
             return describe(root)

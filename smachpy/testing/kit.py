@@ -1,4 +1,4 @@
-"""A mission under test: virtual time, a network in memory, doubles, preempts at any moment."""
+"""Runs a mission under test: virtual time, a network in memory, doubles, preempts."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ if TYPE_CHECKING:
     from smachpy.testing.doubles import Replacement
     from smachpy.testing.exploring.exploration import Exploration
 
-LIMIT_S = 6 * 3600.0
-SETTLE_S = 0.1  # after a run, for what is still on its way to a server
+LIMIT_S = 6 * 3600.0  # [s] virtual time of a run, unless the test gives a limit
+SETTLE_S = 0.1  # [s] after a run, for messages that are still on their way to a server
 
 
 class TimeLimitError(SmachError):
-    """A mission under test ran longer than the limit, or without end while no time passed.
+    """A mission under test exceeded the time limit, or ran endlessly while no time passed.
 
     Args:
-        run: The run up to there.
+        run: The run so far.
         limit: Its limit [s].
-        steps: What it did while no time passed, in words; "" if its time was over.
-        call: Who takes other limits.
+        steps: What it did while no time passed, in words; "" if the time limit was exceeded.
+        call: The function that accepts another limit.
 
     Attributes:
         run: See above.
@@ -69,7 +69,7 @@ class TimeLimitError(SmachError):
 
 
 class UnfiredWarning(UserWarning):
-    """A preempt or interrupt that the test asked for never came: the run ended before."""
+    """A preempt or interrupt of the test never came: the run ended before its moment."""
 
 
 class MissionKit:
@@ -78,19 +78,19 @@ class MissionKit:
     Use it as a context manager; inside, its clock, node and shutdown are the current ones.
 
     Args:
-        seed: Picks the interleaving; None takes turns.
-        rate: Virtual seconds per real second, for watching; None: as fast as it goes.
+        seed: Picks the thread interleaving; None: threads take turns.
+        rate: Virtual seconds per real second, for watching; None: as fast as possible.
         choose: As for `VirtualClock`.
-        folder: Gives the folder for pictures of failed runs; called when one is drawn.
+        folder: Returns the folder for pictures of failed runs; called when one is drawn.
         on_run: Called with every run, for coverage.
 
     Attributes:
         clock: The clock.
-        network: The network; more sessions may join.
+        network: The network; other sessions may join.
         node: The mission's node.
-        shutdown: The end of the program, requested by `interrupt`.
-        draws: Whether runs that raise are drawn.
-        call: Who takes other limits, for the errors' texts.
+        shutdown: The program's shutdown, requested by `interrupt`.
+        draws: Whether to draw runs that raise.
+        call: The function that accepts another limit, for errors.
         on_run: See above.
     """
 
@@ -165,19 +165,19 @@ class MissionKit:
 
         Args:
             machine: Any container.
-            userdata: Values put into its userdata before.
-            limit: Longest run on the test's clock [s].
-            steps: Most steps while no time passes: transitions, and a fifth of it turns of waiting
-                threads.
+            userdata: Values written to its userdata before the run.
+            limit: The longest run on the test's clock [s].
+            steps: The most steps while no time passes: a transition counts as one, a turn of a
+                waiting thread as five.
 
         Raises:
-            TypeError: it is no container.
-            Deadlock: everything waits for something that can never come.
-            TimeLimitError: it did not end in time, or with so many steps.
-            SmachError: a state raised, or the machine does not hold together; as `execute`.
-            AssertionError: a scripted server got a goal that the script does not provide for, or a
-                function of the test beside the mission (`clock.spawn`, `custom_reply`) raised.
-                When something else is raised, this is among its notes.
+            TypeError: it is not a container.
+            Deadlock: everything waits for something that cannot happen.
+            TimeLimitError: it did not end in time, or took too many steps.
+            SmachError: a state raised, or the machine is inconsistent; as for `execute`.
+            AssertionError: a scripted server got a goal without a reply in its script, or a
+                function of the test (`clock.spawn`, `custom_reply`) raised. If the run raises
+                something else, this is added to it as a note.
 
         Warns:
             UnfiredWarning: a preempt or interrupt of the test never came.
@@ -224,7 +224,7 @@ class MissionKit:
         return run
 
     def _take_errors(self) -> tuple[list[str], list[BaseException]]:
-        """Return what went otherwise than the test says beside the mission, and forget it."""
+        """Return and clear the errors of the test's own functions and scripted servers."""
         failures, self.clock.failures = self.clock.failures, []
         errors = [f"{name}: {type(error).__name__}: {error}" for name, error in failures]
         causes = [error for _, error in failures]
@@ -235,12 +235,12 @@ class MissionKit:
         return errors, causes
 
     def _execute(self, machine: Container) -> tuple[str | None, BaseException | None]:
-        """Run the machine here, or beside a running event loop, which cannot be entered twice."""
+        """Run the machine here, or in a thread if this one runs an event loop already."""
 
         def execute() -> tuple[str | None, BaseException | None]:
             try:
                 return machine.execute(), None
-            except (Exception, Stuck) as error:  # noqa: BLE001  raised again, with what the run did
+            except (Exception, Stuck) as error:  # noqa: BLE001  raised again, with the run as a note
                 return None, error
 
         if self._process is not None:
@@ -261,9 +261,9 @@ class MissionKit:
 
     @contextlib.contextmanager
     def process(self) -> Iterator[Process]:
-        """Let the run in this block be that of a process of its own, which can be killed.
+        """Run the mission within this block in a simulated process, which can be killed.
 
-        The run raises `Killed` then; servers and topics of the test go on.
+        A killed run raises `Killed`; the test's servers and topics continue.
         """
         process = self._process = Process(self.clock, self.network)
         process.node.on_client = self.node.on_client
@@ -284,20 +284,20 @@ class MissionKit:
         writes: Mapping[str, Any] | None = None,
         execute: Callable[[Any], str | Awaitable[str]] | None = None,
     ) -> list[Double]:
-        """Put a double in the place of a state, from the next run to the end of the test.
+        """Replace a state by a double, from the next run to the end of the test.
 
         Args:
-            path: Path of the state, or the end of it that only it has.
-            outcomes: What it returns, run after run; the last one is repeated.
+            path: Path of the state, or an unambiguous end of it.
+            outcomes: Its outcomes, run after run; the last one is repeated.
             duration: How long each run takes [s]; a preempt ends it early with 'preempted'.
             writes: Userdata that it writes.
-            execute: A function of the userdata in place of all this; it may be async.
+            execute: A function of the userdata instead of all this; it may be async.
 
         Returns:
             A list that holds the double once the run has begun.
 
         Raises:
-            UnknownStateError, DoubleError: it does not fit the machine; from the run.
+            UnknownStateError, DoubleError: it does not fit the machine; raised by the run.
         """
         made: list[Double] = []
         script = tuple(outcomes)
@@ -321,10 +321,10 @@ class MissionKit:
         """Preempt the next run.
 
         Args:
-            at: So long [s] after its start.
-            on: While this state (path, or the end of one) runs: as soon as it waits.
-            after: With `on`: so long [s] after the state began.
-            visit: With `on`: at which of its visits, from 1.
+            at: This long after its start [s].
+            on: While this state (a path, or the end of one) runs: as soon as it waits.
+            after: With `on`: this long after the state began [s].
+            visit: With `on`: at this visit of the state, from 1.
 
         Raises:
             ValueError: neither or both of `at` and `on`.
@@ -339,9 +339,9 @@ class MissionKit:
         after: float = 0.0,
         visit: int = 1,
     ) -> None:
-        """End the program during the next run, as Ctrl-C does: shutdown, and the preempt with it.
+        """End the program during the next run, as Ctrl-C does: a shutdown, which preempts the run.
 
-        Arguments and errors as `preempt`; with neither `at` nor `on` it comes at once.
+        Arguments and errors as for `preempt`; without `at` and `on` it comes at once.
         """
         self._add_trigger("interrupt", 0.0 if at is None and on is None else at, on, after, visit)
 
@@ -359,31 +359,31 @@ class MissionKit:
 
         self._triggers.append(Trigger(what, act, at, on, after, visit))
 
-    # -- the world around ----------------------------------------------------------------------
+    # -- servers and topics --------------------------------------------------------------------
 
     def action_server(self, name: str, action_class: Any) -> ScriptedActionServer:
-        """Offer an action that does what the test says."""
+        """Offer an action with scripted replies."""
         return ScriptedActionServer(self, name, action_class)
 
     def service_server(self, name: str, service_class: Any) -> ScriptedService:
-        """Offer a service that does what the test says."""
+        """Offer a service with scripted replies."""
         return ScriptedService(self, name, service_class)
 
     def topic(self, name: str, message_class: Any) -> ScriptedTopic:
-        """Write to a topic, and keep what comes on it."""
+        """Publish on a topic, and record its messages."""
         return ScriptedTopic(self, name, message_class)
 
     def add_end(self, end: ScriptedEnd) -> None:
-        """Take a scripted server or topic into the test, whose end closes it."""
+        """Add a scripted server or topic to the test, which closes it at its end."""
         self._servers.append(end)
 
     # -- all runs ------------------------------------------------------------------------------
 
     def explore(self, machine: Any, **options: Any) -> Exploration:
-        """Run a mission over everything that can happen; see `exploration.explore`.
+        """Run a mission with all combinations of choices; see `exploration.explore`.
 
-        States that `replace` names have its doubles in every run, and what stays as it is meets
-        servers and topics with the scripts that those of the test have now.
+        States given to `replace` have their doubles in every run, and kept states meet the test's
+        servers and topics with their current scripts.
 
         Raises:
             TypeError: it is neither a container nor a function.
@@ -401,7 +401,7 @@ class MissionKit:
         return replay(machine, choices, **self._own_options("replay"), **options)
 
     def _own_options(self, what: str) -> dict[str, Any]:
-        """Return what explored runs take over from the test: no preempts, each chooses its own."""
+        """Return the test's doubles and servers for explored runs, which choose their preempts."""
         if self._triggers:
             got = ", ".join(map(str, self._triggers))
             raise ValueError(
@@ -412,15 +412,15 @@ class MissionKit:
 
 
 def check_machine(given: object, call: str, *, functions: bool = False) -> None:
-    """Check that a test runs a machine.
+    """Check that an argument is a machine.
 
     Args:
-        given: What it runs.
+        given: The argument.
         call: The call's name.
-        functions: Whether a function that makes one is fine, too.
+        functions: Whether a function that makes one is allowed, too.
 
     Raises:
-        TypeError: it is something else.
+        TypeError: it is not.
     """
     if isinstance(given, Container):
         return
@@ -443,7 +443,10 @@ def check_machine(given: object, call: str, *, functions: bool = False) -> None:
 def _reraise(
     kit: MissionKit, error: BaseException, run: Run, limit: float, steps: int, errors: list[str]
 ) -> NoReturn:
-    """Raise what ended a run, a deadlock as itself, with the run and `errors` as notes."""
+    """Raise the error that ended a run, with the run and `errors` as notes.
+
+    A deadlock or time limit deep in the causes is raised itself: states wrap it as user errors.
+    """
     cause: BaseException | None = error
     while cause is not None and not isinstance(cause, Deadlock | TimeLimit | Stuck):
         cause = cause.__cause__
@@ -463,7 +466,7 @@ def _reraise(
 
 
 def _untimed(cause: TimeLimit | Stuck, steps: int) -> str:
-    """Return what a run did while no time passed; "" if its time was over."""
+    """Return what a run did while no time passed; "" if the time limit was exceeded."""
     if isinstance(cause, Stuck):
         return f"it took {steps} steps"
     return f"its threads took {cause.turns} turns ({TURN_STEPS} steps each)" if cause.turns else ""
@@ -486,12 +489,12 @@ def mission_kit(
 
     `with mission_kit() as mission: run = mission(machine)`
 
-    Under pytest its options hold: coverage, and the seed and the rate that are not given here.
+    Under pytest, its options apply: coverage, and seed and rate unless given here.
 
     Args:
-        seed: Picks the interleaving.
+        seed: Picks the thread interleaving.
         rate: Virtual seconds per real second.
-        folder: For pictures of failed runs.
+        folder: Folder for pictures of failed runs.
     """
     around = session.current()
     with MissionKit(

@@ -1,6 +1,7 @@
-"""The pytest plugin: fixtures for missions, and mission coverage. No conftest needed.
+"""The pytest plugin: fixtures for missions, and mission coverage. It needs no conftest.
 
-Importing it imports neither the network nor the drawing; the fixtures do, when a test asks.
+It imports neither the network nor the drawing: pytest loads plugins in every session, also where
+no mission is tested. The fixtures import them when a test uses one.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ WORKER_KEY = "smachpy_mission_coverage"
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("missions", "robot missions")
-    group.addoption("--mission-seed", type=int, help="interleaving of the missions under test")
+    group.addoption("--mission-seed", type=int, help="seed of the missions' thread interleaving")
     group.addoption(
         "--mission-seeds",
         type=int,
         metavar="COUNT",
-        help="run every test that uses a mission with so many seeds (from 0, or --mission-seed)",
+        help="run each test of a mission with this many seeds (from 0, or --mission-seed)",
     )
     group.addoption(
         "--mission-rate", type=float, help="virtual seconds per real second, to watch missions"
@@ -40,10 +41,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--ros1",
         action="store_true",
-        help="tests and missions are scripts for ROS 1: rospy, smach and the others are there",
+        help="tests and missions are scripts for ROS 1: provide rospy, smach and so on",
     )
     group.addoption(
-        "--mission-coverage", action="store_true", help="measure what the tests run of the missions"
+        "--mission-coverage", action="store_true", help="measure what the tests cover of missions"
     )
     group.addoption(
         "--mission-coverage-fail-under",
@@ -58,13 +59,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Check the options; start measuring, if it is wanted.
+    """Check the options; start measuring if asked to.
 
     Raises:
-        pytest.UsageError: there are no seeds.
+        pytest.UsageError: the number of seeds is below 1.
     """
-    # pytest parses what a plugin's package imports, in whichever thread, to rewrite its asserts;
-    # threads that parse at once fail in Python 3.11 ("AST constructor recursion depth mismatch").
+    # pytest parses the modules of a plugin's package when they are imported, in any thread, to
+    # rewrite their asserts; parsing in two threads at once fails in Python 3.11 ("AST constructor
+    # recursion depth mismatch").
     rewritten: set[str] = getattr(config.pluginmanager.rewrite_hook, "_must_rewrite", set())
     rewritten.difference_update(OWN)
     count = config.getoption("mission_seeds")
@@ -111,7 +113,7 @@ class _Measuring:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
-        """Take over what a worker measured."""
+        """Add the coverage of a worker."""
         from smachpy.testing.coverage import Coverage
 
         found = getattr(node, "workeroutput", {}).get(WORKER_KEY)
@@ -120,7 +122,7 @@ class _Measuring:
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Hand the coverage on, or write it and judge it."""
+        """In a worker, pass the coverage on; else write it and compare it with the minimum."""
         output = getattr(self._config, "workeroutput", None)
         if output is not None:
             output[WORKER_KEY] = self.coverage.to_json()
@@ -163,14 +165,14 @@ class _Measuring:
 
 
 def _open(file: str) -> Path:
-    """Return a file's path, with its folder made."""
+    """Return a file's path, after creating its folder."""
     path = Path(file)
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Repeat the tests that use a mission with many seeds, if it is wanted."""
+    """Repeat the tests that use a mission with many seeds, if asked to."""
     count = metafunc.config.getoption("mission_seeds")
     if count is not None and "mission_seed" in metafunc.fixturenames:
         seeds = _seeds(metafunc.config)
@@ -204,17 +206,17 @@ def mission(
 
 @pytest.fixture
 def action_server(mission: MissionKit) -> Callable[[str, Any], ScriptedActionServer]:
-    """Offer an action that does what the test says: `action_server("dock", DockAction)`."""
+    """Offer an action with scripted replies: `action_server("dock", DockAction)`."""
     return mission.action_server
 
 
 @pytest.fixture
 def service_server(mission: MissionKit) -> Callable[[str, Any], ScriptedService]:
-    """Offer a service that does what the test says: `service_server("dock", Trigger)`."""
+    """Offer a service with scripted replies: `service_server("dock", Trigger)`."""
     return mission.service_server
 
 
 @pytest.fixture
 def topic(mission: MissionKit) -> Callable[[str, Any], ScriptedTopic]:
-    """Write to a topic and keep what comes on it: `topic("battery", BatteryState)`."""
+    """Publish on a topic and record its messages: `topic("battery", BatteryState)`."""
     return mission.topic

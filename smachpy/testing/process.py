@@ -1,4 +1,4 @@
-"""The process of a mission under test, which can be killed: its threads, timers and session."""
+"""A simulated process of a mission under test, which can be killed with its threads and timers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 class MissionNode(Node):
-    """The mission's node, which tells of the action clients that are made on it.
+    """The mission's node, which reports the action clients made on it.
 
     Attributes:
         on_client: Called with the full name and the type of an action, before its client joins.
@@ -39,12 +39,12 @@ class MissionNode(Node):
 class Killed(BaseException):
     """The process of a run was killed.
 
-    No `Exception`: what a mission or a test catches of those does not keep the run alive.
+    Not an `Exception`: code of a mission or test that catches those must not survive a kill.
     """
 
 
 class Process:
-    """The clock of one process of a mission, which knows its threads and timers.
+    """One process of a mission: a clock that knows the threads and timers it has started.
 
     Args:
         clock: The clock of the test.
@@ -65,7 +65,7 @@ class Process:
 
     @contextlib.contextmanager
     def current(self) -> Iterator[None]:
-        """Let what begins in this block belong to the process; its end ends the process."""
+        """Make this process the current one within the block; the block's end ends the process."""
         with use_clock(self), use_node(self.node):
             try:
                 yield
@@ -77,7 +77,7 @@ class Process:
         """Call `target` in a thread of the process.
 
         Raises:
-            Killed: the process was killed meanwhile; none of its threads runs any more.
+            Killed: the process was killed; all its threads have ended.
         """
         found: list[T] = []
         main = self.spawn(lambda: found.append(target()), name="mission")
@@ -89,9 +89,9 @@ class Process:
         return found[0]
 
     def kill(self) -> None:
-        """Do to the process what SIGKILL does: nobody hears of it, no time passes.
+        """Kill the process as SIGKILL does: without a farewell, in no time.
 
-        Its threads end where they wait, and what they do on their way out reaches nobody.
+        Its threads end where they wait; what their `finally` blocks do reaches nobody.
         """
         self.is_killed = True
         self._session.kill()
@@ -103,7 +103,7 @@ class Process:
 
     @property
     def numbers(self) -> Iterator[int]:
-        """Counts for ids, those of the test's clock: no two processes have the same."""
+        """Counter for ids; that of the test's clock, so that two processes never use the same."""
         return self._clock.numbers
 
     def now(self) -> float:
@@ -126,6 +126,7 @@ class Process:
         """As `Clock.spawn`."""
         task = self._clock.spawn(target, name=name)
         self._tasks.append(task)
+        # A thread on its way out may still start others: they must end as well.
         if self.is_killed:
             self._clock.stop([task])
         return task

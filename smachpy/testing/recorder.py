@@ -1,4 +1,4 @@
-"""One run of a machine under test: its events, its triggers, and an end when no time passes."""
+"""Records one run of a machine under test, fires triggers, and ends it if no time passes."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
     from smachpy.machines.container import Container
 
-STEPS = 100_000
-TURN_STEPS = 5  # a turn of the clock takes the computer that much longer than a transition
+STEPS = 100_000  # events at one moment of virtual time, after which a run counts as endless
+TURN_STEPS = 5  # a thread switch takes the computer about as long as five transitions
 
 
 class MissionClock(VirtualClock):
-    """A virtual clock that keeps what the threads it started were ended by.
+    """A virtual clock that records the exceptions of its threads.
 
     Attributes:
-        failures: Name of the thread, and what it raised.
+        failures: Name of the thread, and its exception.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class MissionClock(VirtualClock):
         self.failures: list[tuple[str, BaseException]] = []
 
     def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
-        """Start a thread, as a clock does."""
+        """As `Clock.spawn`."""
 
         def run() -> None:
             try:
@@ -60,7 +60,7 @@ class MissionClock(VirtualClock):
 class Stuck(BaseException):
     """A run has taken too many steps at one moment of virtual time.
 
-    No `Exception`: a mission that catches those ends all the same.
+    Not an `Exception`: a mission that catches those must end nevertheless.
     """
 
 
@@ -69,12 +69,12 @@ class Trigger:
     """Something to do during the next run.
 
     Attributes:
-        what: Its name, for the reader.
-        act: What.
+        what: Its name, for messages.
+        act: The function to call.
         at: When [s after the start], or None.
         on: When the state at this path begins, or None.
-        after: So long after that [s].
-        visit: At which visit of the state.
+        after: This long after that [s].
+        visit: At this visit of the state.
     """
 
     what: str
@@ -99,8 +99,8 @@ class Recorder:
         clock: The clock.
         machine: The machine.
         record: Its structure.
-        triggers: What is to happen.
-        steps: Most events at one moment.
+        triggers: The triggers.
+        steps: The most events at one moment.
 
     Attributes:
         events: All events, after the run.
@@ -130,12 +130,12 @@ class Recorder:
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
-        """Record the run in this block."""
+        """Record the run within this block."""
         waiting: dict[tuple[str, int], list[int]] = {}  # (path, visit) -> triggers
         for number, (trigger, path) in enumerate(zip(self._triggers, self._paths, strict=True)):
             if path is None:
                 self._start_timer(number, trigger.at or 0.0)
-            elif (path, trigger.visit) == (self._root, 1):  # it begins with the run
+            elif (path, trigger.visit) == (self._root, 1):  # the root has no Entered event
                 self._start_timer(number, trigger.after)
             else:
                 waiting.setdefault((path, trigger.visit), []).append(number)
@@ -145,7 +145,7 @@ class Recorder:
                 self._visits[event.path] += 1
                 for number in waiting.pop((event.path, self._visits[event.path]), ()):
                     self._start_timer(number, self._triggers[number].after)
-                if not waiting:  # a listener slows the machine down
+                if not waiting:  # no longer needed: a listener slows the machine down
                     self._unsubscribe()
 
         buffer = _StepBuffer(self._machine, self._clock, self._steps)
@@ -168,7 +168,7 @@ class Recorder:
         self._timers.append(self._clock.call_later(delay, fire))
 
     def unfired(self) -> tuple[str, ...]:
-        """Return, after the run, the triggers whose moment never came, and why."""
+        """Return, after the run, the triggers that never fired, and why."""
         ended = f"the run ended after {self._clock.now() - self.started:g} s"
         found = []
         for trigger, path, fired in zip(self._triggers, self._paths, self._fired, strict=True):
@@ -180,7 +180,7 @@ class Recorder:
 
 
 class _StepBuffer(RawEventBuffer):
-    """A buffer that raises in the machine's thread when too much happens at one moment."""
+    """An event buffer that raises in the machine's thread if too much happens at one moment."""
 
     def __init__(self, machine: Container, clock: Clock, most: int) -> None:
         self._time = clock
@@ -192,11 +192,11 @@ class _StepBuffer(RawEventBuffer):
     def take(self, event: Event) -> None:
         """Record an event."""
         super().take(event)
-        if type(event) is Entered:  # published by the machine's own thread
+        if type(event) is Entered:  # published by the machine's own thread, which is to be ended
             self._look()
 
     def room(self) -> tuple[Iterator[None], Callable[[tuple[Any, ...]], object]]:
-        """Return how often to append before asking again, and what to append with."""
+        """Return how often to append before asking again, and the function to append with."""
         self._look()
         return super().room()
 

@@ -1,4 +1,4 @@
-"""A run of a mission in a test: what happened, and assertions that say it when they fail."""
+"""A run of a mission in a test: its events, and assertions with readable failures."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Pattern: TypeAlias = str | EllipsisType
 
-MOST_LINES = 60  # of a run's explanation
+MOST_LINES = 60  # lines in a run's explanation
 
 
 class UnknownStateError(SmachError):
@@ -38,10 +38,10 @@ class UnknownStateError(SmachError):
 
 
 def find_path(record: StateRecord, name: str) -> str:
-    """Return the path of the state that `name` means: a path, or the end of one.
+    """Return the path of the state with this name, which is a path or the end of one.
 
     Raises:
-        UnknownStateError: no state, or more than one.
+        UnknownStateError: no state matches, or more than one.
     """
     paths = [state.path for state in record.walk()]
     if name in paths:
@@ -59,7 +59,7 @@ def find_path(record: StateRecord, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What one run of a machine did.
+    """One run of a machine.
 
     Attributes:
         record: The machine.
@@ -67,11 +67,11 @@ class Run:
         events: All events, in order.
         userdata: The machine's userdata after the run.
         duration: How long it took on the test's clock [s].
-        seed: The interleaving it had; None: in turn.
-        folder: Gives the folder for pictures.
+        seed: The seed of its interleaving; None: threads took turns.
+        folder: Returns the folder for pictures.
         unfired: The preempts and interrupts of the test that never came, and why.
-        whole: The machine as it is without the test's doubles; None: without any, as `record`.
-        served: Ids of the goals that the test's servers still work on, whoever sent them.
+        whole: The machine without the test's doubles; None if there are none.
+        served: Ids of the goals that the test's servers still work on, from any client.
     """
 
     record: StateRecord
@@ -89,7 +89,7 @@ class Run:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Paths of the states that were entered, containers too, in order."""
+        """Paths of the states that were entered, including containers, in order."""
         return tuple(event.path for event in self.events if isinstance(event, Entered))
 
     @property
@@ -100,10 +100,10 @@ class Run:
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Paths of the states that ran at the end: none, unless the run broke off in them."""
+        """Paths of the states that were active at the end; empty unless the run was aborted."""
         events = list(self.events)
         while self.outcome is None and events and isinstance(events[-1], Failed | Finished):
-            events.pop()  # what raised there ended all of them
+            events.pop()  # the exception passed through these states and ended them
         active: dict[str, None] = {}
         for event in events:
             if isinstance(event, Entered):
@@ -114,7 +114,7 @@ class Run:
 
     @property
     def goals_left(self) -> tuple[str, ...]:
-        """Ids of the goals that states sent and that have not ended, and of those in `served`."""
+        """Ids of the goals of states that have not ended, and of those in `served`."""
         sent = {event.goal_id: None for event in self.events if isinstance(event, GoalSent)}
         done = {event.goal_id for event in self.events if isinstance(event, GoalDone)}
         left = [goal_id for goal_id in sent if goal_id not in done]
@@ -134,14 +134,14 @@ class Run:
         return tuple(event.outcome for event in found if event.outcome is not None)
 
     def timed_out(self, state: str) -> bool:
-        """Tell whether a state ran into its timeout."""
+        """Return whether a state ran into its timeout."""
         return find_path(self.record, state) in self.timeouts()
 
     def timeouts(self) -> tuple[str, ...]:
         """Return the paths of the states that ran into their timeouts, in order.
 
-        That of a goal, call or wait is its state's own, which ends with the timeout's outcome when
-        it has lasted that long.
+        The timeout of a goal, call or wait is the state's own and has no event: it is recognised by
+        its duration and outcome.
         """
         own = own_timeouts(self.record)
         begun: dict[str, float] = {}
@@ -174,7 +174,7 @@ class Run:
         """Fail unless exactly these leaves ran, in this order.
 
         Args:
-            expected: Paths or ends of paths; `...` stands for any leaves, also none.
+            expected: Paths or ends of paths; `...` matches any number of leaves, including none.
         """
         names = [x if isinstance(x, EllipsisType) else find_path(self.record, x) for x in expected]
         if not _matches(self.path, names):
@@ -212,17 +212,17 @@ class Run:
             self._fail("userdata:\n" + "\n".join(lines))
 
     def assert_duration(self, *, at_most: float, at_least: float = 0.0) -> None:
-        """Fail unless the run took that long [s]."""
+        """Fail unless the run took between `at_least` and `at_most` [s]."""
         if not at_least <= self.duration <= at_most:
             self._fail(
                 f"duration: got {self.duration:g} s; expected {at_least:g} to {at_most:g} s."
             )
 
     def draw(self, file: Path | str | None = None) -> Path | None:
-        """Write the machine with this run; without `file` into the test's folder.
+        """Draw the machine with this run; by default into the test's folder.
 
         Returns:
-            The file, or None when nothing that draws is installed.
+            The file, or None if no drawing package is installed.
         """
         if file is None:
             folder = self.folder()
@@ -247,7 +247,7 @@ class Run:
 
 
 def _summary(events: Iterable[Event]) -> list[str]:
-    """Return one line per state that ended, and what else matters."""
+    """Return one line per state that ended, and for other important events."""
     lines: list[str] = []
     start: float | None = None
     for event in events:
@@ -272,7 +272,7 @@ _SHOWN = frozenset(
 
 
 def own_timeouts(record: StateRecord) -> dict[str, tuple[float, str]]:
-    """Return, for leaves with a limit of their own, the seconds and the outcome then."""
+    """Return, for leaves with their own timeout, its seconds and outcome."""
     found: dict[str, tuple[float, str]] = {}
     for state in record.walk():
         text = dict(state.details).get(_OWN_TIMEOUTS.get(state.kind, ""), "")
@@ -288,11 +288,12 @@ _OWN_TIMEOUTS = {
     "condition": "timeout",
     "action": "exec_timeout",
 }
-_ROUNDED = 1e-5  # the records round seconds to six digits
+_ROUNDED = 1e-5  # relative; records round seconds to six digits
 
 
 def _matches(path: Sequence[str], wanted: Sequence[Pattern]) -> bool:
-    """Tell whether a path is as wanted; `...` stands for any number of steps."""
+    """Return whether a path matches the patterns; `...` matches any number of steps."""
+    # The set of positions at which the patterns so far can end: no backtracking is needed.
     ends = {0}
     for pattern in wanted:
         if isinstance(pattern, EllipsisType):

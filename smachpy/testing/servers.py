@@ -1,4 +1,4 @@
-"""Scripted servers and topics: what a test says they do, faults included."""
+"""Scripted servers and topics, including faults."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 Status: TypeAlias = Literal["succeeded", "aborted", "preempted", "rejected"]
 STATUSES = ("succeeded", "aborted", "preempted", "rejected")
-TWICE = (0.0, 0.0)  # the delays of each copy of a message [s]
-MOST_ERRORS = 5  # of one server that a failure shows
+TWICE = (0.0, 0.0)  # delays of the copies of a message [s]: two copies, both at once
+MOST_ERRORS = 5  # errors of one server that a failure shows
 _UNASKED = (GoalStatus.PENDING, GoalStatus.ACTIVE)
 _WAITING = (GoalStatus.PENDING, GoalStatus.RECALLING)
 _UNENDED = (*_WAITING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
@@ -33,7 +33,7 @@ _UNENDED = (*_WAITING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
 @dataclass(slots=True)
 class Reply:
-    """What is done with one goal or request.
+    """The reply to one goal or request.
 
     Attributes:
         result: The result or response message.
@@ -41,15 +41,15 @@ class Reply:
         duration: From acceptance to the end [s].
         feedback: Sent evenly over the duration, the last one at its end.
         accept_after: From the goal's arrival to its acceptance [s]; None: never accepted.
-        ignore_cancel: Continue when asked to stop.
-        die_after: The server dies so long [s] after acceptance.
-        back_after: And comes back so long [s] after that.
-        lose_result: The result message is lost on the way.
+        ignore_cancel: Continue after a cancel.
+        die_after: The server dies this long after acceptance [s].
+        back_after: It comes back this long after that [s].
+        lose_result: The result message is lost.
         twice: Feedback and result arrive twice.
         text: The goal's status text.
         error: The service's handler raises with this text.
         silent: No response ever comes.
-        function: Does it all: called with the goal handle, or with the request.
+        function: Does everything itself; called with the goal handle, or with the request.
     """
 
     result: Any = None
@@ -69,7 +69,7 @@ class Reply:
 
 
 class Test(Protocol):
-    """What a scripted end needs of the test that it belongs to (`smachpy.testing.kit`)."""
+    """The part of the test (`smachpy.testing.kit`) that a scripted end needs."""
 
     @property
     def clock(self) -> VirtualClock:
@@ -86,10 +86,10 @@ class Test(Protocol):
 
 
 class ScriptedEnd:
-    """One scripted server or topic: a process of its own, as far as the mission can see.
+    """One scripted server or topic; to the mission it looks like a separate process.
 
-    A server takes the next of its replies, else the default, which is success at once until there
-    is a script. With replies and no default, one goal or request too many fails the run.
+    A server takes the next of its replies, else the default, which is immediate success as long as
+    there is no script. With replies and no default, a surplus goal or request fails the run.
 
     Args:
         kit: The test.
@@ -98,10 +98,10 @@ class ScriptedEnd:
 
     Attributes:
         name: See above.
-        replies: What it does with the next goals or requests.
-        default: What it does when there are none of them.
-        errors: What went otherwise than the script says; the run fails with it.
-        causes: What the test's own functions raised.
+        replies: The replies to the next goals or requests.
+        default: The reply if there are no more.
+        errors: Deviations from the script; they fail the run.
+        causes: Exceptions of the test's own functions.
     """
 
     def __init__(self, kit: Test, name: str, type_class: Any) -> None:
@@ -135,23 +135,23 @@ class ScriptedEnd:
         return faults.popleft() if faults else DELIVERED
 
     def _disturb(self, word: str, fault: tuple[float, ...], count: int = 1) -> None:
-        """Do this to the next messages on keys that end with `word`."""
+        """Apply a fault to the next messages on keys that end with `word`."""
         self._faults.setdefault(word, deque()).extend([fault] * count)
 
     def cut(self, seconds: float | None = None) -> None:
-        """Cut its link to the network, for `seconds` or until `restore`."""
+        """Cut its connection to the network, for `seconds` or until `restore`."""
         self._link.cut(seconds)
 
     def restore(self) -> None:
-        """Mend the link."""
+        """Restore the connection."""
         self._link.restore()
 
     def kill(self) -> None:
-        """Die as a process does that gets SIGKILL."""
+        """Die like a process that gets SIGKILL."""
         self._session.kill()
 
     def come_back(self) -> None:
-        """Start again after death, as a new process that knows nothing of what was before."""
+        """Start again after death, as a new process without any memory."""
         self._join()
 
     def close(self) -> None:
@@ -168,12 +168,12 @@ class ScriptedEnd:
         return made
 
     def situation(self) -> Hashable:
-        """Return what it still has to do, equal when all that can follow is equal."""
+        """Return its remaining work; equal if everything that can follow is equal."""
         return len(self.replies)
 
     @property
     def left(self) -> tuple[str, ...]:
-        """Ids of the goals that it works on and nobody has asked to stop."""
+        """Ids of the goals that it works on without a cancel."""
         return ()
 
     def _queue(self, reply: Reply) -> Reply:
@@ -187,7 +187,7 @@ class ScriptedEnd:
         return reply
 
     def _next_reply(self, what: str, count: int, calls: str) -> Reply | None:
-        """Return what is done with the `count`-th `what`; None, and an error, if nothing is."""
+        """Return the reply to goal or request `count`; None, and an error, if there is none."""
         reply = self.replies.popleft() if self.replies else self.default
         if reply is None:
             self.errors.append(
@@ -199,7 +199,7 @@ class ScriptedEnd:
     # -- what went wrong -----------------------------------------------------------------------
 
     def note_raised(self, function: object, error: BaseException) -> str:
-        """Note what a function of the test raised, and return it as a text."""
+        """Record an exception of a function of the test, and return it as text."""
         name = name_of(function)
         text = f"{self.name}: {name} of the test raised {type(error).__name__}: {error}"
         self.errors.append(text)
@@ -207,7 +207,7 @@ class ScriptedEnd:
         return text
 
     def take_errors(self) -> tuple[list[str], list[BaseException]]:
-        """Return what went otherwise than the script says, and what raised; forget both."""
+        """Return and clear the deviations from the script and the exceptions."""
         errors, self.errors = self.errors, []
         causes, self.causes = self.causes, []
         more = len(errors) - MOST_ERRORS
@@ -215,13 +215,13 @@ class ScriptedEnd:
         return [*errors[:MOST_ERRORS], *last], causes
 
     def verify(self) -> None:
-        """Fail if something went otherwise than the script says."""
+        """Fail if anything deviated from the script."""
         __tracebackhide__ = True
         raise_errors(*self.take_errors())
 
 
 def raise_errors(errors: list[str], causes: list[BaseException]) -> None:
-    """Fail with what went otherwise than the test says, if anything did.
+    """Fail with these errors, if there are any.
 
     Raises:
         AssertionError: from the first of `causes`.
@@ -247,11 +247,11 @@ def as_message(kind: Any, value: Any, what: str) -> Any:
 
 
 class ScriptedActionServer(ScriptedEnd):
-    """An action server that does what the test says; made by the `action_server` fixture.
+    """An action server with scripted replies; made by the `action_server` fixture.
 
     Each goal takes the first `reply_conditionally` whose predicate holds, else the next of the
-    replies in order, else the default. Without any script every goal succeeds at once; with
-    replies and no default, a goal more than there are replies is aborted and fails the run.
+    replies in order, else the default. Without a script every goal succeeds at once; with replies
+    and no default, a surplus goal is aborted and fails the run.
 
     Args:
         kit: The test.
@@ -260,8 +260,8 @@ class ScriptedActionServer(ScriptedEnd):
 
     Attributes:
         goals: The goals (XGoal) that arrived, in order.
-        cancelled: The goals that were asked to stop, in order.
-        conditional: Predicates of goals, and what is done with those for which they hold.
+        cancelled: The goals that were cancelled, in order.
+        conditional: Predicates of goals, with the reply if they hold.
     """
 
     def __init__(self, kit: Test, name: str, type_class: Any) -> None:
@@ -320,18 +320,18 @@ class ScriptedActionServer(ScriptedEnd):
         *,
         text: str = "",
     ) -> Reply:
-        """Answer every goal for which `predicate(goal)` holds; else as `reply`.
+        """Answer every goal for which `predicate(goal)` holds; other arguments as for `reply`.
 
-        What the predicate raises fails the run, and the goal is aborted.
+        An exception of the predicate fails the run, and the goal is aborted.
         """
         reply = self._make(result, status, duration, feedback, text)
         self.conditional.append((predicate, reply))
         return reply
 
     def custom_reply(self, function: Callable[[ServerGoalHandle], object]) -> None:
-        """Give the next goal to `function(goal_handle)`, which accepts and ends it; it may wait.
+        """Pass the next goal to `function(goal_handle)`, which accepts and ends it; it may wait.
 
-        What it raises fails the run, and the goal is aborted.
+        An exception of the function fails the run, and the goal is aborted.
         """
         self._queue(Reply(function=function))
 
@@ -344,15 +344,15 @@ class ScriptedActionServer(ScriptedEnd):
         *,
         text: str = "",
     ) -> Reply:
-        """Answer all goals for which there is no other reply; else as `reply`."""
+        """Answer all goals without another reply; arguments as for `reply`."""
         return self._set_default(self._make(result, status, duration, feedback, text))
 
     def choose_by(self, choose: Callable[[], Reply]) -> None:
-        """Ask `choose` for the reply to every goal."""
+        """Call `choose` for the reply to every goal."""
         self._chooser = choose
 
     def never_answer(self) -> Reply:
-        """Take the next goal and say nothing of it, not even that it is there."""
+        """Receive the next goal without any sign of it, not even that it has arrived."""
         return self._queue(Reply(status=None, accept_after=None))
 
     def never_finish(self, *, ignore_cancel: bool = False) -> Reply:
@@ -360,17 +360,17 @@ class ScriptedActionServer(ScriptedEnd):
         return self._queue(Reply(status=None, ignore_cancel=ignore_cancel))
 
     def accept_late(self, after: float, **reply: Any) -> Reply:
-        """Accept the next goal only `after` so long [s], then as `reply`."""
+        """Accept the next goal `after` this long [s], then answer as `reply`."""
         made = self.reply(**reply)
         made.accept_after = after
         return made
 
     def reject(self, text: str = "rejected by the test") -> Reply:
-        """Refuse the next goal."""
+        """Reject the next goal."""
         return self.reply(status="rejected", text=text)
 
     def die(self, after: float = 0.0, *, back_after: float | None = None) -> Reply:
-        """Die `after` so long [s] with the next goal active, and maybe come back.
+        """Die while the next goal is active, and optionally come back.
 
         Args:
             after: From acceptance to death [s].
@@ -391,7 +391,7 @@ class ScriptedActionServer(ScriptedEnd):
         return made
 
     def ignore_cancel(self, duration: float, **reply: Any) -> Reply:
-        """Answer the next goal as `reply`, and go on to the end when asked to stop."""
+        """Answer the next goal as `reply`, and ignore a cancel of it."""
         made = self.reply(duration=duration, **reply)
         made.ignore_cancel = True
         return made
@@ -415,7 +415,7 @@ class ScriptedActionServer(ScriptedEnd):
     # -- the test's side -----------------------------------------------------------------------
 
     def situation(self) -> Hashable:
-        """Return how many replies it has left, and how far it is with its goals."""
+        """Return the number of remaining replies, and the age and status of its goals."""
         now = self._clock.now()
         goals = [
             (round(now - self._arrivals[goal_id], 6), status)
@@ -434,12 +434,12 @@ class ScriptedActionServer(ScriptedEnd):
         )
 
     def await_goal(self, timeout: float | None = None) -> Any:
-        """Return the next goal, waiting for it; each goal is given once.
+        """Wait for the next goal and return it; each goal is returned once.
 
         Raises:
-            AssertionError: none came in time; beside the mission it fails the run.
+            AssertionError: none came in time; in a thread of the test it fails the run.
 
-        Blocks: until then; for functions that run beside the mission (`clock.spawn`).
+        Blocks: until then; for functions that run next to the mission (`clock.spawn`).
         """
         __tracebackhide__ = True
         deadline = None if timeout is None else self._clock.now() + timeout
@@ -470,7 +470,7 @@ class ScriptedActionServer(ScriptedEnd):
         for predicate, reply in self.conditional:
             try:
                 holds = predicate(goal)
-            except Exception as error:  # noqa: BLE001  a border: the run fails with it
+            except Exception as error:  # noqa: BLE001  the test's own code: it fails the run
                 return self._failure(self.note_raised(predicate, error))
             if holds:
                 return reply
@@ -481,7 +481,7 @@ class ScriptedActionServer(ScriptedEnd):
         return Reply(function=lambda handle: self._give_up(handle, text))
 
     def _give_up(self, handle: ServerGoalHandle, text: str) -> None:
-        """Abort a goal that the test has no right answer to, unless it has ended."""
+        """Abort a goal without a valid reply, unless it has ended."""
         status = handle.get_goal_status().status
         if status in _WAITING:
             handle.set_accepted()
@@ -495,11 +495,11 @@ class ScriptedActionServer(ScriptedEnd):
             event.set()
 
     def _play(self, handle: ServerGoalHandle, reply: Reply) -> None:
-        """Do with a goal what the reply says."""
+        """Carry out a reply to a goal."""
         if reply.function is not None:
             try:
                 reply.function(handle)
-            except Exception as error:  # noqa: BLE001  a border: the run fails with it
+            except Exception as error:  # noqa: BLE001  the test's own code: it fails the run
                 self._give_up(handle, self.note_raised(reply.function, error))
             return
         cancel = self._cancels[handle.get_goal_id().id]
@@ -508,7 +508,7 @@ class ScriptedActionServer(ScriptedEnd):
         if reply.accept_after and cancel.wait(reply.accept_after) and not reply.ignore_cancel:
             handle.set_canceled(text="cancelled before it was accepted")
         elif handle.get_goal_status().status not in _WAITING:
-            return  # the test has ended, and the server with it
+            return  # the test has ended meanwhile, and the server with it
         elif reply.status == "rejected":
             handle.set_rejected(reply.result, reply.text)
         else:
@@ -516,7 +516,7 @@ class ScriptedActionServer(ScriptedEnd):
             self._work(handle, reply, cancel)
 
     def _work(self, handle: ServerGoalHandle, reply: Reply, cancel: Any) -> None:
-        """Let the time of an accepted goal pass, and end it."""
+        """Wait for the duration of an accepted goal, and end it."""
         if reply.die_after is not None:
             self._clock.sleep(reply.die_after)
             self.kill()
@@ -531,7 +531,7 @@ class ScriptedActionServer(ScriptedEnd):
             if reply.twice:
                 self._disturb("result", TWICE)
             if reply.status == "preempted":
-                handle.set_cancel_requested()  # the server stops it of its own accord
+                handle.set_cancel_requested()  # as if the server itself decided to stop
             ends = {"succeeded": handle.set_succeeded, "aborted": handle.set_aborted}
             ends.get(reply.status, handle.set_canceled)(reply.result, reply.text)
 
@@ -552,16 +552,16 @@ class ScriptedActionServer(ScriptedEnd):
         return False
 
     def kill(self) -> None:
-        """Die as a process does that gets SIGKILL, and its goals with it."""
+        """Die like a process that gets SIGKILL, together with its goals."""
         self._handles.clear()
         super().kill()
 
 
 class ScriptedService(ScriptedEnd):
-    """A service that answers what the test says; made by the `service_server` fixture.
+    """A service with scripted replies; made by the `service_server` fixture.
 
-    Each request takes the next reply, else the default; without any script that is an empty
-    response at once. With replies and no default, a request more fails the run.
+    Each request takes the next reply, else the default; without a script that is an immediate
+    empty response. With replies and no default, a surplus request fails the run.
 
     Args:
         kit: The test.
@@ -591,24 +591,24 @@ class ScriptedService(ScriptedEnd):
     def custom_reply(self, function: Callable[[Any], Any]) -> Reply:
         """Answer the next request with what `function(request)` returns; it may wait or raise.
 
-        An AssertionError of it fails the run, too.
+        An AssertionError in it also fails the run.
         """
         return self._queue(Reply(function=function))
 
     def default_response(self, response: Any = None, duration: float = 0.0) -> Reply:
-        """Answer all requests for which there is no other reply."""
+        """Answer all requests without another reply."""
         return self._set_default(Reply(self._message(response), duration=duration))
 
     def fail(self, text: str = "failed by the test", duration: float = 0.0) -> Reply:
-        """Let the handler of the next request raise."""
+        """Make the handler of the next request raise."""
         return self._queue(Reply(error=text, duration=duration))
 
     def never_answer(self) -> Reply:
-        """Take the next request and say nothing."""
+        """Receive the next request and never respond."""
         return self._queue(Reply(silent=True))
 
     def die(self, after: float = 0.0) -> Reply:
-        """Die with the next request unanswered, `after` so long [s]."""
+        """Die `after` this long [s], without a response to the next request."""
         return self._queue(Reply(silent=True, die_after=after))
 
     def _message(self, response: Any) -> Any:
@@ -632,13 +632,13 @@ class ScriptedService(ScriptedEnd):
             return self._service.response_class() if reply.result is None else reply.result
         try:
             return reply.function(request)
-        except AssertionError as error:  # whatever else it raises is what the service does
+        except AssertionError as error:  # any other exception is the service's own behaviour
             self.note_raised(reply.function, error)
             raise
 
 
 class ScriptedTopic(ScriptedEnd):
-    """Writes to a topic and keeps what is written there; made by the `topic` fixture.
+    """Publishes on a topic and records its messages; made by the `topic` fixture.
 
     Args:
         kit: The test.
@@ -646,13 +646,13 @@ class ScriptedTopic(ScriptedEnd):
         type_class: Class of its messages.
 
     Attributes:
-        received: All messages on the topic, its own too, in order.
+        received: All messages on the topic, including its own, in order.
     """
 
     def __init__(self, kit: Test, name: str, type_class: Any) -> None:
         self.received: list[Any] = []
-        self._calls: list[Callable[[ScriptedTopic], object]] = []  # all that it was told to do
-        self._due: list[float] = []  # when it will write [s]
+        self._calls: list[Callable[[ScriptedTopic], object]] = []  # its script so far, for copies
+        self._due: list[float] = []  # when it will publish [s]
         super().__init__(kit, name, type_class)
 
     def _start(self) -> None:
@@ -662,19 +662,19 @@ class ScriptedTopic(ScriptedEnd):
         self._publishers: dict[bool, Publisher] = {}  # latched or not
 
     def publish(self, message: Any = None, *, latch: bool = False, **fields: Any) -> None:
-        """Write now.
+        """Publish now.
 
         Args:
-            message: A message or a dict of its fields; or give the fields themselves.
-            latch: Those who come later get it too.
-            **fields: The fields of the message, in place of `message`.
+            message: A message or a dict of its fields; or pass the fields themselves.
+            latch: Whether later subscribers get it, too.
+            **fields: The fields of the message, instead of `message`.
         """
         made = self._message(message if message is not None else fields)
         self._calls.append(lambda topic: topic.publish(made, latch=latch))
         self._publisher(latch=latch).publish(made)
 
     def publish_at(self, at: float, message: Any = None, **fields: Any) -> None:
-        """Write `at` so long [s] from now."""
+        """Publish `at` this long from now [s]."""
         made = self._message(message if message is not None else fields)
         self._calls.append(lambda topic: topic.publish_at(at, made))
         self._due.append(self._clock.now() + at)
@@ -682,12 +682,12 @@ class ScriptedTopic(ScriptedEnd):
         self._clock.call_later(at, lambda: publisher.publish(made))
 
     def publish_every(self, period: float, messages: Iterable[Any], *, start: float = 0.0) -> None:
-        """Write one message after the other, `period` [s] apart, the first `start` [s] from now."""
+        """Publish the messages `period` [s] apart, the first one `start` [s] from now."""
         for number, message in enumerate(messages):
             self.publish_at(start + number * period, message)
 
     def lose(self, count: int = 1) -> None:
-        """Lose the next messages that this end writes."""
+        """Lose the next messages that this end publishes."""
         self.disturb(DROPPED, count)
 
     def deliver_twice(self, count: int = 1) -> None:
@@ -695,18 +695,18 @@ class ScriptedTopic(ScriptedEnd):
         self.disturb(TWICE, count)
 
     def delay(self, seconds: float, count: int = 1) -> None:
-        """Deliver the next messages late by `seconds`: those after them may overtake."""
+        """Deliver the next messages late by `seconds`; later messages may overtake them."""
         self.disturb((seconds,), count)
 
     def copy_to(self, kit: Test) -> Self:
-        """Make the same topic in another test, where everything is asked of it once more."""
+        """Make the same topic in another test, and repeat its script there."""
         made = super().copy_to(kit)
         for call in self._calls:
             call(made)
         return made
 
     def situation(self) -> Hashable:
-        """Return how long it is to the messages that it will write [s]."""
+        """Return the times until its scheduled messages [s]."""
         now = self._clock.now()
         return tuple(round(at - now, 6) for at in self._due if at > now)
 

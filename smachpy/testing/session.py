@@ -1,4 +1,4 @@
-"""What the test session around says of every mission under test: the plugin's options."""
+"""The options of the test session for every mission under test."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Session:
     """A test session.
 
     Attributes:
-        seeds: Of the missions; each test runs with all of them, None takes turns.
-        rate: Virtual seconds per real second; None: as fast as it goes.
+        seeds: The seeds; each test runs with all of them. None: threads take turns.
+        rate: Virtual seconds per real second; None: as fast as possible.
         on_run: Called with every run, for coverage.
     """
 
@@ -30,7 +30,7 @@ _sessions = [Session()]
 
 
 def current() -> Session:
-    """Return the session that began last and has not ended; outside of any one without wishes."""
+    """Return the innermost current session; outside of any, one with the defaults."""
     return _sessions[-1]
 
 
@@ -40,6 +40,6 @@ def begin(session: Session) -> None:
 
 
 def end(session: Session) -> None:
-    """End a session; without effect when it has not begun."""
+    """End a session; does nothing if it has not begun."""
     if session in _sessions[1:]:
         _sessions.remove(session)

@@ -1,6 +1,6 @@
-"""The action `charge` of the simulated robot, from the file in ROS layout beside this module.
+"""The action `charge` of the simulated robot, from the definition file beside this module.
 
-Own definitions are added in the same way: a folder in ROS layout and `add_path`.
+Your own definitions work in the same way: a folder in ROS layout and `add_path`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from actionlib_core.interfaces import add_path
 
 add_path(Path(__file__).parent)
 
-from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402  found since the line above
+# Below `add_path`: the module `mission_msgs` exists only after that call.
+from actionlib_core.interfaces.mission_msgs.msg import (  # noqa: E402
     ChargeAction,
     ChargeFeedback,
     ChargeGoal,

@@ -1,4 +1,4 @@
-"""Floors in the form of ROS `map_server`, with robots and waypoint lists for them."""
+"""Maps in the format of ROS `map_server`, with robots and waypoint lists for them."""
 
 from __future__ import annotations
 

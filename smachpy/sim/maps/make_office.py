@@ -1,7 +1,7 @@
-"""Draw the office floor: `python make_office.py` writes office.pgm and office.yaml.
+"""Draws the office floor: `python make_office.py` writes office.pgm and office.yaml.
 
-27 x 17 m at 5 cm. Coordinates below are metres from the lower left corner of the image, which is
-the origin of the map frame too.
+27 x 17 m at 5 cm. The coordinates below are metres from the lower left corner of the image, which
+is also the origin of the map frame.
 """
 
 from __future__ import annotations

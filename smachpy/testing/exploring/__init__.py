@@ -1,1 +1,1 @@
-"""Exploration: many runs of one machine, with other results, preempts and interleavings."""
+"""Exploration: many runs of one machine, with different outcomes, preempts and interleavings."""

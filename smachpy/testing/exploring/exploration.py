@@ -1,4 +1,4 @@
-"""Running a mission over everything that can happen, and the shortest run that goes wrong."""
+"""Runs a mission with all combinations of choices, and finds a shortest run that fails."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
     Machine: TypeAlias = Container | Callable[[], Container]
 
-COMPUTER = RealClock()  # of the computer: a run's own time is virtual
-SHRINKING_RUNS = 300
-ORDERS = 100
+COMPUTER = RealClock()  # measures the computer's time: a run's own time is virtual
+SHRINKING_RUNS = 300  # the most runs to shorten a counterexample
+ORDERS = 100  # the most thread orders that are compared with a run with a kill
 
 
 class ReplayError(SmachError):
-    """A run to be repeated came to another choice than the one that was noted."""
+    """A replayed run came to another choice than the recorded one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +54,11 @@ class Counterexample:
     Attributes:
         reason: What is wrong with it.
         run: The run.
-        choices: What was chosen in it, as texts for `replay`.
+        choices: Its choices, as texts for `replay`.
         script: A program that repeats it.
-        picture: The machine with this run; None when nothing that draws is installed.
-        is_cut: `max_time` ended its shortening: a faster computer may find a shorter one. Otherwise
-            it is the same on all.
+        picture: The machine with this run; None if no drawing package is installed.
+        is_cut: Whether `max_time` ended its shortening: then a faster computer may find a shorter
+            one. Otherwise the counterexample is the same on every computer.
     """
 
     reason: str
@@ -77,16 +77,16 @@ class Counterexample:
 
 @dataclass(frozen=True, slots=True)
 class Exploration:
-    """What `explore` found.
+    """The result of `explore`.
 
     Attributes:
         ok: Whether every run kept all invariants.
-        runs: Number of runs, those for shrinking left out.
-        exhaustive: Whether there are no further runs: every choice was tried in every situation.
-        stopped_by: Why it is not: "max_runs", "max_time", "max_depth" or "counterexample".
+        runs: Number of runs, without those for shortening.
+        exhaustive: Whether there are no more runs: every choice was tried in every situation.
+        stopped_by: Why not: "max_runs", "max_time", "max_depth" or "counterexample".
         counterexample: A shortest run that breaks an invariant.
         seconds: How long it took.
-        not_raised: Exceptions that `on_exception` or `retry` name and no run raised, since they
+        not_raised: Exceptions in `on_exception` or `retry` that no run raised, because they
             cannot be made from a text alone.
     """
 
@@ -102,7 +102,7 @@ class Exploration:
         return self.ok
 
     def assert_ok(self) -> None:
-        """Fail with the whole counterexample if there is one.
+        """Fail with the counterexample, if there is one.
 
         Raises:
             AssertionError: a run breaks an invariant.
@@ -133,38 +133,38 @@ def explore(
     on_run: Callable[[Run], object] | None = None,
     **options: Unpack[RunOptions],
 ) -> Exploration:
-    """Run a mission over every leaf outcome, preempt point, fault and interleaving.
+    """Run a mission with every combination of leaf outcomes, preempts, faults and interleavings.
 
     Each leaf is replaced by a double that takes one second and ends with each of its outcomes in
-    turn. Of those that run at once, each may be the next to end, and outlasts the others then.
-    Other times are not varied: those of states that are kept, of retries' pauses, of scripted
-    servers. Runs with few unusual choices come first. Without invariants of your own, situations
-    that are equal (active states, outcomes, items, userdata, threads that can continue) are entered
-    once, which makes machines with loops finite; what states keep elsewhere is not seen. An own
+    turn. If several run at once, each may be the next to end; it outlasts the others then. Other
+    durations are not varied: those of kept states, of pauses before retries, of scripted servers.
+    Runs with few unusual choices come first. Without invariants of your own, each situation
+    (active states, outcomes, items, userdata, threads that can continue) is entered once, which
+    makes machines with loops finite; state that leaves keep elsewhere is not seen. Your own
     invariant may look at the whole past, so then every sequence of choices is a case of its own.
 
-    These always hold, or are reported: the mission ends; it does not raise; after a preempt it ends
-    within `grace`; no goal is left running.
+    These invariants are always checked: the mission ends; it does not raise; after a preempt it
+    ends within `grace`; no goal is left running.
 
     Args:
-        machine: A container, or a function that makes one; needed when its items run out.
-        max_runs: Most runs.
-        max_time: Longest time [s of the computer], for slow ones: what it cuts off depends on the
-            computer, and `stopped_by` says so. Shortening what was found may take as long again;
-            `Counterexample.is_cut` says when that was too short.
+        machine: A container, or a function that makes one (necessary if its items run out).
+        max_runs: The most runs.
+        max_time: The longest time [s of the computer]. What it cuts off depends on the computer,
+            and `stopped_by` says so. Shortening a counterexample may take as long again;
+            `Counterexample.is_cut` says whether that was too short.
         max_depth: Choices of a run after this many are not varied.
-        invariants: Called with each run. Anything false but None, or an exception, is a
+        invariants: Called with each run. A false value other than None, or an exception, is a
             counterexample.
         grace: Longest time from a preempt to the end [s].
-        folder: Gives the folder for the picture.
-        on_run: Called with each run, for coverage; without it that of the session, if it measures.
+        folder: Returns the folder for the picture.
+        on_run: Called with each run, for coverage; by default that of the test session.
         **options: See `RunOptions`.
 
     Raises:
         TypeError: `machine` is neither a container nor a function, or there is no such option.
         ValueError: there is no such fault.
-        UnknownStateError: `keep` or `writes` names a state that the machine does not have, or
-            `writes` one of several.
+        UnknownStateError: `keep` or `writes` names a state that does not exist; or a name in
+            `writes` is ambiguous.
     """
     check_machine(machine, "explore", functions=True)
     own = tuple(invariants)
@@ -215,12 +215,12 @@ def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOption
 
     Args:
         machine: As in `explore`.
-        choices: Those of the counterexample; what comes after them is as usual.
-        **options: Those that `explore` had.
+        choices: Those of the counterexample; later choices are the usual ones.
+        **options: Those given to `explore`.
 
     Raises:
         ReplayError: the machine has changed.
-        Exception: what the run raised.
+        Exception: the run raised it.
     """
     check_machine(machine, "replay", functions=True)
     kill = None
@@ -238,7 +238,7 @@ def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOption
 
 
 class _Budget:
-    """How many runs there may be, and for how long."""
+    """Counts the runs, and limits their number and time."""
 
     def __init__(self, max_runs: int, max_time: float) -> None:
         self._max_runs, self._max_time = max_runs, max_time
@@ -247,27 +247,27 @@ class _Budget:
 
     @property
     def seconds(self) -> float:
-        """For how long there have been runs [s of the computer]."""
+        """Time since the first run [s of the computer]."""
         return COMPUTER.now() - self._begun
 
     def take(self) -> str:
-        """Take one run; return why there is none, else ""."""
+        """Count a run; return why there may be no more, else ""."""
         if self.runs >= self._max_runs:
             return "max_runs"
-        if self.runs > 0 and self.seconds > self._max_time:  # always one, however slow it is here
+        if self.runs > 0 and self.seconds > self._max_time:  # one run in any case, on any computer
             return "max_time"
         self.runs += 1
         return ""
 
 
 class Runner:
-    """Runs a machine again and again, each time from the same beginning.
+    """Runs a machine many times, always from the same initial state.
 
     Args:
-        call: The function that the user has called, for errors.
+        call: The function that the user called, for errors.
         machine: The machine, or a function that makes it.
         given: The options that differ from the defaults.
-        merges: See `Explorer`.
+        merges: As in `Explorer`.
 
     Raises:
         TypeError: there is no such option.
@@ -282,7 +282,7 @@ class Runner:
         if unknown:
             raise TypeError(f"{call}: {unknown}")
         options: RunOptions = {**DEFAULTS, **given}
-        # Whoever gave an iterator: one look would use it up.
+        # These may be iterators, which can be read only once.
         options["faults"], options["keep"] = tuple(options["faults"]), tuple(options["keep"])
         faults = sorted(set(options["faults"]) - FAULTS)
         if faults:
@@ -317,7 +317,7 @@ class Runner:
         """Make the machine, and put doubles into it.
 
         Args:
-            journal: That of the run which another process goes on with; None: a new run begins.
+            journal: The journal of a run that this process continues; None: a new run begins.
         """
         if journal is None or not isinstance(self.source, Container):
             self._places.restore()  # the machine before
@@ -336,13 +336,13 @@ class Runner:
             for c in _containers(machine)
         ]
         self._scripts = [(path, state, state.script) for path, state in _doubles(machine)]
-        self._restore()  # so that no run changes what is kept here
+        self._restore()  # the runs get copies, so that none can change the values stored here
         if journal is not None:
             for path, double, script in self._scripts:
                 double.script = script[min(journal.ends(path), len(script) - 1) :]
 
     def _restore(self) -> None:
-        """Bring the userdata and the test's doubles back to the beginning."""
+        """Reset the userdata and the test's doubles."""
         for _, double, script in self._scripts:
             double.script = script
         for userdata, values in self._userdata:
@@ -357,28 +357,28 @@ class Runner:
         *,
         like: Mapping[Hashable, str] | None = None,
     ) -> tuple[Run, Exception | None]:
-        """Run once, with these choices first; what it raised comes back with the run.
+        """Run once, beginning with these choices; return the run and the exception it raised.
 
         Args:
             prefix: The choices.
             kill: Where the process is killed.
-            like: The choices of the run that this one is to be like; `prefix` has only turns then.
+            like: The choices of the run to follow; `prefix` has only the turns of threads then.
 
         Raises:
             ReplayError: it came to other choices.
         """
         if not isinstance(self.source, Container) and self.explorer.choices:
-            self._restore()  # the function may give the same machine each time
+            self._restore()  # the function may return the same machine each time
             self._prepare()
         self._restore()
         explorer, options = self.explorer, self.options
         runs: list[Run] = []
         error: Exception | None = None
-        # A kit for each run: what still waits in one must not reach into the next.
+        # A new kit for each run: threads and timers left over from one must not reach the next.
         kit = MissionKit(choose=explorer.turn, on_run=runs.append)
         self.journal = None
         if "kill" in options["faults"]:
-            from smachpy.testing.exploring.kills import Journal  # few tests need journals
+            from smachpy.testing.exploring.kills import Journal  # slow to import, and seldom needed
 
             self.journal = Journal(self._machine, kill)
         begins = None if self.journal is None else self.journal.begins
@@ -407,10 +407,9 @@ class Runner:
         return (run if self._whole is None else replace(run, whole=self._whole)), error
 
     def kills(self) -> Iterator[Kill]:
-        """Yield the kills to repeat the last run with, each place once; none without that fault.
+        """Yield the kills for the last run, each place once; none without that fault.
 
-        The order of threads starts anew in another process, so only runs in which they take turns
-        have them.
+        Only for runs in which the threads take turns: their order starts anew in another process.
         """
         explorer, journal = self.explorer, self.journal
         if journal is None or any(turn.picked for turn in explorer.turns):
@@ -430,7 +429,7 @@ class Runner:
     def _execute_kept(
         self, kit: MissionKit, userdata: Mapping[str, Any] | None, journal: Journal
     ) -> None:
-        """Run with a journal, in one process after the other until none is killed."""
+        """Run with a journal, in one process after another until none is killed."""
         from smachpy.durable.mission import kept_mission
 
         store = journal.as_store()
@@ -449,7 +448,7 @@ class Runner:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """Log nothing: what goes wrong in a run is reported as its verdict."""
+    """Log nothing: errors in a run are reported as its verdict."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:
@@ -486,7 +485,7 @@ def _shrunk(
     verdict: Verdict,
     run: Run,
 ) -> Counterexample:
-    """Return the shortest run that can be found that is wrong in the same way."""
+    """Return the shortest run found that fails in the same way."""
     choices = runner.explorer.choices
     reason = verdict.reason
     end = COMPUTER.now() + max_time
@@ -501,7 +500,7 @@ def _shrunk(
         try:
             found, error = runner.run(prefix)
         except ReplayError:
-            continue  # there is no such run
+            continue  # there is no run with these choices
         why = verdict_on(found, error)
         others = runner.explorer.choices
         if why is None or why.kind != verdict.kind:
@@ -519,10 +518,10 @@ def _killed_anywhere(
     verdict_on: Callable[[Run, Exception | None], Verdict | None],
     budget: _Budget,
 ) -> tuple[Counterexample | None, str]:
-    """Repeat the last run with kills, if there is that fault.
+    """Repeat the last run with kills, if that fault is on.
 
     Returns:
-        The first one that another process goes on with otherwise, and why not all were tried.
+        The first run that does not continue as without the kill, and why not all were tried.
     """
     explorer, expected = runner.explorer, runner.facts
     for kill in runner.kills():
@@ -542,13 +541,13 @@ def _killed_anywhere(
 
 
 def _texts(choices: list[Choice]) -> tuple[str, ...]:
-    """Return choices as texts, up to the last unusual one: what comes after it is as usual."""
+    """Return choices as texts, up to the last unusual one; later ones are the usual ones."""
     last = max((number for number, choice in enumerate(choices, 1) if choice.picked), default=0)
     return tuple(map(str, choices[:last]))
 
 
 def _difference(runner: Runner, kill: Kill, explorer: Explorer, expected: Mapping[str, Any]) -> str:
-    """Return in what the last run, with a kill, differs from the one without; "" if in nothing."""
+    """Return how the last run, with a kill, differs from the one without; "" if not at all."""
     from smachpy.testing.exploring.kills import difference
 
     if kill.loses_request:
@@ -561,9 +560,10 @@ def _difference(runner: Runner, kill: Kill, explorer: Explorer, expected: Mappin
 def _is_other_order(
     runner: Runner, picks: Mapping[Hashable, str], facts: Mapping[str, Any]
 ) -> bool:
-    """Tell whether the run does that without a kill, too, when its threads go on in another order.
+    """Return whether the run ends like that without a kill, in another order of its threads.
 
-    In another process those that go on at the same moment do so in an order of their own.
+    Threads that are ready at the same moment run in another order in another process, so such a
+    difference is not the kill's fault.
     """
     search = Search(depth=math.inf)
     for _ in range(ORDERS):
@@ -578,7 +578,7 @@ def _is_other_order(
 
 
 def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:
-    """Yield beginnings of runs that may be shorter, the shortest first."""
+    """Yield prefixes of runs that may be shorter, the shortest first."""
     picks = tuple(choice.picked for choice in choices)
     for number, choice in enumerate(choices):
         for other in range(len(choice.options)):
@@ -615,7 +615,7 @@ def _script(runner: Runner, choices: tuple[str, ...], reason: str) -> str:
 
 
 def _import_of(source: Any) -> str:
-    """Return the line of a script that gets what makes the machine, or says what belongs there."""
+    """Return the line of a script that imports the machine's source, or a placeholder."""
     module = sys.modules.get(getattr(source, "__module__", None) or "")
     names = [] if module is None else [n for n, v in vars(module).items() if v is source]
     if module is not None and names:
@@ -632,7 +632,7 @@ def _import_of(source: Any) -> str:
 
 
 def _literal(value: object) -> str:
-    """Return a value as it stands in a program, or a gap and what belongs there."""
+    """Return a value as Python source, or a placeholder with a comment."""
     text = repr(value)
     try:
         ast.literal_eval(text)

@@ -1,4 +1,4 @@
-"""The choices of an explored run: made by doubles of leaves, by servers, and by the clock."""
+"""Makes the choices of an explored run: for the doubles of leaves, for servers and the clock."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 PREEMPTED = "preempted"
 FAULTS = frozenset({"hang", "raise", "deaf", "kill"})
-STEP_S = 1.0  # how long a double or server takes, unless it outlasts others
-APART_S = 0.001  # so much more for each double, where there are kills
-WITHIN = 0.9  # part of the rest of its timeout for which a double outlasts others
+STEP_S = 1.0  # [s] duration of a double or server, unless it outlasts others
+APART_S = 0.001  # [s] added per leaf if there are kills, so that no two end at the same moment
+WITHIN = 0.9  # a leaf outlasts others for this part of its remaining timeout
 _OUTSIDE = frozenset({"monitor", "condition", "service"})
 
-# What a run may choose besides outcomes.
+# The options of a leaf besides its outcomes.
 TURN = "turn"
 PREEMPT = "is preempted"
 HANGS = "never finishes"
@@ -51,7 +51,7 @@ STAYS = "is left alone"
 ASKED = "runs as a preempt comes"
 RAISED = "raised by the test"  # text of the exceptions
 
-# What a server may do with a goal.
+# The options of a server for a goal.
 REPLIES: dict[str, Reply] = {
     "succeeds": Reply(duration=STEP_S),
     "aborts": Reply(status="aborted", duration=STEP_S),
@@ -63,7 +63,7 @@ REPLIES: dict[str, Reply] = {
     "delivers twice": Reply(duration=STEP_S, twice=True),
     "is slow and ignores a cancel": Reply(duration=3 * STEP_S, ignore_cancel=True),
 }
-# The same with a preempt of the mission while the goal is active.
+# The same, with a preempt of the mission while the goal is active.
 PREEMPTED_REPLIES: dict[str, Reply] = {
     "works as a preempt comes": Reply(duration=3 * STEP_S),
     "works as a preempt comes, and ignores the cancel": Reply(
@@ -73,30 +73,31 @@ PREEMPTED_REPLIES: dict[str, Reply] = {
 
 
 class RunOptions(TypedDict, total=False):
-    """What the runs of `explore` and `replay` vary, and when one counts as endless.
+    """What the runs of `explore` and `replay` vary, and when a run counts as endless.
 
     Keys:
-        faults: "hang": any leaf may never finish; "raise": may raise a RuntimeError, and whatever
-            `on_exception` and `retry` of it and of its containers name, if that can be made from a
-            text alone; "deaf": may ignore a preempt. Leaves with a timeout, and watchers beside
-            others, may hang in any case. "kill": each run has a journal, and is repeated with a
-            kill of its process at each write of it, before and after; another process goes on.
-        preempts: Most preempts per run; 1.
+        faults: "hang": any leaf may never finish; "raise": may raise a RuntimeError, and the
+            exceptions in `on_exception` and `retry` of itself and its containers that can be made
+            from a text alone; "deaf": may ignore a preempt. Leaves with a timeout, and watchers
+            next to others, may always hang. "kill": each run has a journal, and is repeated with
+            a kill of its process before and after each write; another process continues it.
+        preempts: The most preempts per run; 1.
         interleavings: Whether to vary which thread continues first, and which leaf outlasts the
             others; True.
-        max_steps: Most doubles that run; with more the run counts as endless; 200.
-        limit: Longest run [s of its own clock, without what outlasts others]; also endless; an
-            hour.
-        steps: Most steps while no time passes, as in `mission(...)`; also endless.
-        keep: Leaves, or containers with all leaves in them, that stay as they are; a name may mean
+        max_steps: The most doubles that run; 200. With more the run counts as endless.
+        limit: The longest run [s of its own clock, without the time for outlasting]; an hour. A
+            longer one counts as endless.
+        steps: The most steps while no time passes, as in `mission(...)`; with more the run counts
+            as endless.
+        keep: Leaves, or containers with all their leaves, that are not replaced; a name may match
             several. A preempt comes as soon as such a leaf waits.
         writes: Leaf -> userdata that its double writes.
-        real_actions: Put doubles only in the places of services, monitors and conditions. Scripted
-            servers do to each goal all that servers do: succeed, abort, reject, accept late, die,
+        real_actions: Replace only services, monitors and conditions by doubles. Scripted servers
+            do everything to a goal that servers can do: succeed, abort, reject, accept late, die,
             come back, lose the result, deliver twice, ignore a cancel; preempts come while one
             works.
-        userdata: Put into the machine's userdata before each run.
-        doubles: The doubles of `mission.replace`; each run begins with their whole scripts.
+        userdata: Written to the machine's userdata before each run.
+        doubles: The doubles of `mission.replace`; each run starts with their complete scripts.
         servers: The servers and topics of the test; each run has them with the same scripts.
     """
 
@@ -132,13 +133,13 @@ DEFAULTS: RunOptions = {
 
 @dataclass(slots=True)
 class _Execution:
-    """How far a double is.
+    """The progress of a double.
 
     Attributes:
         begun: When it began [s].
-        until: How long its time passes, or has passed [s].
-        picked: What was chosen last.
-        picks: How many choices were made.
+        until: When its current time ends or ended [s].
+        picked: The last choice.
+        picks: The number of choices so far.
     """
 
     begun: float
@@ -148,21 +149,21 @@ class _Execution:
 
 
 class Explorer:
-    """Makes and notes the choices of one run after the other.
+    """Makes and records the choices of one run after another.
 
     Args:
         root: The machine; the explorer puts its doubles into it.
-        options: What is varied, complete.
-        places: Puts the leaves back in the end.
-        merges: Whether equal situations are told apart from others.
+        options: All options.
+        places: Puts the leaves back at the end.
+        merges: Whether a situation that was seen before is not explored again.
 
     Attributes:
-        doubles: Paths of the leaves with doubles of the explorer.
-        choices: What was chosen in the run, in order.
-        picks: What was chosen, by what a run with a kill finds it by.
-        too_long: It had too many leaves.
-        mismatch: Why it could not follow the choices that were given.
-        not_raised: Names of the exceptions that should be raised and cannot be made.
+        doubles: Paths of the leaves that the explorer replaced.
+        choices: The choices of the run, in order.
+        picks: The same choices, by a key with which a run with a kill finds them.
+        too_long: Whether too many leaves ran.
+        mismatch: Why it could not follow the given choices.
+        not_raised: Names of the exceptions that should be raised but cannot be made.
     """
 
     def __init__(
@@ -172,15 +173,15 @@ class Explorer:
         states = list(record.walk())
         self._root, self._root_path = root, record.path
         self._options = options
-        # What a plan does next depends on more than on which states are active.
+        # A plan's next step depends on its marking, not only on the active states.
         self._merges = merges and all(s.net is None for s in states)
         self._parallel = {s.path for s in states if s.kind == "concurrence"}
-        # It makes no difference how long these have been active.
+        # For these the time since they began makes no difference.
         self._timeless = {
             s.path for s in states if s.is_container and "timeout" not in dict(s.details)
         }
         self._leaves = {s.path for s in states if not s.is_container}
-        # Here a server chooses when the preempt comes.
+        # For these a server chooses the moment of the preempt.
         self._served = {s.path for s in states if options["real_actions"] and s.kind == "action"}
         self._writes = {find_path(record, n): w for n, w in (options["writes"] or {}).items()}
         raised = dict(_raised_in(root, record.path)) if "raise" in options["faults"] else {}
@@ -190,11 +191,11 @@ class Explorer:
             path: {text: kind for text, kind in kinds.items() if can[kind]}
             for path, kinds in raised.items()
         }
-        # Longer than all the leaves of a run one after the other.
+        # Longer than all leaves of a run together, so that everything else ends first.
         self._long_s = (options["max_steps"] + 1) * STEP_S
         self.doubles: set[str] = set()
         self._bounded: set[str] = set()
-        # Another process may go on in another order with what ends at the same moment.
+        # After a kill, leaves that end at the same moment may end in another order: avoid ties.
         tie_s = APART_S if "kill" in options["faults"] else 0.0
         self._step_s = {path: STEP_S + n * tie_s for n, path in enumerate(sorted(self._leaves), 1)}
         self._kept = _kept_by(record, options["keep"])
@@ -204,7 +205,7 @@ class Explorer:
 
     @property
     def turns(self) -> list[Choice]:
-        """What was chosen for the turns of threads, in order."""
+        """The choices for the turns of threads, in order."""
         return [choice for choice in self.choices if choice.where == TURN]
 
     # -- the run -------------------------------------------------------------------------------
@@ -217,15 +218,15 @@ class Explorer:
         picks: Mapping[Hashable, str] | None = None,
         begins: Callable[[str], int] | None = None,
     ) -> None:
-        """Forget the last run.
+        """Prepare for the next run.
 
         Args:
-            kit: What the next one runs in.
-            prefix: The choices that it begins with, as indices or texts.
-            picks: All its choices but the turns of threads, which are those of `prefix` then: those
-                of a run that it is to be like.
+            kit: The kit in which it runs.
+            prefix: Its first choices, as indices or texts.
+            picks: All its choices except the turns of threads, which `prefix` has then: the choices
+                of a run to follow.
             begins: Counts how often a state has begun. A leaf that is executed again without having
-                begun again was interrupted by a kill, and goes on. None: there are no kills.
+                begun again was interrupted by a kill, and continues. None: there are no kills.
         """
         self._kit, self._clock = kit, kit.clock
         self._prefix = prefix
@@ -246,33 +247,37 @@ class Explorer:
         self._items: dict[str, int] = {}
         self._attempts: dict[str, int] = {}
         self._hanging: set[str] = set()
-        self._outlasting: set[str] = set()  # since the last end of a leaf
+        self._outlasting: set[str] = (
+            set()
+        )  # those that chose to outlast others since a leaf last ended
         self._outlasted: list[tuple[float, float]] = []
         self._request: Timer | None = None
         self._over = False
 
     def go_on(self, root: Container, places: Places, active: Iterable[str]) -> None:
-        """Go on with the run in another process.
+        """Continue the run in another process.
 
         Args:
             root: Its machine.
-            places: Puts the leaves back in the end.
-            active: Paths of the states that are active.
+            places: Puts the leaves back at the end.
+            active: Paths of the active states.
         """
         going_on = set(active)
         self._root = root
         self._active = {path: t for path, t in self._active.items() if path in going_on}
         self._hanging.clear()
         self._over = False
-        self._replace_leaves(places, root, self._root_path, self._kept)  # unless they are there
+        self._replace_leaves(
+            places, root, self._root_path, self._kept
+        )  # skips those that are there
 
     def end(self) -> None:
-        """Cancel a preempt that the run did not wait for."""
+        """Cancel a preempt whose time has not come."""
         if self._request is not None:
             self._request.cancel()
 
     def outlasted_s(self, since: float) -> float:
-        """Return for how long, from `since` on, leaves ran only to outlast others [s]."""
+        """Return how long leaves ran on only to outlast others, from `since` on [s]."""
         total = 0.0
         for begin, end in sorted(self._outlasted):
             total += max(0.0, end - max(begin, since))
@@ -286,10 +291,10 @@ class Explorer:
         situation: Hashable = None,
         key: Hashable = None,
     ) -> int:
-        """Choose, as given or the first, and note it.
+        """Choose the given option or the first, and record it.
 
-        A choice without a situation, as of a server, is part of all situations after it. Its `key`
-        is what a run with a kill finds the choice by, which comes to it at another time.
+        A choice without a situation, such as a server's, is a part of all later situations. A run
+        with a kill comes to the same choice at another time, and finds it by its `key`.
         """
         number = len(self.choices)
         picked = 0
@@ -305,7 +310,7 @@ class Explorer:
             index = texts.index(given) if given in texts else given
             if isinstance(index, int) and index < len(options):
                 picked = index
-            else:  # not raised here, where the clock asks as well
+            else:  # not raised here: the clock calls this as well
                 self.mismatch = self.mismatch or (
                     f"replay: choice {number}: got {given!r}; expected one of {texts}. Has the "
                     "machine changed, or does it depend on something outside?"
@@ -324,7 +329,7 @@ class Explorer:
         return self.choose(TURN, names, self._situation((TURN, *sorted(names))))
 
     def on_event(self, event: Event) -> None:
-        """Follow the run."""
+        """Keep track of the run."""
         if isinstance(event, Entered):
             self._active[event.path] = event.t
             self._attempts.pop(event.path, None)
@@ -336,11 +341,11 @@ class Explorer:
         elif isinstance(event, Left | Failed):
             self._active.pop(event.path, None)
             self._hanging.discard(event.path)
-            # The whole text: it holds the error of a state further down.
+            # The whole text: it contains the error of an inner state.
             left = event.outcome if isinstance(event, Left) else f"raised {event.error}"
             self._ended[event.path] = left
             if event.path in self._leaves:
-                self._outlasting.clear()  # another one may be the next to end
+                self._outlasting.clear()  # from here on, each of them may again be the next to end
         elif isinstance(event, Retried):
             self._attempts[event.path] = event.attempt
             self._forget_ends(event.path)
@@ -348,21 +353,22 @@ class Explorer:
             self._items[event.path] = event[3]  # tuples have an `index` of their own
 
     def _forget_ends(self, path: str) -> None:
-        """Forget how the states in a container ended: it begins again."""
+        """Forget the outcomes in a container that starts again."""
         inside = path + "/"
         self._ended = {p: o for p, o in self._ended.items() if not p.startswith(inside)}
 
     def _begin_leaf(self, path: str) -> None:
-        """Choose whether a preempt comes while a leaf runs that stays as it is."""
+        """Choose whether a preempt comes while a kept leaf runs."""
         if path in self.doubles or path in self._served or not self._preempts:
             return
         key = (path, ASKED, 0 if self._begins is None else self._begins(path))
         if self.choose(path, (STAYS, ASKED), self._situation((path, ASKED)), key):
             self._preempts -= 1
-            self._request = self._clock.call_later(0.0, self._preempt)  # as soon as it waits
+            # A timer at the current time fires when every thread waits: so the leaf has started.
+            self._request = self._clock.call_later(0.0, self._preempt)
 
     def _situation(self, about: Hashable) -> Hashable:
-        """Return all that the rest of the run depends on."""
+        """Return everything that the rest of the run depends on."""
         if not self._merges:
             return None
         now = self._clock.now()
@@ -386,7 +392,7 @@ class Explorer:
         )
 
     def _age(self, path: str, age: float) -> float:
-        """Return what an active state's age [s] means to the rest of the run, if anything."""
+        """Return an active state's age [s] as far as the rest of the run depends on it."""
         if path in self._timeless or path in self._hanging:
             return -1.0
         if age > self._step_s.get(path, STEP_S) and path in self.doubles - self._bounded:
@@ -402,7 +408,7 @@ class Explorer:
     def serve_actions(self) -> None:
         """Offer every action that the machine uses and the test does not offer.
 
-        Those of action states are there from the beginning, those of other clients come with them.
+        Those of action states are offered at once, those of other clients when a client is made.
         """
         kit = self._kit
         names = {kit.node.resolve(end.name) for end in kit.ends}
@@ -490,21 +496,21 @@ class Explorer:
         return self._act(double, path, picked, outcomes)
 
     def _sleep(self, double: Double, seconds: float, *, outlasts: bool) -> bool:
-        """Let a double's time pass; return whether a preempt ended it."""
+        """Wait for a double's duration; return whether a preempt ended it."""
         if not outlasts:
             return double.sleep(seconds)
         if self._clock.limit is not None:
-            self._clock.limit += seconds  # a long run, but not an endless one
+            self._clock.limit += seconds  # time for outlasting does not count as an endless run
         begin = self._clock.now()
         asked = double.sleep(seconds)
         self._outlasted.append((begin, self._clock.now()))
         return asked
 
     def _longer_s(self, double: Double, path: str, begun: float) -> float:
-        """Return how long a double would go on to outlast the others [s]; 0: it ends now.
+        """Return how much longer a double would run to outlast the others [s]; 0: it ends now.
 
-        So each of the leaves that run at once may be the next to end. The last one does end: the
-        fault "hang" is for those that never do.
+        So each of the leaves that run at once may be the next to end. The last one always ends; the
+        fault "hang" is for leaves that never do.
         """
         others = self._active.keys() & self._leaves - self._hanging - self._outlasting - {path}
         if (
@@ -530,7 +536,8 @@ class Explorer:
         may_outlast: bool,
     ) -> str:
         plain = [outcome for outcome in outcomes if outcome != PREEMPTED] or list(outcomes)
-        first = self._visits[path] % len(plain)  # each is the usual one in turn: loops end
+        # The usual outcome changes with each visit: with a fixed one, a loop would never end.
+        first = self._visits[path] % len(plain)
         options = plain[first:] + plain[:first]
         options += [OUTLASTS] if may_outlast else []
         if self._preempts:
@@ -545,7 +552,7 @@ class Explorer:
         return options[self.choose(path, options, situation, key)]
 
     def _waits(self, double: Double, path: str) -> bool:
-        """Tell whether it is a watcher beside others: it is preempted when those end."""
+        """Return whether it is a watcher next to others: it waits until they end and preempt it."""
         kind, details = double.describe_details()
         if kind not in {"monitor", "condition"} or "checks" in dict(details):
             return False
@@ -563,7 +570,8 @@ class Explorer:
             double.wait_preempt()
             self._hanging.discard(path)
             double.service_preempt()
-            # After a kill it is not asked again what it says to a timeout that has passed.
+            # After a kill, the state is not asked again for the outcome of a timeout that has
+            # passed.
             late = get_options(double).timeout_outcome if self._begins is not None else None
             return PREEMPTED if PREEMPTED in outcomes else late or outcomes[0]
         if picked in outcomes:
@@ -602,20 +610,20 @@ def _expected(state: State) -> tuple[type[BaseException], ...]:
 def _made(kind: type[BaseException]) -> BaseException:
     try:
         return kind(RAISED)
-    except Exception:  # noqa: BLE001  it takes other arguments, which do not matter here
+    except Exception:  # noqa: BLE001  its __init__ takes other arguments: skip it
         return kind.__new__(kind, RAISED)
 
 
 def _can_be_made(kind: type[BaseException]) -> bool:
     try:
         str(_made(kind))
-    except Exception:  # noqa: BLE001  whatever is missing in it
+    except Exception:  # noqa: BLE001  it lacks what its __init__ would have set
         return False
     return True
 
 
 def _userdata(container: Container) -> Hashable:
-    """Return the userdata of a container and of all below it, to be compared."""
+    """Return the userdata of a container and all inner ones, in a form that can be compared."""
     data = container.userdata
     own = tuple((key, repr(writable(data[key]))) for key in sorted(data.keys()))
     children = container.get_children().values()
@@ -623,11 +631,12 @@ def _userdata(container: Container) -> Hashable:
 
 
 def _kept_by(record: StateRecord, names: Iterable[str]) -> set[str]:
-    """Return the paths of the leaves that stay as they are.
+    """Return the paths of the leaves that are not replaced.
 
     Args:
         record: The machine.
-        names: Paths, or ends of paths, which may mean several; a container means all in it.
+        names: Paths, or ends of paths, which may match several; a container stands for all its
+            leaves.
 
     Raises:
         UnknownStateError: there is no such state.
@@ -637,6 +646,6 @@ def _kept_by(record: StateRecord, names: Iterable[str]) -> set[str]:
     for name in names:
         end = "/" + name.strip("/")
         found = [s.path for s in record.walk() if s.path == name or s.path.endswith(end)]
-        tops = found or [find_path(record, name)]  # which says what there is
+        tops = found or [find_path(record, name)]  # raises, and lists the states
         kept.update(leaf for leaf in leaves if any(f"{leaf}/".startswith(f"{t}/") for t in tops))
     return kept

@@ -1,4 +1,4 @@
-"""Kills of the process of an explored run, at the writes of its journal."""
+"""Kills the process of an explored run at the writes of its journal."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Kill(NamedTuple):
     """A kill of a run.
 
     Attributes:
-        write: At which write of its journal, from 1.
-        written: Whether that one is written first.
-        what: What it says.
+        write: The number of the write, from 1.
+        written: Whether this write is done before the kill.
+        what: The write's entries, as text.
     """
 
     write: int
@@ -38,7 +38,7 @@ class Kill(NamedTuple):
 
     @property
     def loses_request(self) -> bool:
-        """Whether a request to stop is lost with the process: nobody has been told of it."""
+        """Whether a preempt request is lost with the process, before anything has seen it."""
         return not self.written and "PreemptRequested" in self.what
 
     def __str__(self) -> str:
@@ -46,13 +46,13 @@ class Kill(NamedTuple):
 
 
 def parse_kill(text: object) -> Kill | None:
-    """Return the kill that a text of `replay` means; None: it means none."""
+    """Return the kill that a text of `replay` describes; None if it describes none."""
     found = re.fullmatch(r"killed (before|after) write (\d+): (.*)", str(text))
     return found and Kill(int(found[2]), found[1] == "after", found[3])
 
 
 class Journal:
-    """The journal of an explored run, in memory: what `kept_mission` needs of a `Store`.
+    """The journal of an explored run, in memory, with the methods of `Store` that are needed.
 
     Args:
         machine: The root.
@@ -60,8 +60,8 @@ class Journal:
 
     Attributes:
         die: Kills the process.
-        writes: For each write what it says, and what the rest of the run can depend on.
-        position: Where the run stands.
+        writes: For each write its text, and the position before it.
+        position: The position of the run.
     """
 
     def __init__(self, machine: Container, kill: Kill | None) -> None:
@@ -76,25 +76,25 @@ class Journal:
         self._chosen: set[str] = set()
 
     def as_store(self) -> Store:
-        """Return it as what it stands for."""
+        """Return it with the type of the store that it replaces."""
         return cast("Store", self)
 
     def active(self) -> list[str]:
-        """Return the paths of the states that have begun and not ended."""
+        """Return the paths of the active states."""
         return [path for path, one in self.position.visits.items() if one["outcome"] is None]
 
     def begins(self, path: str) -> int:
-        """Return how often the state at `path` has begun, attempts counted, kills not."""
+        """Return how often the state at `path` began, including attempts, excluding kills."""
         return self._begins[path]
 
     def ends(self, path: str) -> int:
-        """Return how often it has ended, attempts counted."""
+        """Return how often it ended, including attempts."""
         kinds = {"Left", "Retried"}
         return sum(e["path"] == path and e["kind"] in kinds for e in self._entries)
 
     def facts(self, ends: Iterable[ScriptedEnd]) -> dict[str, Any]:
-        """Return what must be equal in a run with a kill and in one without."""
-        # Whether a branch that is told to stop is heard before its concurrence ends is a race.
+        """Return the facts that must be equal in runs with and without a kill."""
+        # Without 'preempted': whether a preempted branch ends before its concurrence is a race.
         left = Counter(
             (e["path"], e["outcome"])
             for e in self._entries
@@ -117,7 +117,7 @@ class Journal:
         return self._row
 
     def claim(self, mission: str, runner: str, *, seconds: float) -> Lease:  # noqa: ARG002
-        """As `Store.claim`: the process before is dead."""
+        """As `Store.claim`; the previous process is dead."""
         self._fence += 1
         return Lease(mission, self._fence, runner)
 
@@ -144,7 +144,7 @@ class Journal:
                 self._count(entry)
                 self._entries.append(entry)
         if at:
-            self._fence += 1  # whoever writes now is dead
+            self._fence += 1  # writes of the killed process are refused from now on
             self.die()
             raise Stopped
 
@@ -170,23 +170,23 @@ class Journal:
 
 
 def kills_of(journal: Journal, seen: set[object]) -> Iterator[Kill]:
-    """Yield the kills to try in a run, two at each write, that no run before had at the same place.
+    """Yield the kills for a run, two at each write, except at places that were tried before.
 
     Args:
         journal: Its journal.
-        seen: Where kills were tried; what is yielded is added.
+        seen: The places that were tried; new ones are added.
     """
     for number, (told, place) in enumerate(journal.writes, 1):
         for written in (False, True):
             if written and number == len(journal.writes):
-                continue  # it has ended
+                continue  # the run has ended: nothing is left to continue
             if (told, place, written) not in seen:
                 seen.add((told, place, written))
                 yield Kill(number, written, told)
 
 
 def difference(facts: Mapping[str, Any], expected: Mapping[str, Any]) -> str:
-    """Say in what a run with a kill differs from the one without; "" if in nothing."""
+    """Return how a run with a kill differs from the one without; "" if not at all."""
     found = []
     for name, want in expected.items():
         got = facts[name]

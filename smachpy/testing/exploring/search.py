@@ -1,4 +1,4 @@
-"""All sequences of choices, those with the fewest unusual ones first."""
+"""Enumerates sequences of choices, those with the fewest unusual ones first."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class Choice:
     """One choice of a run.
 
     Attributes:
-        where: What was chosen at: a state's path, a server, or "turn".
-        options: What there was to choose from; the first is the usual one.
-        picked: Index of what was chosen.
-        situation: Equal in two runs when all that can follow is equal; None: never.
+        where: The place of the choice: a state's path, a server, or "turn".
+        options: The options; the first is the usual one.
+        picked: Index of the option that was picked.
+        situation: Equal in two runs if everything that can follow is equal; None: never equal.
     """
 
     where: str
@@ -31,16 +31,16 @@ class Choice:
 
 
 class Search:
-    """Which runs to try next: each is given the choices it begins with, the rest is as usual.
+    """Decides which runs come next; each gets its first choices, the others are the usual ones.
 
-    Runs come in the order of the number of their unusual choices, so the first run that fails is
-    among the simplest that do.
+    Runs are ordered by the number of their unusual choices, so the first run that fails is among
+    the simplest that do.
 
     Args:
-        depth: Choices after the `depth`-th of a run are not varied.
+        depth: Choices of a run after this many are not varied.
 
     Attributes:
-        is_cut: There were choices after the `depth`-th.
+        is_cut: Whether there were choices after `depth`.
     """
 
     def __init__(self, depth: float) -> None:
@@ -50,22 +50,24 @@ class Search:
         self.is_cut = False
 
     def next(self) -> tuple[int, ...] | None:
-        """Return the choices that the next run begins with; None when all were tried."""
+        """Return the first choices of the next run; None if all were tried."""
         return self._waiting.popleft() if self._waiting else None
 
     def add(self, prefix: tuple[int, ...], choices: list[Choice]) -> None:
-        """Queue the runs that choose otherwise than one that has ended.
+        """Queue the runs that differ from a finished one by one more choice.
 
         Args:
-            prefix: The choices that `next` gave for it.
+            prefix: The choices that `next` returned for it.
             choices: All its choices, in order.
         """
+        # Only choices after the prefix: those within it were varied when shorter runs were added,
+        # so no sequence is queued twice.
         picks = tuple(choice.picked for choice in choices)
         for number in range(len(prefix), len(choices)):
             choice = choices[number]
             if choice.situation is not None:
                 if choice.situation in self._seen:
-                    return  # another run went on from here in the same way
+                    return  # another run has continued from an equal situation
                 self._seen.add(choice.situation)
             if number >= self._depth:
                 self.is_cut = True

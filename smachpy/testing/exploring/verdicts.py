@@ -1,4 +1,4 @@
-"""What is wrong with an explored run."""
+"""Judges explored runs."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 class Verdict(NamedTuple):
-    """What is wrong with a run.
+    """A fault of a run.
 
     Attributes:
-        kind: Equal for two runs that are wrong in the same way.
-        reason: It, in words.
+        kind: Equal for two runs with the same kind of fault.
+        reason: The fault in words.
     """
 
     kind: tuple[str, ...]
@@ -36,14 +36,14 @@ def judge(
     grace: float,
     invariants: Iterable[Callable[[Run], object]],
 ) -> Verdict | None:
-    """Return what is wrong with a run, None if nothing is.
+    """Return the fault of a run; None if it has none.
 
     Args:
         run: The run.
-        error: What it raised.
-        explorer: What chose in it.
+        error: The exception it raised, if any.
+        explorer: The explorer that made its choices.
         grace: Longest time from a preempt to the end [s].
-        invariants: What must hold; called with the run.
+        invariants: Functions of the run that must hold.
     """
     if isinstance(error, Deadlock | TimeLimitError) or explorer.too_long:
         return Verdict(("ends",), f"it never ends{f': {error}' if error is not None else ''}")
@@ -61,7 +61,7 @@ def judge(
 
 
 def _slow_preempt(run: Run, explorer: Explorer, grace: float) -> str:
-    """Return how a preempt took too long; "" if none did."""
+    """Return in words how a preempt took too long; "" if none did."""
     asked = [
         e.t for e in run.events if isinstance(e, PreemptRequested) and e.path == run.record.path
     ]
@@ -69,6 +69,7 @@ def _slow_preempt(run: Run, explorer: Explorer, grace: float) -> str:
     if not asked or not ended:
         return ""
     left = [event.path for event in run.events if isinstance(event, Abandoned)]
+    # Leaves that ran on only to outlast others are no delay of the mission itself.
     took = ended[-1] - asked[0] - explorer.outlasted_s(asked[0])
     if not left and took <= grace:
         return ""
@@ -77,7 +78,7 @@ def _slow_preempt(run: Run, explorer: Explorer, grace: float) -> str:
 
 
 def _broken(run: Run, invariants: Iterable[Callable[[Run], object]]) -> Verdict | None:
-    """Return the first invariant that does not hold; what returns None is one that asserts."""
+    """Return the first invariant that does not hold; one that returns None uses asserts."""
     for number, invariant in enumerate(invariants):
         name = getattr(invariant, "__name__", repr(invariant))
         kind = ("invariant", str(number))
@@ -86,7 +87,7 @@ def _broken(run: Run, invariants: Iterable[Callable[[Run], object]]) -> Verdict 
             holds = answer is None or bool(answer)
         except AssertionError as error:
             return Verdict(kind, f"invariant {name}: {error}")
-        except Exception as error:  # noqa: BLE001  an invariant that cannot be told does not hold
+        except Exception as error:  # noqa: BLE001  an invariant that cannot be evaluated does not hold
             raised = type(error).__name__
             return Verdict((*kind, raised), f"invariant {name} raised {raised}: {error}")
         if not holds:
@@ -102,7 +103,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _way_out(causes: Iterable[BaseException], run: Run, explorer: Explorer) -> str:
-    """Return what to try when a value is missing that the state itself would have written."""
+    """Return advice for a missing value that the replaced state would have written."""
     keys = [
         cause.key
         for cause in causes

@@ -383,7 +383,7 @@ def test_the_help_of_the_alias_is_short(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["test", "--help"])
     assert ended.value.code == 0
-    assert "All words go to pytest" in capsys.readouterr().out
+    assert "All words are passed to pytest" in capsys.readouterr().out
 
 
 def test_loading_the_plugin_loads_neither_network_nor_numbers():
