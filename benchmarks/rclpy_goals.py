@@ -1,7 +1,7 @@
 """Goals from rclpy to rclpy over Fast DDS: `ros2_actions.py` runs this with rclpy's own Python.
 
-rclpy_goals.py serve              until standard input ends
-rclpy_goals.py client             measures as many goals as each line of standard input says [s]
+rclpy_goals.py serve       until standard input ends
+rclpy_goals.py client      measures as many goals as each line of standard input says [s]
 """
 
 from __future__ import annotations
@@ -45,27 +45,19 @@ def end_with_input() -> None:
 
 
 def client() -> None:
-    """Send one goal after the other; an executor in a thread of its own calls back."""
+    """Send one goal after the other."""
     node = rclpy.create_node("client")
     goals = ActionClient(node, Fibonacci, "instant")
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     assert goals.wait_for_server(20.0)
 
-    threading.Thread(target=executor.spin, daemon=True).start()
-
     def goal() -> None:
-        done = threading.Event()
-
-        def taken(f):
-            f.result().get_result_async().add_done_callback(ended)
-
-        def ended(f):
-            assert list(f.result().result.sequence) == [7]
-            done.set()
-
-        goals.send_goal_async(Fibonacci.Goal(order=1)).add_done_callback(taken)
-        assert done.wait(10.0)
+        sent = goals.send_goal_async(Fibonacci.Goal(order=1))
+        executor.spin_until_future_complete(sent, 10.0)
+        ended = sent.result().get_result_async()
+        executor.spin_until_future_complete(ended, 10.0)
+        assert list(ended.result().result.sequence) == [7]
 
     def measure(count: int) -> list[float]:
         times = []
@@ -79,8 +71,6 @@ def client() -> None:
     print("ready", flush=True)
     for line in sys.stdin:
         print(json.dumps(measure(int(line))), flush=True)
-    goals.destroy()
-    node.destroy_node()
     rclpy.shutdown()
 
 

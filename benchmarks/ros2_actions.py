@@ -7,7 +7,8 @@ answered (send_goal), and from its callback a second one (get_result), with payl
 of the same sizes, in two processes of its own. Lists of statuses go out beside that, one in 20 ms
 at most, and nobody waits for them. `own` is a goal on our own wire between the same processes.
 `rclpy` is one from rclpy to rclpy over Fast DDS in two processes of theirs, where `.ci/rclpy` has
-installed it. All exchanges take turns, so that a busy computer slows each; look at the ratios.
+installed it; its client waits with `spin_until_future_complete`, as Nav2's simple commander does.
+All exchanges take turns, so that a busy computer slows each; look at the ratios.
 `killed` is how long after SIGKILL of its server a goal is LOST.
 """
 
@@ -160,10 +161,9 @@ def start_rclpy(stack: ExitStack) -> _Process:
         "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
         "ROS_LOG_DIR": stack.enter_context(tempfile.TemporaryDirectory()),
     }
-    return [
-        stack.enter_context(_Process(mode, command=(str(RCLPY), program), env=environment))
-        for mode in ("serve", "client")
-    ][1]
+    command = (str(RCLPY), program)
+    stack.enter_context(_Process("serve", command=command, env=environment))
+    return stack.enter_context(_Process("client", command=command, env=environment))
 
 
 def kill() -> float:
