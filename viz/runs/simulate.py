@@ -119,7 +119,7 @@ class Task:
     Attributes:
         mission: What `smachpy run` takes: a name, a file, module:factory.
         number: Of the run, from 1.
-        seed: Of the order in which things of the same instant happen.
+        seed: Of the order of events at the same instant, and of Python's `random`.
         values: By key.
         file: Where it is recorded.
         limit: Virtual time that it may take [s]; it is preempted then.
@@ -339,6 +339,8 @@ def run_one(task: Task) -> Result:
             if not task.file.parent.is_dir():  # another computer
                 folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="smachpy-run-"))
                 here = replace(task, file=Path(folder) / task.file.name)
+            stack.callback(random.setstate, random.getstate())  # of a program that runs it here
+            random.seed(task.seed)
             outcome, error = _execute(here)
             recording = b"" if here is task else here.file.read_bytes()
             return Result(task, outcome, error, recording)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import re
 import select
 import signal
@@ -92,6 +93,35 @@ def test_the_same_seed_makes_the_same_runs(job, tmp_path):
 
     assert values(1) == values(1) != values(2)
     assert [value["name"] for _, value in values(1)] == ["a", "b", "a", "b", "a"]
+
+
+def test_a_mission_draws_the_same_random_numbers_with_the_same_seed(tmp_path):
+    dice = tmp_path / "dice.py"
+    dice.write_text("""
+import random
+import smachpy
+
+@smachpy.state(outcomes=[str(i) for i in range(1000)])
+def draw(userdata):
+    return str(random.randrange(1000))
+
+def mission():
+    sm = smachpy.StateMachine(outcomes=[str(i) for i in range(1000)], name="DICE")
+    sm.add("DRAW", draw)
+    return sm
+""")
+    before = random.getstate()
+
+    def draw(seed, folder):
+        (tmp_path / folder).mkdir()
+        runs = simulate(Plan(str(dice), 3, tmp_path / folder, [], seed), Here())
+        return [run.outcome for run in runs]
+
+    drawn = draw(1, "a")
+    assert drawn == draw(1, "b") != draw(2, "c")
+    assert None not in drawn
+    assert len(set(drawn)) > 1
+    assert random.getstate() == before
 
 
 def test_whole_numbers_stay_whole_and_meet_both_ends():
