@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from dataclasses import dataclass, field
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smachpy.events.run_state import RAISED
-from smachpy.outcome_classes import outcome_class
+from viz.model.labels import end_class
 from viz.pictures.drawing import picture
 from viz.pictures.theme import LIGHT
 from viz.runs import charts
@@ -173,7 +175,7 @@ def _states(runs: Runs) -> str:
             low, high = min(one.durations), max(one.durations)
             span = f"{low:.1f} to {high:.1f} s"
             bars = f'{charts.histogram(one.durations, low, high)} <span class="muted">{span}</span>'
-        told = ", ".join(f"{_coloured(o)} \u00d7{n}" for o, n in one.outcomes.items())
+        told = ", ".join(f"{_coloured(o, one.kind)} \u00d7{n}" for o, n in one.outcomes.items())
         cells = [escape(state.path), str(one.visits), *_times(one.durations)]
         rows.append([*cells, f"{one.failures():.0%}", bars, told])
     head = ["state", "visits", "median", "95 %", "failed", "durations", "outcomes"]
@@ -192,10 +194,13 @@ def _differences(before: Runs, runs: Runs) -> str:
 
 def _files(runs: Runs, values: Mapping[str, Mapping[str, object]]) -> str:
     rows = []
-    for file, outcome, seconds in runs.files:
+    places = [Path(file).absolute() for file, _, _ in runs.files]
+    common = os.path.commonpath([place.parent for place in places]) if places else ""
+    for place, (file, outcome, seconds) in zip(places, runs.files, strict=True):
+        name = str(place.relative_to(common))
         chosen = ", ".join(f"{key} {_short(v)}" for key, v in values.get(file, {}).items())
         took = "" if seconds is None else f"{seconds:.1f} s"
-        rows.append([escape(file), _coloured(outcome), took, escape(chosen)])
+        rows.append([escape(name), _coloured(outcome), took, escape(chosen)])
     return _table(["file", "outcome", "time", *(["values"] if values else [])], rows)
 
 
@@ -208,8 +213,8 @@ def _times(durations: list[float]) -> list[str]:
     return ["" if value is None else f"{value:.2f} s" for value in found]
 
 
-def _coloured(outcome: str) -> str:
-    return f'<span class="{outcome_class(outcome)}">{escape(outcome)}</span>'
+def _coloured(outcome: str, kind: str = "") -> str:
+    return f'<span class="{end_class(kind, outcome)}">{escape(outcome)}</span>'
 
 
 NUMBERS = {"runs", "share", "median", "95 %", "visits", "failed", "time"}

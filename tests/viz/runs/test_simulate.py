@@ -19,8 +19,10 @@ import pytest
 from smachpy.command import main
 from smachpy.events.recording import each_recording
 from smachpy.exceptions import MissionError, SmachError
-from viz.runs.report import by_quarter, collect, report
+from smachpy.introspection import StateRecord
+from viz.runs.report import Runs, by_quarter, collect, report
 from viz.runs.simulate import Plan, Vary, simulate
+from viz.runs.statistics import StateStatistics
 
 MISSION = """
 import smachpy
@@ -209,6 +211,22 @@ def test_the_report_shows_all_and_runs_nothing(job, tmp_path):
     assert "<b>x" not in page
     for chart in re.findall(r'<svg class="chart".*?</svg>', page, re.DOTALL):
         ET.fromstring(chart)
+    for result in results:
+        assert f"<td >{result.task.file.name}</td>" in page
+    assert str(tmp_path) not in page
+
+
+def test_the_report_shows_what_a_monitor_finds_as_no_failure():
+    record = StateRecord("/JOB", "JOB", "machine", "StateMachine", ("invalid",), children=(
+        StateRecord("/JOB/WATCH", "WATCH", "monitor", "MonitorState", ("invalid",)),
+        StateRecord("/JOB/TRY", "TRY", "state", "State", ("invalid",)),
+    ))  # fmt: skip
+    runs = Runs(record)
+    for path, kind in (("/JOB/WATCH", "monitor"), ("/JOB/TRY", "state")):
+        runs.statistics.states[path] = StateStatistics(1, [1.0], {"invalid": 1}, kind=kind)
+    page = report(runs)
+    assert page.count('<span class="other">invalid</span>') == 1
+    assert page.count('<span class="failure">invalid</span>') == 1
 
 
 @pytest.mark.slow
