@@ -321,7 +321,7 @@ class ActionClientPort:
         self._declared = [
             transport.subscribe(keys.status, self._on_status, history=False),
             transport.subscribe(keys.feedback, self._on_feedback_sample, history=False),
-            transport.subscribe(keys.result, self._on_result_sample, history=False),
+            transport.subscribe(keys.result, self.take_result, history=False),
             transport.declare_alive(token_key(self.endpoint)),
             transport.watch_alive(token_pattern(Kind.ACTION_SERVER, self._name), self._on_presence),
         ]
@@ -389,10 +389,6 @@ class ActionClientPort:
         if sample.source not in self._direct:
             self._feedback.take(sample)
 
-    def _on_result_sample(self, sample: Sample) -> None:
-        if sample.source not in self._direct:
-            self.take_result(sample)
-
     # Feedback may wait in `_feedback` for the rest of a burst. To keep the order of messages, it is
     # handed on before any status, result or end of a server.
 
@@ -427,7 +423,9 @@ class ActionClientPort:
             else:
                 self._listener.on_feedback(entry, sample.payload[start:], sample.source)
 
-    def take_result(self, sample: Sample) -> None:
+    def take_result(self, sample: Sample, *, direct: bool = False) -> None:
+        if not direct and sample.source in self._direct:
+            return  # the copy of a message that came directly
         if self._feedback.waiting or self._feedback.lock.locked():
             self._feedback.flush()
         if sample.encoding != self._encodings[1] and not self._readable.check(

@@ -19,8 +19,8 @@ class ClientInProcess(Protocol):
     def take_feedback(self, sample: Sample, /) -> None:
         """Take feedback; must not wait."""
 
-    def take_result(self, sample: Sample, /) -> None:
-        """Take a result; must not wait."""
+    def take_result(self, sample: Sample, /, *, direct: bool) -> None:
+        """Take a result, `direct` if it did not come over the network; must not wait."""
 
 
 class ServerInProcess(Protocol):

@@ -414,7 +414,7 @@ class _Shown:
         if self._clients:
             sample = self._sample("result", payload)
             for client in list(self._clients):
-                client.take_result(sample)
+                client.take_result(sample, direct=True)
         self._result.put(payload)
 
     def _sample(self, word: str, payload: bytes) -> Sample:
