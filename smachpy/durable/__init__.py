@@ -1,1 +1,1 @@
-"""Missions that survive their process: journals, what they keep, and runners that share them."""
+"""Durable missions: journals, the values that they keep, and runners that share a store."""

@@ -1,9 +1,9 @@
-"""Values as JSON that can be read back as they were: what a journal keeps of userdata.
+"""Userdata values as JSON for the journal, and back without loss.
 
-Reading builds data only. A class is looked up among those that were registered, never by importing
-what a name says, so that a journal from elsewhere runs no code that the mission does not name.
+Decoding only builds data. Classes are looked up among the registered ones and never imported by
+name, so a journal from elsewhere cannot run code that the mission does not use.
 
-What JSON does not have is an object whose one key, or the first of two, begins with `$`:
+Values that JSON lacks are objects whose first key begins with `$`:
 
     {"$tuple": [...]}  {"$set": [...]}  {"$frozenset": [...]}  {"$items": [[key, value], ...]}
     {"$bytes": "base64"}  {"$bytearray": "base64"}  {"$float": "nan" | "inf" | "-inf"}
@@ -27,7 +27,7 @@ import math
 import sys
 from datetime import date, datetime, time, timedelta, timezone
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from actionlib_core.exceptions import ActionlibError
@@ -49,7 +49,6 @@ from smachpy.userdata.readonly import writable
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-C = TypeVar("C", bound=type)
 
 _DEEPEST: Final = 100
 
@@ -59,9 +58,9 @@ class NotDurableError(InvalidUserCodeError, TypeError):
 
     Attributes:
         key: The userdata key.
-        place: Where in its value: ".route[3].socket", or "".
-        kind: The type of what cannot be kept.
-        reason: Why.
+        place: The place in its value, ".route[3].socket", or "" for the value itself.
+        kind: The type of the value at that place.
+        reason: Why it cannot be kept.
     """
 
     def __init__(
@@ -75,7 +74,7 @@ class NotDurableError(InvalidUserCodeError, TypeError):
         super().__init__(
             f"{where}userdata key {key!r}: got {kind.__module__}.{kind.__qualname__}"
             f"{f' at {place}' if place else ''}, which a journal cannot keep: {reason}; expected "
-            f"{way_out}, or transient=[{key!r}] when it need not survive.",
+            f"{way_out}, or transient=[{key!r}] if it does not have to survive.",
             path=path,
         )
 
@@ -84,8 +83,8 @@ class JournalValueError(MissionError, ValueError):
     """A value in a journal cannot be read back.
 
     Attributes:
-        place: Where it is: "$.route[3]".
-        reason: Why.
+        place: Its place in the encoded value, "$.route[3]".
+        reason: Why it cannot be read.
     """
 
     def __init__(self, place: str, reason: str) -> None:
@@ -95,17 +94,17 @@ class JournalValueError(MissionError, ValueError):
 
 
 def encode(value: Any, *, key: str = "", path: str = "") -> Any:
-    """Return what `json` can write in place of a value.
+    """Return a value in a form that `json` can write.
 
-    The result shares nothing with `value` that can change.
+    The result shares no mutable object with `value`.
 
     Args:
-        value: A userdata value; read-only views are kept as what they show.
+        value: A userdata value; of a read-only view, the value behind it is kept.
         key: Its key, for errors.
         path: The path of the state that sets it, for errors.
 
     Raises:
-        NotDurableError: it, or something in it, cannot be kept.
+        NotDurableError: the value, or something in it, cannot be kept.
     """
     try:
         return _encode(value, "", 0)
@@ -120,7 +119,7 @@ def decode(data: Any) -> Any:
     """Rebuild the value of an `encode` result.
 
     Raises:
-        JournalValueError: it names a class that is not registered, or does not fit.
+        JournalValueError: it names a class that is not registered, or the data do not fit.
     """
     try:
         return _decode(data, "$")
@@ -137,13 +136,17 @@ class _Refused(Exception):  # noqa: N818  never leaves this module
 _ATOMS: Final = frozenset({type(None), bool, int, str})
 _NUMBERS: Final = _ATOMS | {float}
 _LARGEST: Final = 2**4096
-"""`json` refuses integers of more than 4300 digits (`sys.set_int_max_str_digits`)."""
+"""Larger integers are kept as hexadecimal text: CPython refuses to convert integers of more than
+4300 decimal digits (`sys.set_int_max_str_digits`), hexadecimal ones have no limit.
+"""
 
 
 def _encode(value: Any, place: str, depth: int) -> Any:
+    # The exact type, not `isinstance`: a subclass of str or int would come back as a plain one.
     kind = type(value)
     if kind in _ATOMS and (kind is not int or -_LARGEST < value < _LARGEST):
         return value
+    # A value that contains itself would end in a RecursionError far away from its place.
     if depth > _DEEPEST:
         reason = "it is nested too deeply"
         raise _Refused(f"{place[:60]}...", kind, reason, "one that does not contain itself")
@@ -163,7 +166,7 @@ def _encode(value: Any, place: str, depth: int) -> Any:
 
 
 def _why_not(kind: type) -> tuple[str, str]:
-    """Return the reason and the way out."""
+    """Return the reason, and what to use instead."""
     name = kind.__qualname__
     same_name = REGISTERED.get(name_of(kind))
     if "<locals>" in name:
@@ -180,12 +183,14 @@ def _why_not(kind: type) -> tuple[str, str]:
 
 
 def _encode_list(value: list[Any], place: str, depth: int) -> Any:
-    if _NUMBERS.issuperset(map(type, value)):  # quickly what is long: scans, paths
+    # Long lists, such as laser scans, hold only numbers: no text for the place of each item.
+    if _NUMBERS.issuperset(map(type, value)):
         return [_encode(item, place, depth) for item in value]
     return [_encode(item, f"{place}[{i}]", depth + 1) for i, item in enumerate(value)]
 
 
 def _encode_dict(value: dict[Any, Any], place: str, depth: int) -> Any:
+    # Other keys, and texts that look like one of the marks above, are kept as pairs.
     if all(type(key) is str and not key.startswith("$") for key in value):
         return {key: _encode(item, f"{place}.{key}", depth + 1) for key, item in value.items()}
     items = value.items()
@@ -202,7 +207,8 @@ def _encode_dict(value: dict[Any, Any], place: str, depth: int) -> Any:
 def _sequence(mark: str) -> Callable[[Any, str, int], Any]:
     def encode_sequence(value: Iterable[Any], place: str, depth: int) -> Any:
         items = [_encode(item, f"{place}[{i}]", depth + 1) for i, item in enumerate(value)]
-        if mark != "$tuple":  # a set has no order: give it one, so that equal ones look equal
+        # The recorder compares texts to find changed values; equal sets must give equal texts.
+        if mark != "$tuple":
             items.sort(key=lambda item: json.dumps(item, sort_keys=True))
         return {mark: items}
 
@@ -219,7 +225,7 @@ def _encode_datetime(value: datetime, place: str, _: int) -> Any:
             "fold": value.fold,
             "zone": zone.key,
         }
-    raise _Refused(f"{place}.tzinfo", type(zone), "its rules are not known by a name", "a ZoneInfo")
+    raise _Refused(f"{place}.tzinfo", type(zone), "its rules have no name", "a ZoneInfo")
 
 
 def _encode_time(value: time, place: str, _: int) -> Any:
@@ -234,7 +240,7 @@ def _base64(value: Any) -> str:
 
 
 _ENCODERS: Final[dict[type, Callable[[Any, str, int], Any]]] = {
-    int: lambda value, *_: {"$int": hex(value)},  # a large one
+    int: lambda value, *_: {"$int": hex(value)},  # only larger than `_LARGEST`
     float: lambda value, *_: value if math.isfinite(value) else {"$float": str(value)},
     list: _encode_list,
     dict: _encode_dict,
@@ -268,7 +274,8 @@ def _encode_registered(value: Any, registered: RegisteredType, place: str, depth
     if isinstance(value, enum.Enum):
         if value.name in kind.__members__:  # type: ignore[attr-defined]  # an enum has them
             return {"$enum": name, "name": value.name}
-        return {"$enum": name, "value": _encode(value.value, f"{place}.value", depth + 1)}  # flags
+        # A combination of flags (`enum.Flag`) has no name of its own.
+        return {"$enum": name, "value": _encode(value.value, f"{place}.value", depth + 1)}
     if isinstance(value, tuple):
         names: Iterable[str] = value._fields  # type: ignore[attr-defined]
     else:
@@ -286,7 +293,7 @@ def _encode_registered(value: Any, registered: RegisteredType, place: str, depth
 
 
 def _encode_message(value: Any, place: str, depth: int) -> Any:
-    """Return a message's fields as they are, which need not be those that go over the wire."""
+    """Return the fields of a message without converting or checking them as for sending."""
     kind = type(value)
     wire = getattr(kind, "_wire", None)
     if wire is None or not hasattr(kind, "_slot_types"):
@@ -301,7 +308,7 @@ def _encode_message(value: Any, place: str, depth: int) -> Any:
 
 
 def _encode_numpy(value: Any, place: str) -> Any:
-    numpy = sys.modules.get("numpy")  # who has an array has imported it
+    numpy = sys.modules.get("numpy")  # NumPy is optional; without it there are no arrays
     if numpy is None:
         return None
     kind = type(value)
@@ -340,7 +347,8 @@ def _decode(data: Any, place: str) -> Any:
         binascii.Error,
         ActionlibError,
     ) as error:
-        raise JournalValueError(place, f"got {mark!r} that does not fit: {error!r}.") from error
+        reason = f"got {mark!r} with unusable data: {error!r}."
+        raise JournalValueError(place, reason) from error
 
 
 def _list(data: Any, place: str) -> list[Any]:
@@ -387,7 +395,8 @@ def _decode_fields(data: dict[str, Any], place: str) -> Any:
     if is_named_tuple(kind):
         return kind(**values)
     if not dataclasses.is_dataclass(kind):
-        raise JournalValueError(place, f"got fields of {data['$type']}; expected no dataclass.")
+        reason = f"got fields of {data['$type']}, which has none; expected a dataclass."
+        raise JournalValueError(place, reason)
     known = {field.name: field.init for field in dataclasses.fields(kind)}
     unknown = sorted(values.keys() - known.keys())
     if unknown:
@@ -395,7 +404,7 @@ def _decode_fields(data: dict[str, Any], place: str) -> Any:
         raise JournalValueError(place, reason)
     result = kind(**{name: value for name, value in values.items() if known[name]})
     for name, value in values.items():
-        # __post_init__ may have changed fields: a value is restored as it was kept.
+        # `__post_init__` may have changed fields again; `object` also writes to frozen classes.
         object.__setattr__(result, name, value)
     return result
 
@@ -446,8 +455,9 @@ def _decode_array(data: dict[str, Any], place: str) -> Any:
     if "$scalar" in data:
         return np.frombuffer(_bytes(data["$scalar"]), dtype)[0]
     shape = tuple(data["shape"])
-    if dtype.itemsize == 0 or 0 in shape:
+    if dtype.itemsize == 0 or 0 in shape:  # `frombuffer` refuses items of size 0
         return np.zeros(shape, dtype)
+    # A copy, as an array over `bytes` cannot be written to.
     return np.frombuffer(_bytes(data["$array"]), dtype).reshape(shape).copy()
 
 

@@ -1,7 +1,7 @@
-"""The journal of one run: entries are folded into the position, then written before anybody acts.
+"""The journal of one run: each entry is folded into the position and written before its effect.
 
-Branches of a concurrence that write at the same time share a transaction: whoever comes first
-writes what the others have brought meanwhile (group commit).
+Branches of a concurrence that write at the same time share a transaction: the first one also writes
+the entries that the others have queued meanwhile (group commit).
 """
 
 from __future__ import annotations
@@ -17,17 +17,19 @@ if TYPE_CHECKING:
     from smachpy.durable.store import Lease, Store
 
 SNAPSHOT_EVERY: Final = 1000
-"""Entries between two snapshots: as many at most are read when a run goes on."""
+"""Entries between two snapshots, and so the most that are read when a run is resumed."""
 
 
 def read_position(store: Store, mission: str) -> Position:
-    """Return where a mission's journal stands.
+    """Return the position that a mission's journal leads to.
 
     Raises:
-        StoreError: the journal cannot be read, or its entries are of a newer smachpy.
-        UnknownMissionError: the store has none of this id.
+        StoreError: the journal cannot be read, or a newer smachpy wrote it.
+        UnknownMissionError: the store has no mission of this id.
     """
-    version = store.mission(mission).version  # of entries that no snapshot has replaced
+    # Entries carry no version. The row has that of the code that began the mission, the snapshot
+    # that of the code that wrote it.
+    version = store.mission(mission).version
     snapshot, entries = store.read(mission)
     where = f"mission {mission!r}"
     try:
@@ -53,13 +55,13 @@ class Journal:
     """Writes the entries of one run.
 
     Args:
-        store: Where to.
-        lease: The right to do so.
-        position: Where the run stands.
+        store: Keeps the entries.
+        lease: The right to write them.
+        position: The position at which the run begins or resumes.
 
     Attributes:
-        position: See above; what was put in is in it at once. Guarded by `lock`.
-        lock: Guards the position and the order of entries; held for no I/O.
+        position: The position after the newest entry, written or not. Guarded by `lock`.
+        lock: Guards the position and the order of entries; never held during I/O.
 
     Threads: every method may be called from any thread.
     """
@@ -76,14 +78,14 @@ class Journal:
         self._since_snapshot = 0
 
     def put(self, entry: dict[str, Any]) -> int:
-        """Fold an entry and queue it; return its number. Needs the lock."""
+        """Fold an entry and queue it; return its number. The caller holds the lock."""
         self.position.fold(entry)
         self._queue.append(json.dumps(entry, separators=(",", ":")).encode())
         self._put += 1
         return self._put
 
     def commit(self, number: int) -> None:
-        """Write what was put in, up to entry `number` at least.
+        """Write the queued entries, at least up to entry `number`.
 
         Raises:
             StoreError, FencedError: it cannot be written.
@@ -92,7 +94,9 @@ class Journal:
         """
         with self._writing:
             if self._written >= number:
-                return  # somebody else has written it
+                return  # another thread has written it with its own
+            # All that is queued by now. `lock` is released before the store is called, so that
+            # other threads can queue the next entries while this one waits for the disk.
             with self.lock:
                 entries, self._queue = self._queue, []
                 upto = self._put

@@ -1,4 +1,4 @@
-"""One mission with a journal: begun, or gone on with, kept, and ended."""
+"""One durable mission: starts it or resumes it, renews its lease, and releases it at the end."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from smachpy.machines.container import Container
 
 Outage = Literal["counts", "pauses"]
-Migrations = "Mapping[str, str] | Callable[[list[str]], Mapping[str, str] | None]"
+
 
 LEASE_S: Final = 15.0
-"""How long a runner that says nothing holds its mission [s]."""
+"""Time after the last renewal for which a runner holds its mission [s]."""
 
 
 class MachineChangedError(MissionError):
-    """A journal is of another machine than the one that is to go on.
+    """The machine differs from the one in the journal.
 
     Attributes:
         mission: The mission's id.
@@ -45,7 +45,7 @@ class MachineChangedError(MissionError):
         self.differences = tuple(differences)
         lines = "".join(f"\n  - {difference}" for difference in differences)
         super().__init__(
-            f"mission {mission!r}: machine: got another one than that of the journal; expected the "
+            f"mission {mission!r}: machine: got one that differs from the journal's; expected the "
             f"same.{lines}\n{way_out}"
         )
 
@@ -55,8 +55,8 @@ class OutageError(MissionError):
 
     Attributes:
         mission: The mission's id.
-        outage: How old it is [s].
-        max_outage: How old it may be [s].
+        outage: Its age [s].
+        max_outage: The greatest age allowed [s].
     """
 
     def __init__(self, mission: str, outage: float, max_outage: float) -> None:
@@ -64,9 +64,9 @@ class OutageError(MissionError):
         self.outage = outage
         self.max_outage = max_outage
         super().__init__(
-            f"mission {mission!r}: outage: got {outage:.0f} s since the journal was written last; "
-            f"expected {max_outage:g} at most: a person is to look first. Try 'smachpy missions "
-            f"resume {mission}', or 'smachpy missions forget {mission}'."
+            f"mission {mission!r}: outage: got {outage:.0f} s since the last entry of the journal; "
+            f"expected {max_outage:g} at most: a person must check the robot first. Try 'smachpy "
+            f"missions resume {mission}', or 'smachpy missions forget {mission}'."
         )
 
 
@@ -78,7 +78,7 @@ def new_mission(
     argv: tuple[str, ...] = (),
     robot: str | None = None,
 ) -> MissionRow:
-    """Return the row of a mission that has not begun; `Store.create` takes it."""
+    """Return the row of a new mission, for `Store.create`."""
     name = machine.name or "SM_ROOT"
     now = current_clock().time_ns() / 1e9
     return MissionRow(
@@ -106,23 +106,23 @@ def run_durable(
     max_outage: float | None = None,
     migrate: Any = None,
 ) -> str:
-    """Run a machine so that another process can go on with it, and return its outcome.
+    """Run a machine so that another process can resume it, and return its outcome.
 
-    A mission of this id that has begun and not ended goes on where it was; else it begins.
+    A mission of this id that has begun and not ended is resumed; otherwise a new one begins.
 
     Args:
         machine: The root, built by the same code each time.
         journal: A path, a URL of PostgreSQL, or a store.
         mission: The mission's id; None: the machine's name.
-        outage: Whether timeouts and pauses between attempts go on while no process runs the mission
-            ("counts"), or stand still ("pauses").
-        max_outage: How old the journal may be [s]; None: any age.
-        migrate: What has become of paths: old path -> new path; or a function that gets the
-            differences as texts and returns that, or None to refuse.
+        outage: Whether timeouts and pauses between attempts continue while no process runs the
+            mission ("counts"), or stop ("pauses").
+        max_outage: The greatest age of the journal [s]; None: any age.
+        migrate: New paths of states that were renamed or moved: old path -> new path; or a function
+            that gets the differences as texts and returns such a mapping, or None to refuse.
 
     Raises:
         MissionInUseError: a living process runs it.
-        MachineChangedError: the journal is of another machine, and `migrate` does not say how.
+        MachineChangedError: the machine differs from the journal's, and `migrate` does not map it.
         OutageError: the journal is older than `max_outage`.
         NotDurableError: a value of the userdata cannot be kept.
         StoreError, FencedError: the journal could not be written: the machine was preempted.
@@ -161,27 +161,31 @@ def kept_mission(
     lease_s: float = LEASE_S,
     on_fenced: Callable[[FencedError], object] | None = None,
 ) -> Iterator[Recorder]:
-    """Let the one run of `machine` within the block be kept as `mission`, which the store has.
+    """Journal the run of `machine` within the block as `mission`, which the store already has.
 
-    What is raised, and the other arguments, are those of `run_durable`. A runner that says nothing
-    for `lease_s` [s] loses the mission; with infinity nothing is renewed, and no cancel is heard
-    of. When another one has taken it over, `on_fenced` is called, in some thread, before the
-    machine is preempted: its goals are the other one's now.
+    The other arguments and the errors are those of `run_durable`. A runner that does not renew its
+    lease for `lease_s` [s] loses the mission; if that is infinite, the lease is never renewed and
+    requests to cancel are not noticed. If another runner has taken the mission over, `on_fenced` is
+    called, in any thread, before the machine is preempted: the goals belong to that runner now, and
+    must not be cancelled here.
     """
     row = store.mission(mission)
     lease = store.claim(mission, this_runner(), seconds=lease_s)
     status = QUEUED if row.status == QUEUED else INTERRUPTED
     try:
+        # Read only now that the lease is held: before, another runner could still write entries.
         position = read_position(store, mission)
-        goes_on = bool(position.visits)
+        resumed = bool(position.visits)
         shift_ns = gone_ns = 0
-        if goes_on:
+        if resumed:
+            # The outage begins with the last sign of life: an entry, or a renewal of the lease
+            # (`row.changed`), as a state may run for hours without an entry.
             now_ns, last_ns = current_clock().time_ns(), position.data["last_ns"]
             gone_ns = max(0, now_ns - max(last_ns, round(row.changed * 1e9)))
             if max_outage is not None and gone_ns > max_outage * 1e9:
                 raise OutageError(mission, gone_ns / 1e9, max_outage)
             fitted = _fitted(machine, row, position, migrate)
-            if fitted is not position:  # the entries so far have the old paths
+            if fitted is not position:  # a snapshot, as the entries so far have the old paths
                 store.append(lease, [], snapshot=fitted.to_bytes())
                 position = fitted
             shift_ns = gone_ns if outage == "pauses" else 0
@@ -191,12 +195,12 @@ def kept_mission(
             machine,
             Journal(store, lease, position),
             row=row,
-            goes_on=goes_on,
+            resumed=resumed,
             shift_ns=shift_ns,
             gone_ns=gone_ns,
         )
         recorder.on_fenced = on_fenced
-        if goes_on:
+        if resumed:
             recorder.restore()
         data = machine._smachpy
         data.journal = recorder
@@ -205,18 +209,24 @@ def kept_mission(
                 yield recorder
         finally:
             data.journal = None
-            if position.visits:  # else it has not begun, or ended
+            if position.visits:  # empty before the run begins and after it has ended
                 status = INTERRUPTED
         if recorder.broken is not None:
             raise recorder.broken
     finally:
-        with contextlib.suppress(MissionError):  # fenced, or the store is gone: said above
+        # Fails if the lease is lost or the store is unreachable. The recorder has raised that
+        # already; here it would hide the exception of the block.
+        with contextlib.suppress(MissionError):
             now = store.mission(mission).status
             store.release(lease, now if now in OVER else status)
 
 
 def _fitted(machine: Container, row: MissionRow, position: Position, migrate: Any) -> Position:
-    """Return the position as it is in `machine`."""
+    """Return the position with the paths of `machine`.
+
+    Raises:
+        MachineChangedError: the machines differ, and `migrate` does not map all active states.
+    """
     new = structure.shape_of(machine)
     try:
         old = position.data.get("structure") or structure.from_bytes(row.structure)
@@ -230,8 +240,8 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
         raise MachineChangedError(
             row.id,
             found,
-            "Try the code that the mission began with, '--migrate OLD_PATH=NEW_PATH' to say what "
-            f"has become of a state, or 'smachpy missions forget {row.id}'.",
+            "Try the code with which the mission began, '--migrate OLD_PATH=NEW_PATH' for a state "
+            f"that has another path now, or 'smachpy missions forget {row.id}'.",
         )
     unknown = sorted(path for path in names.values() if path not in new)
     if unknown:
@@ -239,13 +249,14 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
             f"mission {row.id!r}: migrate: got the paths {unknown}; expected paths of the machine, "
             f"of {sorted(new)}."
         )
+    # Other differences are accepted once paths are mapped, but what was active must still exist.
     moved = position.renamed(names)
     missing = structure.missing_paths(moved.visits, new)
     missing += structure.missing_places(moved.markings, new)
     if missing:
         raise MachineChangedError(
             row.id,
-            [f"{each}: was active and is no more" for each in missing],
+            [f"{each}: was active and is missing" for each in missing],
             "Try '--migrate OLD_PATH=NEW_PATH' for each of them.",
         )
     moved.data["structure"] = new
@@ -262,7 +273,7 @@ def _renewing(
     *,
     asked: bool,
 ) -> Iterator[None]:
-    """Renew the lease, and hear of a wish to cancel, while the block runs."""
+    """Renew the lease while the block runs, and preempt the machine if a cancel is requested."""
     clock = current_clock()
     over = clock.event(f"the end of mission {lease.mission}")
 
@@ -271,18 +282,19 @@ def _renewing(
             request_soon(machine)
 
     def renew() -> None:
-        told = False
+        cancelled = False
+        # Three renewals per lease: one or two may be late before another runner takes over.
         while not over.wait(lease_s / 3):
             try:
                 wanted = store.renew(lease, seconds=lease_s)
             except MissionError as error:
                 recorder.stop(error)
                 return
-            if wanted and not told:
-                told = True
+            if wanted and not cancelled:
+                cancelled = True
                 cancel()
 
-    if asked:
+    if asked:  # cancelled while no process ran the mission
         cancel()
     if math.isinf(lease_s):
         yield

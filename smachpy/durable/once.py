@@ -1,4 +1,4 @@
-"""`once`: what a state does to the world is not done twice because its process ended."""
+"""`once`: a side effect of a state is not repeated when the state is executed again."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ R = TypeVar("R")
 
 
 def once(key: str, call: Callable[[], R]) -> R:
-    """Return what `call` returns, from the journal if it has returned in this visit before.
+    """Call `call` once in this visit of the state, and return its result from the journal later.
 
-    In a durable run the result is kept before this returns: a state that is executed again, by
-    another process or by `retry`, gets it without a second call. The next visit of the state calls
-    anew. If the process ends after `call` has returned and before its result is kept, it is called
-    again. Outside a durable run it is called each time.
+    In a durable run the result is in the journal before this function returns: a state that is
+    executed again, by another process or by `retry`, gets it without a second call. The next visit
+    of the state calls again. If the process ends after `call` has returned and before its result is
+    in the journal, it is called again. Outside a durable run it is called each time.
 
     Args:
-        key: What to call it; within one visit of a state.
-        call: Does it; a plain function.
+        key: A name for the call, unique within one visit of the state.
+        call: A plain function without arguments.
 
     Returns:
-        Its result, which must be a value that can be kept.
+        The result of `call`, which must be a value that a journal can keep.
 
     Raises:
-        InvalidStateError: `key` is no text, or `call` a coroutine function.
+        InvalidStateError: `key` is not a text, or `call` is a coroutine function.
         NotDurableError: the result cannot be kept; `call` was called.
-        Exception: what `call` raised; nothing is kept then.
+        Exception: any that `call` raised; nothing is kept then.
 
-    Blocks: as long as `call`, and for the journal.
+    Blocks: during `call`, and until the journal is written.
     """
     if not isinstance(key, str) or not key:
         raise InvalidStateError(f"once: key: got {key!r}; expected a text that is not empty.")

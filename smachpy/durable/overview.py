@@ -1,4 +1,4 @@
-"""What a store knows of its missions, for those who look: lists, and viewers."""
+"""A summary of each mission in a store, for lists and viewers."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
 
 
 def overview(store: Store, row: MissionRow) -> dict[str, Any]:
-    """Return what there is to show of a mission, as plain data.
+    """Return the summary of a mission, as plain data.
 
     Returns:
         `id`, `name`, `target`, `argv`, `status`, `outcome`, `robot`, `created` and `changed` [s
-        since the epoch] and `owner` of its row; `run`, which its recordings carry as well;
-        `active`, the paths of the innermost states that were begun and have not ended;
-        `began_ns` and `last_ns`, when it began and was written last, null before; `outages`, pairs
-        [ns since the epoch]; `ends`, path, begin, end and outcome of the root's newest children
-        that ended; `current`, path and begin of those that have not; `rows`, the root's children if
-        they run side by side, else null; `problem`, why its journal cannot be read, a
-        `smachpy.durable.store.Reason`, or "".
+        since the epoch] and `owner` of its row; `run`, the name of the run, as in its recordings;
+        `active`, the paths of the innermost states that have begun and not ended; `began_ns` and
+        `last_ns`, the times of the first and the newest entry, null before the first; `outages`,
+        pairs [ns since the epoch]; `ends`, path, begin, end and outcome of the newest children of
+        the root that have ended; `current`, path and begin of those that are running; `rows`, the
+        children of the root if they run at the same time, else null; `problem`, why its journal
+        cannot be read, a `smachpy.durable.store.Reason`, or "".
 
-    Blocks: for the store.
+    Blocks: until the store has answered.
     """
     names = "id name target argv status outcome robot created changed owner"
     facts = {name: getattr(row, name) for name in names.split()}
@@ -46,7 +46,8 @@ def overview(store: Store, row: MissionRow) -> dict[str, Any]:
     facts.update(begun, active=position.leaves(), outages=data["outages"])
     return {
         **facts,
-        "ends": data.get("ends", []),  # older journals have neither these nor `entered_ns`
+        # Journals of earlier versions have neither `ends` nor `entered_ns`.
+        "ends": data.get("ends", []),
         "current": [
             [path, visit.get("entered_ns", visit["since_ns"])]
             for path, visit in position.visits.items()

@@ -1,26 +1,26 @@
-"""Where a run stands, folded from the entries of its journal; no threads, time or files here.
+"""The position of a run, folded from the entries of its journal; no threads, time or files here.
 
-An entry is a dict. Its `kind`, `path` and `stamp_ns` are those of the event that it stands for
-(`smachpy.events`), so that whatever shows recorded events shows a journal; what is needed to go on
-is beside them:
+An entry is a dict. Its `kind`, `path` and `stamp_ns` are those of the corresponding event
+(`smachpy.events`), so tools for recorded events can show a journal. The other keys are needed to
+resume:
 
-    Started, Entered   a visit begins; `in`: path of the container; `beside`: its other children run
-                       on; `number`: the iterator's item
-    Left               it has ended with `outcome`; `next`: path of the child that has been chosen
+    Started, Entered   a visit begins; `in`: path of the container; `beside`: the other children
+                       keep running; `number`: the index of the iterator's item
+    Left               a visit has ended with `outcome`; `next`: path of the child that follows
     Retried            attempt `attempt` has ended; the next begins at `at_ns`
     GoalSent, GoalTaken, GoalDone    a goal is about to be sent, is at a server, has ended
     Once               a call has returned `value` for `key`
     Fired              `transitions` of the plan at `path` have fired: its tokens are in `marking`,
-                       the actions at the paths `ends` have to stop, those at `begins` begin
-    Noted              only what stands beside it
+                       the actions at the paths `ends` must stop, those at `begins` begin
+    Noted              nothing but changes, see below
     PreemptRequested   `source`, `by` and `why` asked the container at `path` to stop; with
-                       `override` an operator asked the child there, and wants that outcome or that
-                       label (a pair) next, or neither (None)
-    Recovered          another process goes on; `shift_ns`: how far deadlines have moved;
-                       `gone_ns`: how long none did
+                       `override` an operator asked the child there; it is a pair of the outcome or
+                       the label that comes next, or None
+    Recovered          another process resumes; `shift_ns`: how far deadlines have moved; `gone_ns`:
+                       the length of the outage
     Finished           the run has ended with `outcome`
 
-Any of them may hold what has changed since the entry before: `userdata` (path of a container -> key
+Any of them may also have the changes since the entry before: `userdata` (path of a container -> key
 -> encoded value), `deleted` (path -> keys), and `conditions` (path of a plan -> `set`: name ->
 truth, `events`: pairs [name, stamp] that no guard has read).
 """
@@ -34,36 +34,42 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 VERSION: Final = 1
-"""Of entries and snapshots."""
+"""Version of the format of entries and snapshots."""
 
 MOST_ENDS: Final = 80
-"""So many ends of children of the root are kept."""
+"""Kept ends of the root's children; older ones are dropped."""
 
 
 OF_PROCESS: Final = frozenset({"signal", "shutdown"})
-"""Origins of requests that are about the process: the run that goes on is not asked again."""
+"""Origins of requests to stop that concern one process only: a resumed run is not asked again."""
 
 
 class Position:
-    """The facts that a run goes on from; plain JSON.
+    """The facts from which a run can be resumed, as plain JSON.
 
     Attributes:
-        data: visits: path -> visit of each state that runs, or that has ended and whose outcome
-            has not been followed: in, since_ns (of the attempt), attempt, outcome (None while it
-            runs), number (of the iterator's item), goal (action, id, sent_ns, taken_ns, status,
-            text, result, preempted: it ended after its state was asked to stop, stopped: the end of
-            a process has cancelled it) or None, asked (source, by, why, override) if an operator
-            asked it to stop, once (key -> encoded value), begun_ns, entered_ns (which no outage
-            moves); of a plan's action that was asked to stop by a transition also stopping, and
-            again: it begins anew after that;
-            markings: path of a plan that runs -> ids of the places that hold tokens;
-            conditions: as in entries;
-            userdata: path of a container -> key -> encoded value;
-            preempts: path, source, by and why of each request;
-            started_ns, last_ns: stamps of the first entry and of the newest;
-            outages: pairs [from, to] of stamps; ends: path, begin and end [ns] and outcome of the
-            newest visits of the root's children that have ended; finished; outcome; structure: the
-            machine that the paths are of, when it is not the one that the mission began with.
+        data: A dict with these keys:
+
+            visits: path -> visit of each state that is running, or that has ended and whose outcome
+                has not been followed yet. A visit has: in (path of its container); since_ns (begin
+                of the attempt), begun_ns (begin of the visit; both are moved by an outage during
+                which time stops), entered_ns (the same, never moved); attempt; outcome (None while
+                it runs); number (index of the iterator's item); once (key -> encoded value);
+                goal, or None: action, id, sent_ns, taken_ns, status, text, result, preempted (it
+                ended after its state was asked to stop) and stopped (the end of a process has
+                cancelled it); asked, if an operator asked it to stop: source, by, why and override.
+                The visit of a plan's action may also have: stopping (a transition has asked it to
+                stop) and again (it begins once more after that).
+            markings: path of a running plan -> ids of the places that hold tokens
+            conditions: as in entries
+            userdata: path of a container -> key -> encoded value
+            preempts: path, source, by and why of each request
+            started_ns, last_ns: stamps of the first and the newest entry
+            outages: pairs [from, to] of stamps
+            ends: path, begin and end [ns] and outcome of the newest visits of the root's children
+                that have ended
+            finished, outcome: of the run
+            structure: the machine that the paths belong to, if the mission began with another
     """
 
     def __init__(self, data: dict[str, Any] | None = None) -> None:
@@ -107,11 +113,11 @@ class Position:
         return conditions
 
     def to_bytes(self) -> bytes:
-        """Return it as a snapshot."""
+        """Return the position as a snapshot."""
         return json.dumps(self.data, separators=(",", ":")).encode()
 
     def leaves(self) -> list[str]:
-        """Return the paths of what runs and has nothing that runs below it."""
+        """Return the paths of the innermost states that are running."""
         containers = {visit["in"] for visit in self.visits.values()}
         return [
             path
@@ -123,7 +129,7 @@ class Position:
         """Fold one entry.
 
         Raises:
-            KeyError: of an unknown kind, or about a visit that there is not.
+            KeyError: the kind is unknown, or there is no such visit.
         """
         self._FOLD[entry["kind"]](self, entry)
         self.data["last_ns"] = max(self.data["last_ns"], entry["stamp_ns"])
@@ -135,14 +141,14 @@ class Position:
         self.conditions.update(entry.get("conditions", {}))
 
     def renamed(self, names: Mapping[str, str]) -> Position:
-        """Return the position in a machine whose states have other paths.
+        """Return the position with other paths.
 
         Args:
-            names: Old path -> new path; what is below an old path moves with it.
+            names: Old path -> new path; paths below an old path move with it.
         """
 
         def new(path: str) -> str:
-            for old in sorted(names, key=len, reverse=True):
+            for old in sorted(names, key=len, reverse=True):  # the innermost match counts
                 if path == old or path.startswith(f"{old}/"):
                     return names[old] + path[len(old) :]
             return path
@@ -150,6 +156,7 @@ class Position:
         visits = {
             new(path): {**visit, "in": new(visit["in"])} for path, visit in self.visits.items()
         }
+        # The target of an operator's jump is a label, not a path: look it up beside the child.
         for path, visit in self.visits.items():
             outcome, label = (visit.get("asked") or {}).get("override") or (None, None)
             if label is not None:
@@ -166,6 +173,7 @@ class Position:
     # -- one function for each kind ------------------------------------------------------------
 
     def _end_below(self, path: str) -> None:
+        """Drop the visits and markings below a state that has ended or begins anew."""
         below = f"{path}/"
         for facts in (self.visits, self.markings):
             for each in [each for each in facts if each.startswith(below)]:
@@ -191,7 +199,7 @@ class Position:
 
     def _on_entered(self, entry: Mapping[str, Any]) -> None:
         path, container = entry["path"], entry["in"]
-        if not entry.get("beside"):
+        if not entry.get("beside"):  # one child at a time: the one before has ended
             self._end_below(container)
         self._end_below(path)
         self._begin(path, container, entry["stamp_ns"], entry.get("number"))
@@ -205,17 +213,17 @@ class Position:
             del self.visits[path]
             if visit.get("again"):
                 self._begin(path, visit["in"], entry["stamp_ns"])
-        elif following is None:
+        elif following is None:  # not followed yet: a resumed run enters the child for its outcome
             visit.update(outcome=entry["outcome"], goal=None, once={})
         else:
             del self.visits[path]
             self._begin(following, visit["in"], entry["stamp_ns"])
 
     def _keep_end(self, path: str, visit: Mapping[str, Any], entry: Mapping[str, Any]) -> None:
-        """Keep how a child of the root ended, for those who look at the mission."""
+        """Keep the end of a child of the root, for lists and viewers."""
         container = self.visits.get(visit["in"])
         if container is not None and container["in"] == "":
-            began = visit.get("entered_ns", visit["since_ns"])  # older journals have none
+            began = visit.get("entered_ns", visit["since_ns"])  # not in journals of old versions
             ends = self.data.setdefault("ends", [])
             ends.append([path, began, entry["stamp_ns"], entry["outcome"]])
             del ends[:-MOST_ENDS]
@@ -260,6 +268,7 @@ class Position:
                 del self.visits[path]
         for path in entry["begins"]:
             visit = self.visits.get(path)
+            # One run of an action at a time: it begins once the one that is stopping has ended.
             if visit is not None and visit.get("stopping"):
                 visit["again"] = True
             else:
@@ -273,7 +282,7 @@ class Position:
         request = {name: entry[name] for name in ("path", "source", "by", "why")}
         if "override" in entry:
             visit = self.visits.get(entry["path"])
-            if visit is not None:  # else it has ended meanwhile
+            if visit is not None:  # it may have ended meanwhile
                 visit["asked"] = {**request, "override": entry["override"]}
             return
         self.data["preempts"].append(request)
@@ -284,8 +293,9 @@ class Position:
 
     def _on_recovered(self, entry: Mapping[str, Any]) -> None:
         stamp_ns = entry["stamp_ns"]
-        gone_ns = entry.get("gone_ns", stamp_ns)  # older journals do not say
-        last_ns = self.data["last_ns"] = min(self.data["last_ns"], stamp_ns)  # a clock put back
+        gone_ns = entry.get("gone_ns", stamp_ns)  # not in journals of old versions
+        # The clock may have been put back during the outage: stamps never exceed its time.
+        last_ns = self.data["last_ns"] = min(self.data["last_ns"], stamp_ns)
         self.data["outages"].append([max(last_ns, stamp_ns - gone_ns), stamp_ns])
         for visit in self.visits.values():
             visit["begun_ns"] = visit.get("begun_ns", visit["since_ns"]) + entry["shift_ns"]

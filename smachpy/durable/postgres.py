@@ -1,7 +1,8 @@
-"""Journals in a database of PostgreSQL, for the missions of a fleet.
+"""Journals in a PostgreSQL database, for the missions of a fleet.
 
-A connection that is lost, as when the server restarts or another one takes its place, is made again
-for `patience` seconds; what was under way is looked up then, so that no entry is written twice.
+If the connection is lost, because the server restarts or a standby takes over, the store tries to
+connect again for `patience` seconds. It then looks up whether the interrupted transaction was
+committed, so that no entry is written twice.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ T = TypeVar("T")
 
 _DEFAULTS: Final = {
     "application_name": "smachpy",
-    "target_session_attrs": "read-write",  # of several hosts, the one that writes
+    "target_session_attrs": "read-write",  # of several hosts, the one that accepts writes
+    # [s]: a server that is gone without a word is noticed after 2 + 2 * 1 s without traffic; the
+    # system's default is hours.
     "keepalives_idle": "2",
     "keepalives_interval": "1",
     "keepalives_count": "2",
 }
-# Not to_regclass: that answers from a cache, also what was so before a lock was waited for.
+# Not `to_regclass`: it answers from a cache, which may be older than the lock that was waited for.
 _HAS_TABLES: Final = (
     "SELECT COUNT(*) FROM pg_tables "
     "WHERE tablename = 'smachpy_version' AND schemaname = ANY (current_schemas(false))"
@@ -44,18 +47,18 @@ _REASONS: Final[tuple[tuple[type[psycopg.Error], Reason, str], ...]] = (
     (errors.DiskFull, "full", "no space is left on the server"),
     (errors.DataCorrupted, "corrupt", "the database is damaged"),
     (errors.IndexCorrupted, "corrupt", "the database is damaged"),
-    (errors.QueryCanceled, "busy", "the server did not get to it in time"),
-    (errors.LockNotAvailable, "busy", "the server did not get to it in time"),
+    (errors.QueryCanceled, "busy", "the server did not finish it in time"),
+    (errors.LockNotAvailable, "busy", "the server did not finish it in time"),
 )
 
 
 class PostgresStore(SqlStore):
     """A store in a database; see `open_store` for the arguments.
 
-    Its tables are made at the first use, and are called `smachpy_...`.
+    Its tables, named `smachpy_...`, are created at the first use.
 
     Raises:
-        StoreError: the server cannot be reached, or the tables are those of a newer smachpy.
+        StoreError: the server cannot be reached, or the tables belong to a newer smachpy.
     """
 
     by_lease = True
@@ -65,7 +68,9 @@ class PostgresStore(SqlStore):
         real="DOUBLE PRECISION",
         for_update=" FOR UPDATE",
         for_share=" FOR SHARE",
-        one_claimer="SELECT pg_advisory_xact_lock(1936550508)",  # "smjl", as in a file
+        # "smjl", the application id of files. Locked rows are not enough: two runners may claim
+        # different missions of one robot, and neither sees the other's uncommitted claim.
+        one_claimer="SELECT pg_advisory_xact_lock(1936550508)",
     )
 
     def __init__(self, url: str, *, patience: float = 8.0) -> None:
@@ -76,11 +81,11 @@ class PostgresStore(SqlStore):
         self.where = "postgresql://"
         try:
             given = conninfo.conninfo_to_dict(url)
-        except psycopg.Error:  # its text may hold the password
+        except psycopg.Error:  # not chained: its text may contain the password
             problem = "got a URL that cannot be read"
             raise self._store_error("unreachable", problem) from None
         self.where = _without_password(given)
-        # A network that swallows everything is noticed within the patience, too.
+        # A network that drops all packets must also be noticed within the patience.
         half = max(2, round(patience / 2))
         limits = {"connect_timeout": str(half), "tcp_user_timeout": str(1000 * half)}
         self._arguments: dict[str, Any] = {**_DEFAULTS, **limits, **given}
@@ -89,7 +94,7 @@ class PostgresStore(SqlStore):
         except psycopg.Error as error:
             raise self._error(error) from error
         try:
-            self._transact(self._make_tables)
+            self._transact(self._create_tables)
         except BaseException:
             self._connection.close()
             raise
@@ -102,7 +107,7 @@ class PostgresStore(SqlStore):
     def _connect(self) -> psycopg.Connection[Any]:
         connection = psycopg.connect(**self._arguments, autocommit=True)
         milliseconds = max(1, round(self._patience * 1000))
-        # "off" would report a commit before it is durable; the rest is the server's choice.
+        # With "off" a commit returns before it is durable; the other values are up to the server.
         connection.execute(
             "SELECT set_config('statement_timeout', %s, false), "
             "CASE WHEN current_setting('synchronous_commit') = 'off' "
@@ -111,9 +116,10 @@ class PostgresStore(SqlStore):
         )
         return connection
 
-    def _make_tables(self, cursor: Cursor, _: bool) -> None:
+    def _create_tables(self, cursor: Cursor, _: bool) -> None:
         if not self._one(cursor, _HAS_TABLES)[0]:
-            self._do(cursor, self.dialect.one_claimer)  # two that open a new database at once
+            # Two processes may open a new database at once: look again when holding the lock.
+            self._do(cursor, self.dialect.one_claimer)
             if not self._one(cursor, _HAS_TABLES)[0]:
                 for statement in self.dialect.tables():
                     self._do(cursor, statement)
@@ -139,6 +145,7 @@ class PostgresStore(SqlStore):
                     with self._connection.transaction():
                         return work(cast("Cursor", self._connection.cursor()), again)
                 except psycopg.Error as error:
+                    # A wrong statement is wrong on a new connection, too.
                     lost = self._connection.closed and not isinstance(
                         error, psycopg.ProgrammingError
                     )
@@ -146,16 +153,16 @@ class PostgresStore(SqlStore):
                     if not (lost or isinstance(error, _AGAIN)) or left <= 0:
                         raise self._error(error) from error
                     if isinstance(error, errors.ReadOnlySqlTransaction):
-                        self._connection.close()
+                        self._connection.close()  # connect again, to the host that accepts writes
                 again = True
                 self._clock.sleep(min(pause, left))
                 pause = min(2 * pause, _LONGEST_PAUSE_S)
 
     def _verify(self, cursor: Cursor) -> None:
-        """Leave that to the server: `initdb --data-checksums`."""
+        """Do nothing: the server checks its own pages, with `initdb --data-checksums`."""
 
     def _now(self, cursor: Cursor) -> float:
-        # Computers' clocks differ; the server's is one for all.
+        # The clocks of the runners' computers differ; the server's clock is the same for all.
         now = self._one(cursor, "SELECT EXTRACT(EPOCH FROM clock_timestamp())::DOUBLE PRECISION")
         return float(now[0])
 

@@ -1,4 +1,4 @@
-"""Which process holds a mission, and whether it still lives."""
+"""Identifies the process that holds a mission, and tells whether it is still alive."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ def this_runner() -> str:
 
 
 def process_mark() -> str:
-    """Return what tells this process from another that has its pid later, or elsewhere.
+    """Return a text that no other process has: pids are reused, and repeat in other containers.
 
-    Three words: the computer's boot, the namespace of its pids (containers), when it started.
+    Its three words: the boot of the computer, the pid namespace, the start time of the process.
     """
     return f"{_boot_and_namespace()} {_start_of(os.getpid())}"
 
 
 def process_lives(pid: int, mark: str) -> bool | None:
-    """Tell whether a process still lives, None when that cannot be told from here.
+    """Return whether a process is still alive; None if that cannot be determined from here.
 
     Args:
-        pid: Its number.
+        pid: Its process id.
         mark: Its `process_mark()`.
     """
+    # After a reboot, on another computer or in another container the same pid means nothing.
     place, _, start = mark.rpartition(" ")
     if not start or place != _boot_and_namespace():
         return None
@@ -34,20 +35,22 @@ def process_lives(pid: int, mark: str) -> bool | None:
 
 
 def _boot_and_namespace() -> str:
-    """Return where pids mean the same: "BOOT NAMESPACE"."""
+    """Return "BOOT NAMESPACE"; processes for which it is equal see each other's pids."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         namespace = Path("/proc/self/ns/pid").readlink()
-    except OSError:  # no Linux: nothing can be told
+    except OSError:  # not Linux; the own pid makes the text differ from that of other processes
         return f"unknown {os.getpid()}"
     return f"{boot} {namespace}"
 
 
 def _start_of(pid: int) -> str:
-    """Return when a process started, in ticks after the boot (proc(5)); "-": it is gone."""
+    """Return when a process started, in clock ticks after the boot; "-" if it is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:
         return "-"
-    fields = stat[stat.rindex(b")") + 2 :].split()  # its name may hold blanks and parentheses
-    return "-" if fields[0] in {b"Z", b"X"} else fields[19].decode()
+    # proc(5): "pid (name) state ...", and the start time is field 22. The name may contain blanks
+    # and parentheses, so fields are counted from the last parenthesis; fields[0] is field 3.
+    fields = stat[stat.rindex(b")") + 2 :].split()
+    return "-" if fields[0] in {b"Z", b"X"} else fields[19].decode()  # zombie, dead

@@ -1,4 +1,4 @@
-"""What an operator is asked about a state with `resume="ask"`: a question on the network."""
+"""The question to an operator about a state with `resume="ask"`, offered on the network."""
 
 from __future__ import annotations
 
@@ -28,14 +28,16 @@ FOREVER_S: Final = 1e9
 def open_question(
     path: str, outcomes: Sequence[str], on_answer: Callable[[], object]
 ) -> Iterator[Inbox]:
-    """Ask, for as long as the block runs, what is to become of the state at `path`.
+    """Offer the question how the state at `path` continues, while the block runs.
 
     Args:
-        path: The state.
-        outcomes: The answers besides `RESUME`, which executes it again.
-        on_answer: Called with the first answer, in a thread of the network.
+        path: The path of the state.
+        outcomes: The answers besides `RESUME`, which executes the state again.
+        on_answer: Called after the first answer, in a thread of the network.
     """
     node = get_node()
+    # The session's id and a number of the node: questions of several programs, and several
+    # questions of one program, need a service each.
     number = next(node.shared("questions", lambda: itertools.count(1)))
     service = node.resolve(f"operator/questions/q{node.transport.session_id}_{number}")
     answers = tuple(dict.fromkeys((RESUME, *outcomes)))
@@ -44,7 +46,7 @@ def open_question(
     inbox = Inbox(path, answers, on_answer)
 
     def on_call(request: Any) -> dict[str, Any]:
-        if not request.answer.strip():
+        if not request.answer.strip():  # without an answer it asks for the text of the question
             return {"question": question_text(question, FOREVER_S)}
         try:
             inbox.take(request.answer, request.by)

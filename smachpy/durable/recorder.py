@@ -1,7 +1,7 @@
-"""Keeps a run, and goes on with one that was kept: what `smachpy.run` asks of its journal.
+"""Records a run in its journal, and resumes a recorded run: the `RunJournal` of `smachpy.run`.
 
-All that depends on the machine and its threads is here; what an entry means is in
-`smachpy.durable.position`, writing it in `smachpy.durable.journal`.
+This module handles the machine and its threads. `smachpy.durable.position` gives entries their
+meaning, `smachpy.durable.journal` writes them.
 """
 
 from __future__ import annotations
@@ -35,37 +35,40 @@ if TYPE_CHECKING:
     from smachpy.run.frame import Frame, Run
     from smachpy.run.step import Step
 
-_FOUND_AGAIN = frozenset({"timeout", "concurrence", "plan"})
-"""Origins of requests that a run which goes on makes itself, when their cause still holds."""
+_MADE_AGAIN = frozenset({"timeout", "concurrence", "plan"})
+"""Origins of requests that a resumed run makes by itself, if their cause still holds."""
 
 RESUME_S: Final = 2.0
-"""How long those that go on wait for each other, and requests to stop for all of them [s]."""
+"""Longest time for which resumed leaves, and requests to stop, wait until all states that were
+active have been entered again [s]. An operator may hold one of them for hours.
+"""
 
 _MISSING = object()
 
-MOST_TOLD: Final = 500
-"""So many states that go on, and outages, the event `Recovered` tells of."""
+MOST_LISTED: Final = 500
+"""Resumed states, and outages, that the event `Recovered` lists at most."""
 
 
 class Recorder:
-    """Writes down what a run does, before it does it, and leads a new one to the same place.
+    """Writes each action of a run to the journal first, and resumes the run of an earlier process.
 
     Args:
         machine: The root.
         journal: Its journal.
-        goes_on: Whether the position is that of an earlier process.
+        resumed: Whether the position comes from an earlier process.
         shift_ns: How far deadlines move because no process ran the mission [ns].
-        gone_ns: How long no process has run it [ns].
-        row: What the store knows of the mission.
+        gone_ns: Length of the outage before this process [ns].
+        row: The mission's row in the store.
 
     Attributes:
-        mission: Its id.
-        run: Names this run of it, in its recordings and to viewers: a mission of the same id that
-            was begun anew has another one.
-        broken: Why nothing is written any more; None while all is well. The run was preempted.
-        on_fenced: Called before that when another runner has the mission, if given.
+        mission: The mission's id.
+        run: The name of this run in recordings and viewers. It differs when a mission of the same
+            id is started anew.
+        broken: The error after which nothing is written any more and the run was preempted; None
+            while there is none.
+        on_fenced: Called before that preempt if another runner has taken the mission over, or None.
 
-    Threads: as `smachpy.run.frame.RunJournal` is called: any thread of the run.
+    Threads: any thread of the run calls the methods, as `smachpy.run.frame.RunJournal` says.
     """
 
     def __init__(
@@ -74,7 +77,7 @@ class Recorder:
         journal: Journal,
         *,
         row: MissionRow,
-        goes_on: bool,
+        resumed: bool,
         shift_ns: int = 0,
         gone_ns: int = 0,
     ) -> None:
@@ -83,24 +86,27 @@ class Recorder:
         self.on_fenced: Callable[[FencedError], object] | None = None
         self._machine = machine
         self._journal = journal
-        self._goes_on = goes_on
+        self._is_resumed = resumed
         self._shift_ns = shift_ns
         self._gone_ns = gone_ns
         self._run: Run | None = None
         self._root = f"/{machine.name or 'SM_ROOT'}"
-        self._resume: dict[str, dict[str, Any]] = {}  # visits that have not gone on yet
-        self._now: dict[str, dict[str, Any]] = {}  # those of them that go on now
-        self._markings: dict[str, list[str]] = {}  # of plans that have not gone on yet
-        # They were stopping, and go on to do that; who asked them, and what an operator wants.
+        # Visits of the earlier process: those whose states have not been entered again, and those
+        # that continue now. A path is in at most one of the two.
+        self._unresumed: dict[str, dict[str, Any]] = {}
+        self._resumed: dict[str, dict[str, Any]] = {}
+        self._markings: dict[str, list[str]] = {}  # of plans that have not been resumed yet
+        # Children that had been asked to stop, to be asked again: frame, child, origin, override.
         self._to_stop: list[tuple[Frame, Step, tuple[str, str, str], Override | None]] = []
-        preempts = journal.position.data["preempts"] if goes_on else []
+        preempts = journal.position.data["preempts"] if resumed else []
         self._preempts = [one for one in preempts if one["source"] not in OF_PROCESS]
-        self._is_late = False  # somebody has waited `RESUME_S` for all to be back
-        self._asks = 0  # states that an operator is asked about now
+        self._gave_up_waiting = False  # not all states were entered again within `RESUME_S`
+        self._questions = 0  # states about which an operator is asked now
+        # Children whose begin is in the journal already, in the entry that chose them.
         self._chosen: set[str] = set()
-        self._numbers: dict[str, int] = {}
+        self._numbers: dict[str, int] = {}  # path of an iterator -> index of its item
         self._containers = dict(_containers(machine, self._root))
-        # Where the values of a userdata object are kept: two containers may share one.
+        # Two containers may share a userdata object: it is kept once, under the first path.
         self._homes: dict[int, str] = {}
         for path, container in self._containers.items():
             self._homes.setdefault(id(container.userdata), path)
@@ -108,8 +114,9 @@ class Recorder:
             path: frozenset(get_options(container).transient)
             for path, container in self._containers.items()
         }
-        self._knowledge: dict[str, Any] = {}  # of plans
-        self._known_changes: dict[str, int] = {}
+        self._knowledge: dict[str, Any] = {}  # path of a plan -> its conditions and events
+        self._known_changes: dict[str, int] = {}  # path of a plan -> its changes that were written
+        # Path -> key -> the value, and its JSON, as last written.
         self._known: dict[str, dict[str, tuple[Any, str]]] = {}
         for path, container in self._containers.items():
             own: Any = container._smachpy
@@ -120,14 +127,15 @@ class Recorder:
                 register_annotations(data.fields.kind)
 
     def restore(self) -> None:
-        """Give the machine the userdata, and its plans the events, that were kept.
+        """Restore the machine's userdata, and the events of its plans.
 
         Raises:
-            MissionError: a value cannot be made from what was kept.
+            MissionError: a value cannot be decoded.
         """
         for path in self._homes.values():
             kept = self._journal.position.userdata.get(path, {})
             data = data_of(self._containers[path].userdata)
+            # The mission's code may have set a key that the run has deleted since.
             for key in [key for key in data if self._is_kept(path, key) and key not in kept]:
                 del data[key]
             known = self._known[path] = {}
@@ -141,20 +149,23 @@ class Recorder:
     # -- writing -------------------------------------------------------------------------------
 
     def _write(self, kind: str, path: str, **facts: Any) -> bool:
-        """Write an entry with what has changed in the userdata; tell whether that worked.
+        """Write an entry; return whether that worked.
 
-        When it does not work, nothing more is told to the outside: the run is preempted.
+        If it did not, its effect must not happen: the run is preempted.
         """
         return self._write_with(None, None, kind, path, facts)
 
     def _write_with(
         self, frame: Frame | None, step: Step | None, kind: str, path: str, facts: dict[str, Any]
     ) -> bool:
+        """Write an entry with the changes in the userdata of `frame`; see `_changes`."""
         run = self._run
         assert run is not None
         if self.broken is not None:
             return False
         journal = self._journal
+        # The lock covers reading the userdata and queueing the entry: a change that an entry
+        # reports must not be older than the one that an earlier entry has reported.
         with journal.lock:
             entry = {"kind": kind, "path": path, "stamp_ns": run.clock.time_ns(), **facts}
             if frame is not None:
@@ -162,6 +173,7 @@ class Recorder:
             if entry.pop("only_changes", False) and "userdata" not in entry:
                 return True
             number = journal.put(entry)
+        # Without the lock: other branches queue their entries meanwhile, see `Journal`.
         try:
             journal.commit(number)
         except (StoreError, FencedError) as error:
@@ -170,7 +182,7 @@ class Recorder:
         return True
 
     def stop(self, error: Exception) -> None:
-        """Preempt the run, which cannot be kept any more, because of the first `error`."""
+        """Preempt the run because its journal cannot be written; only the first `error` counts."""
         if self.broken is not None:
             return
         self.broken = error
@@ -181,17 +193,17 @@ class Recorder:
             request_soon(self._machine)
 
     def _changes(self, frame: Frame, step: Step | None) -> dict[str, Any]:
-        """Return what has changed in the userdata of the container of `frame`, for an entry.
+        """Return the changes in the userdata of the container of `frame`, for an entry.
 
-        A value that `step` may have changed in place is compared by what is kept of it; without a
-        `step`, each one is.
+        A state may change a list or message in place, so identity proves nothing for the values
+        that `step` can write, or for all without a `step`: their JSON is compared.
         """
         userdata = frame.container.userdata
         path = self._homes.get(id(userdata))
         if path is None:
             return {}
         written = None if step is None else set(getattr(step.userdata, "_output", {}).values())
-        data = dict(data_of(userdata))  # one step: other branches may be writing
+        data = dict(data_of(userdata))  # a copy, as other branches may write at the same time
         known = self._known.setdefault(path, {})
         changed: dict[str, Any] = {}
         for key, value in data.items():
@@ -202,7 +214,7 @@ class Recorder:
             elif not self._is_kept(path, key):
                 continue
             encoded = encode(value, key=key, path=frame.here())
-            text = json.dumps(encoded)  # as 1 == True
+            text = json.dumps(encoded)  # texts, because 1 == True == 1.0
             if before is None or before[1] != text:
                 changed[key] = encoded
             known[key] = (value, text)
@@ -213,7 +225,7 @@ class Recorder:
         return {**found, "deleted": {path: gone}} if gone else found
 
     def _is_kept(self, path: str, key: str) -> bool:
-        """Tell whether a key is kept; constants, "LABEL.KEY", are those of the machine's code."""
+        """Return whether a key is kept; constants, "LABEL.KEY", come from the machine's code."""
         return "." not in key and key not in self._transient[path]
 
     # -- the run -------------------------------------------------------------------------------
@@ -222,15 +234,18 @@ class Recorder:
         """As `RunJournal.attach`."""
         run = self._run = root.run
         run.journal = self
+        # Entries are written where events are published, which the fast loop does not do.
         run.watched = run.careful = True
-        if self._goes_on:
+        if self._is_resumed:
             self._write("Recovered", self._root, shift_ns=self._shift_ns, gone_ns=self._gone_ns)
-            self._resume = copy.deepcopy(self._journal.position.visits)
+            # A copy: the position changes with each entry from here on.
+            self._unresumed = copy.deepcopy(self._journal.position.visits)
             self._markings = dict(self._journal.position.markings)
-            self._now[self._root] = self._resume.pop(self._root)
-            self._back = run.clock.event("the states that were active")
-            if self._resume and self._machine._preempt_requested:
-                # What is active must be entered to be stopped.
+            self._resumed[self._root] = self._unresumed.pop(self._root)
+            self._all_back = run.clock.event("the states that were active")
+            if self._unresumed and self._machine._preempt_requested:
+                # Requested before the run: a state that was active must be entered again before it
+                # can stop, or its goal would run on without anybody to cancel it.
                 source, by, why = self._machine._smachpy.origin or ("program", "", "")
                 self._machine._preempt_requested = False
                 self.asked(root, (source, by, why))
@@ -249,16 +264,16 @@ class Recorder:
 
     def recovered(self) -> tuple[Any, ...] | None:
         """As `RunJournal.recovered`."""
-        if not self._goes_on:
+        if not self._is_resumed:
             return None
         data = self._journal.position.data
         active = [
-            (path, visit.get("entered_ns", visit["since_ns"]))  # older journals have none
+            (path, visit.get("entered_ns", visit["since_ns"]))  # not in journals of old versions
             for path, visit in data["visits"].items()
             if visit["outcome"] is None
         ]
-        outages = tuple(map(tuple, data["outages"][-MOST_TOLD:]))
-        return self.mission, data["started_ns"], outages, tuple(active[:MOST_TOLD])
+        outages = tuple(map(tuple, data["outages"][-MOST_LISTED:]))
+        return self.mission, data["started_ns"], outages, tuple(active[:MOST_LISTED])
 
     def finish(self, outcome: str) -> None:
         """As `RunJournal.finish`."""
@@ -267,18 +282,18 @@ class Recorder:
     def enter(self, frame: Frame, step: Step) -> str | None:
         """As `RunJournal.enter`."""
         if frame.path not in self._containers:
-            return None  # a container that a state runs by hand
+            return None  # a state runs this container by itself; it is not part of the machine
         path = step.path_in(frame)
-        visit = self._resume.pop(path, None)
+        visit = self._unresumed.pop(path, None)
         outcome: str | None = None
         if visit is None:
-            self._now.pop(path, None)
+            self._resumed.pop(path, None)
             if not self._write_entered(frame, path):
                 outcome = "preempted"
         else:
             outcome = visit["outcome"]
             if outcome is None:
-                self._now[path] = visit
+                self._resumed[path] = visit
                 if visit.get("stopping"):
                     origin = ("plan", frame.path, "before the resume")
                     self._to_stop.append((frame, step, origin, None))
@@ -287,19 +302,22 @@ class Recorder:
                     origin = (request["source"], request["by"], request["why"])
                     wanted = request["override"] and Override(*request["override"])
                     self._to_stop.append((frame, step, origin, wanted))
-            if not self._resume:
-                self._all_are_back()
+            if not self._unresumed:
+                self._note_all_back()
             elif outcome is not None or not isinstance(step.state, Container):
-                # What ends now could stop others before they are back, and with them their goals.
-                self._back.wait(RESUME_S)
-        if outcome is not None and outcome not in step.next:  # that of a child that was asked
+                # The end of this child may stop its siblings. They must have been entered again
+                # before, to cancel their goals.
+                self._all_back.wait(RESUME_S)
+        # An outcome without a transition was accepted because the child had been asked to stop:
+        # ask again, so that it is accepted now, too.
+        if outcome is not None and outcome not in step.next:
             with asking("program", "journal", "before the resume"), frame.run.lock:
                 ask(frame, step)
             frame.run.flush()
         return outcome
 
     def _write_entered(self, frame: Frame, path: str) -> bool:
-        """Write that the state at `path` begins; tell whether that worked."""
+        """Write that the state at `path` begins; return whether that worked."""
         facts: dict[str, Any] = {"in": frame.path}
         kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
         if kind in {"concurrence", "plan"}:
@@ -309,19 +327,21 @@ class Recorder:
         if path in self._chosen:
             self._chosen.discard(path)
             visit = self._journal.position.visits.get(path)
-            # Else it was written with the end of the one before, or with what fired.
+            # The entry that chose it has begun its visit. Only a start or transition callback may
+            # have changed the userdata since.
             if visit is not None and not visit.get("stopping"):
                 if not frame.data.transition_cbs:
                     return self.broken is None
                 facts["only_changes"] = True
         return self._write_with(frame, None, "Entered", path, facts)
 
-    def _all_are_back(self) -> None:
+    def _note_all_back(self) -> None:
+        """Continue what waited until all states that were active have been entered again."""
         self._ask_again()
-        self._back.set()
+        self._all_back.set()
 
     def _ask_again(self) -> None:
-        """Pass the requests to stop on that were made before all was back."""
+        """Pass on the requests to stop that waited until the active states were entered again."""
         stopping, self._to_stop = self._to_stop, []
         for frame, step, origin, override in stopping:
             with asking(*origin):
@@ -335,7 +355,7 @@ class Recorder:
 
     def execute(self, frame: Frame, step: Step, userdata: Any) -> Any:
         """As `RunJournal.execute`."""
-        visit = self._now.get(frame.here())
+        visit = self._resumed.get(frame.here())
         if visit is None:
             return step.execute(userdata)
         state: Any = step.state
@@ -343,7 +363,8 @@ class Recorder:
         if options.on_resume is not None:
             own = state.userdata if isinstance(state, Container) else userdata
             self._call(frame, options.on_resume, own)
-        # A container goes on with its children, an action with its goal, or sends it now.
+        # The option `resume` does not apply to a container, whose children are resumed. An action
+        # looks for its goal first, and calls `decide` itself if the server does not know it.
         if isinstance(state, Container) or state._smachpy_kind == "action":
             return step.execute(userdata)
         decided = self.decide(frame, userdata)
@@ -352,7 +373,7 @@ class Recorder:
     def decide(self, frame: Frame, userdata: Any) -> Any:
         """As `RunJournal.decide`.
 
-        Blocks: while an operator is asked.
+        Blocks: until the operator answers, for `resume="ask"`.
         """
         options = get_options(frame.step.state)
         policy = options.resume
@@ -366,8 +387,9 @@ class Recorder:
         return self._ask_operator(frame)
 
     def _ask_operator(self, frame: Frame) -> str | None:
-        """Hold the state until an operator says what is to become of it."""
-        from smachpy.durable.question import RESUME, open_question  # it needs the network
+        """Hold the state until an operator decides how it continues."""
+        # Imported here: the question needs the network, which other missions may do without.
+        from smachpy.durable.question import RESUME, open_question
 
         path, state = frame.here(), frame.step.state
         log.logwarn(
@@ -379,17 +401,18 @@ class Recorder:
         outcomes = state.get_registered_outcomes()
         with open_question(path, outcomes, lambda: control.release(path)) as inbox:
             with self._journal.lock:
-                self._asks += 1
+                self._questions += 1
             control.hold(frame, path, "resume", until=lambda: inbox.answer is not None)
         answer, by = inbox.close(RESUME)
         with self._journal.lock:
-            self._asks -= 1
-            is_last = self._asks == 0
+            self._questions -= 1
+            is_last = self._questions == 0
         if state._preempt_requested:
             return "preempted"
         if by:
             log.loginfo(f"{path}: {by} answered {answer!r}")
-            if is_last:  # the question had paused the machine
+            # `hold` has paused the machine; without an answer the operator has resumed it.
+            if is_last:
                 control.resume()
         return None if answer == RESUME else answer
 
@@ -405,8 +428,8 @@ class Recorder:
     def leave(self, frame: Frame, step: Step, outcome: Any) -> None:
         """As `RunJournal.leave`."""
         path = step.path_in(frame)
-        self._now.pop(path, None)
-        if frame.dead:
+        self._resumed.pop(path, None)
+        if frame.dead:  # left behind: the journal has recorded another end for this visit
             raise Interruption
         visit, state = frame.visit, step.state
         overridden = visit is not None and visit.override is not None
@@ -418,43 +441,48 @@ class Recorder:
         asked = asked or frame.container._preempt_requested
         if target is None:
             if not asked:
-                return  # no such outcome: an error, and nothing that could be followed
+                return  # an unknown outcome: the machine raises an error right after this
+        # The next child begins in the same entry, so that no kill can come between. Not if the
+        # child was asked to stop: the container may end instead.
         elif not (asked or target.final) and hasattr(frame.data, "transitions"):
             facts["next"] = f"{frame.path}/{target.label}"
             self._chosen.add(facts["next"])
+        # Start callbacks get the userdata itself and may keep it: compare all keys, not only those
+        # that this child writes.
         callbacks = frame.data.start_cbs
         self._write_with(frame, None if callbacks else step, "Left", path, facts)
 
-    # -- where containers and states were ------------------------------------------------------
+    # -- the position before the resume --------------------------------------------------------
 
     def _children(self, path: str) -> list[str]:
-        return [each for each, visit in tuple(self._resume.items()) if visit["in"] == path]
+        """Return the paths of a container's children that have not been entered again."""
+        # `tuple`: other branches take their visits out at the same time.
+        return [each for each, visit in tuple(self._unresumed.items()) if visit["in"] == path]
 
     def resumes(self, frame: Frame) -> bool:
         """As `RunJournal.resumes`."""
-        return frame.path in self._markings or (
-            bool(self._resume) and bool(self._children(frame.path))
-        )
+        return self._has_begun(frame.path)
 
     def resumed_label(self, frame: Frame) -> str | None:
         """As `RunJournal.resumed_label`."""
-        children = self._children(frame.path) if self._resume else []
+        children = self._children(frame.path) if self._unresumed else []
         return children[0][len(frame.path) + 1 :] if children else None
 
     def item(self, frame: Frame, number: int) -> int:
         """As `RunJournal.item`."""
-        children = self._children(frame.path) if self._resume else []
+        children = self._children(frame.path) if self._unresumed else []
         self._numbers[frame.path] = number
-        return number - self._resume[children[0]]["number"] if children else 1
+        return number - self._unresumed[children[0]]["number"] if children else 1
 
     def check_items(self, frame: Frame, count: int) -> None:
         """As `RunJournal.check_items`.
 
         Raises:
-            MissionError: there were fewer.
+            MissionError: there are fewer.
         """
+        # An item that was reached has been entered again by now, and its visit is gone.
         for child in self._children(frame.path):
-            number = self._resume[child]["number"]
+            number = self._unresumed[child]["number"]
             raise MissionError(
                 f"{frame.path}: items: got {count} after the resume; expected at least "
                 f"{number + 1}, as before it. Try items that are the same each time."
@@ -462,8 +490,10 @@ class Recorder:
 
     def began_inside(self, frame: Frame) -> bool:
         """As `RunJournal.began_inside`."""
-        path = frame.here()
-        return path in self._markings or (bool(self._resume) and bool(self._children(path)))
+        return self._has_begun(frame.here())
+
+    def _has_begun(self, path: str) -> bool:
+        return path in self._markings or (bool(self._unresumed) and bool(self._children(path)))
 
     # -- plans ---------------------------------------------------------------------------------
 
@@ -496,7 +526,7 @@ class Recorder:
             self._write("Noted", frame.path, **facts)
 
     def _new_conditions(self, frame: Frame) -> dict[str, Any]:
-        """Return, for an entry, the conditions that have changed in the plan and below it."""
+        """Return the conditions that have changed in the plan and its sub-plans, for an entry."""
         found: dict[str, Any] = {}
         for path, knowledge in self._knowledge.items():
             is_here = path == frame.path or path.startswith(f"{frame.path}/")
@@ -512,24 +542,25 @@ class Recorder:
             return None
         children: dict[str, Any] = {}
         for child in self._children(path):
-            visit = self._resume[child]
+            visit = self._unresumed[child]
             label = child[len(path) + 1 :]
             has_more = visit["goal"] is not None or child in self._markings
             if visit["outcome"] is not None:
-                del self._resume[child]
+                del self._unresumed[child]
             elif visit.get("stopping") and not (has_more or self._children(child)):
-                del self._resume[child]  # it has nothing to go on with, only to stop
+                # A leaf without a goal that was stopping: the end of the process has stopped it.
+                del self._unresumed[child]
                 if not visit.get("again"):
                     continue
                 visit = {**visit, "stopping": False}
             children[label] = visit
-        if not self._resume:
-            self._all_are_back()
+        if not self._unresumed:
+            self._note_all_back()
         return marking, children
 
     def attempt(self, frame: Frame) -> tuple[int, float]:
         """As `RunJournal.attempt`."""
-        visit = self._now.get(frame.here())
+        visit = self._resumed.get(frame.here())
         if visit is None:
             return 1, 0.0
         wait = visit["since_ns"] - frame.run.clock.time_ns()
@@ -537,20 +568,21 @@ class Recorder:
 
     def time_left(self, frame: Frame, seconds: float) -> float:
         """As `RunJournal.time_left`."""
-        visit = self._now.get(frame.here())
+        visit = self._resumed.get(frame.here())
         if visit is None:
             return seconds
         return float(seconds - (frame.run.clock.time_ns() - visit["since_ns"]) / 1e9)
 
     def goes_on(self, frame: Frame) -> bool:
         """As `RunJournal.goes_on`."""
-        visit = self._now.get(frame.here())
+        visit = self._resumed.get(frame.here())
         return visit is None or visit["goal"] is not None or self.began_inside(frame)
 
     def retried(self, frame: Frame, attempt: int, wait: float, reason: str) -> None:
         """As `RunJournal.retried`."""
         path = frame.here()
-        self._now.pop(path, None)
+        # The next attempt is a normal one: `resume`, the goal and the time left were for this one.
+        self._resumed.pop(path, None)
         if path in self._journal.position.visits:
             at_ns = frame.run.clock.time_ns() + int(wait * 1e9)
             facts = {"attempt": attempt, "reason": reason, "at_ns": at_ns}
@@ -563,12 +595,13 @@ class Recorder:
         source, by, why = origin
         request = {"path": path, "source": source, "by": by, "why": why}
         known = self._journal.position.data["preempts"]
-        if source in _FOUND_AGAIN or path not in self._containers:
+        if source in _MADE_AGAIN or path not in self._containers:
             return False
         if request not in known:
             self._write("PreemptRequested", **request)
-        if not self._resume or self._is_late:
+        if not self._unresumed or self._gave_up_waiting:
             return False
+        # Kept until all states that were active have been entered again, or `RESUME_S` is over.
         if request not in self._preempts:
             self._preempts.append(request)
             assert self._run is not None
@@ -585,9 +618,9 @@ class Recorder:
             self._write("PreemptRequested", path, **facts)
 
     def _give_up_waiting(self) -> None:
-        """Stop what is back, when an operator holds the rest."""
-        if self._resume:
-            self._is_late = True
+        """Pass on the requests, although an operator still holds some of the states."""
+        if self._unresumed:
+            self._gave_up_waiting = True
             self._ask_again()
 
     # -- userdata ------------------------------------------------------------------------------
@@ -598,6 +631,7 @@ class Recorder:
         Raises:
             NotDurableError: it cannot be kept.
         """
+        # Here rather than at the end of the state, so that the traceback shows the assignment.
         home = self._homes.get(id(frame.container.userdata))
         if type(value) not in ATOMS and home is not None and self._is_kept(home, key):
             encode(value, key=key, path=path)
@@ -606,7 +640,7 @@ class Recorder:
 
     def goal_of(self, frame: Frame) -> dict[str, Any] | None:
         """As `RunJournal.goal_of`."""
-        visit = self._now.get(frame.here())
+        visit = self._resumed.get(frame.here())
         goal = None if visit is None else visit["goal"]
         if goal is None or goal["result"] is None:
             return goal
@@ -616,11 +650,11 @@ class Recorder:
         """As `RunJournal.goal_sent`.
 
         Raises:
-            StoreError, FencedError: it cannot be written, so it must not be sent.
+            StoreError, FencedError: it cannot be written, so the goal must not be sent.
         """
         if self._visit_of(frame) is None:
             return
-        if frame.dead:
+        if frame.dead:  # a thread that was left behind must not start anything
             raise Interruption
         written = self._write("GoalSent", frame.here(), action=action, goal_id=goal_id)
         if not written and self.broken is not None:
@@ -653,11 +687,11 @@ class Recorder:
         """As `RunJournal.once`.
 
         Raises:
-            NotDurableError: what `call` returned cannot be kept; it was called.
+            NotDurableError: the result of `call` cannot be kept; it was called.
         """
         path = frame.here()
         visits = self._journal.position.visits
-        while path and path not in visits:  # in a container that a state runs by hand
+        while path and path not in visits:  # a state runs this container by itself: use its visit
             path = path.rpartition("/")[0]
         if not path:
             return call()

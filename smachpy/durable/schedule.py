@@ -1,4 +1,4 @@
-"""Which mission of a queue a runner takes next, and when schedules are due; no I/O."""
+"""Chooses a runner's next mission from a queue, and computes when schedules are due; no I/O."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ScheduleError(MissionError):
     """A time or a cron expression cannot be read.
 
     Attributes:
-        text: What was given.
+        text: The text that was given.
     """
 
     def __init__(self, option: str, text: str, expected: str) -> None:
@@ -31,16 +31,16 @@ class ScheduleError(MissionError):
 def next_mission(
     rows: Sequence[MissionRow], now: float, robots: Collection[str], leave: Collection[str] = ()
 ) -> MissionRow | None:
-    """Return the mission that a runner takes next, None when there is none for it.
+    """Return the mission that a runner should take next; None if there is none.
 
-    What was begun goes on before anything is begun; else the one that is due longest comes first.
-    A robot that a mission moves is left to it.
+    Interrupted missions come before queued ones, and of these the one that has been due longest
+    comes first. Missions for a robot that another mission is using have to wait.
 
     Args:
         rows: Missions of the store.
         now: Seconds since the Unix epoch.
-        robots: Those that the runner is for; empty: missions for all, and for none.
-        leave: Ids that it is not to take.
+        robots: The robots that the runner serves; empty: all missions, with or without a robot.
+        leave: Ids of missions that it must not take.
     """
     busy = {row.robot for row in rows if row.status == RUNNING and row.robot is not None}
     free = [
@@ -57,7 +57,7 @@ def next_mission(
 
 
 def next_time(rows: Sequence[MissionRow], now: float) -> float | None:
-    """Return when the next mission or schedule is due [s since the Unix epoch], None for never."""
+    """Return when the next mission or schedule is due [s since the Unix epoch]; None for never."""
     later = [_due(row) for row in rows if row.status == QUEUED and _due(row) > now]
     return min(later, default=None)
 
@@ -65,9 +65,9 @@ def next_time(rows: Sequence[MissionRow], now: float) -> float | None:
 def due_schedules(
     rows: Sequence[MissionRow], now: float
 ) -> list[tuple[MissionRow, MissionRow, float]]:
-    """Return for each schedule that is due: itself, the mission to begin, when it is due again.
+    """Return for each schedule that is due: its row, the new mission, and the next due time.
 
-    However often it was due while no runner lived, it is begun once.
+    A schedule that was due several times while no runner was alive adds one mission.
 
     Args:
         rows: Missions of the store.
@@ -81,6 +81,7 @@ def due_schedules(
             and row.due is not None
             and row.due <= now
         ):
+            # The id has the due time: if two runners see it, both choose the same id.
             stamp = datetime.fromtimestamp(row.due, UTC).strftime("%Y%m%dT%H%M%SZ")
             begun = dataclasses.replace(
                 row,
@@ -95,16 +96,15 @@ def due_schedules(
 
 
 def next_due(every: str, now: float) -> float:
-    """Return when a cron expression is due next after `now` [s since the Unix epoch].
+    """Return the first time after `now` at which a cron expression is due [s since the Unix epoch].
 
     Args:
-        every: "MINUTE HOUR DAY MONTH WEEKDAY [ZONE]", as cron has it; the zone is UTC unless
-            it is named.
+        every: "MINUTE HOUR DAY MONTH WEEKDAY [ZONE]", as in cron; the default zone is UTC.
         now: Seconds since the Unix epoch.
 
     Raises:
         ScheduleError: it cannot be read, or is never due.
-        ModuleNotFoundError: cronsim is missing, the extra `cron`.
+        ModuleNotFoundError: the package cronsim of the extra `cron` is missing.
     """
     from cronsim import CronSim, CronSimError
 
@@ -118,30 +118,32 @@ def next_due(every: str, now: float) -> float:
     except CronSimError as error:
         raise ScheduleError("--every", every, f"{expected}: {str(error).lower()}") from error
     except StopIteration:
-        raise ScheduleError("--every", every, "a time that comes within 50 years") from None
+        raise ScheduleError("--every", every, "a time within the next 50 years") from None
     return due.timestamp()
 
 
 def read_time(text: str, now: float) -> float:
     """Return the time of "08:30", "2026-03-28 08:30" or ISO 8601 [s since the Unix epoch].
 
-    A time without an offset is one of this computer's zone; one without a date is the next such.
+    A time without an offset is in this computer's zone; a time without a date is its next
+    occurrence.
 
     Args:
-        text: What a person wrote.
+        text: The text that a person wrote.
         now: Seconds since the Unix epoch.
 
     Raises:
-        ScheduleError: it is none.
+        ScheduleError: it cannot be read.
     """
     today = datetime.fromtimestamp(now, UTC).astimezone().date()
     for form in ("%H:%M", "%H:%M:%S"):
         try:
-            clock = datetime.strptime(text, form).time()  # noqa: DTZ007  of this computer's zone
+            clock = datetime.strptime(text, form).time()  # noqa: DTZ007  in this computer's zone
         except ValueError:
             continue
         due = datetime.combine(today, clock).timestamp()
         if due < now:
+            # Not plus 24 hours: a day on which summer time begins or ends is shorter or longer.
             due = datetime.combine(today + timedelta(days=1), clock).timestamp()
         return due
     try:

@@ -1,8 +1,8 @@
-# ruff: noqa: S608  statements are made of the names of our own columns; values are always bound
-"""What stores in SQL databases share: the tables, and every method of `Store` once.
+# ruff: noqa: S608  statements are built from our own column names; values are always bound
+"""The common part of stores in SQL databases: the tables, and every method of `Store`.
 
-A database differs in how it is opened, how a transaction is begun, and in what its errors mean:
-`SqlStore._transact`, `_now` and the few words of `Dialect`.
+Databases differ in how they are opened, in how transactions begin, and in their errors; a subclass
+has `_transact`, `_now`, `_verify` and `close` for these, and a `Dialect`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 VERSION: Final = 1
-"""Of the tables; a store that has a higher one was written by a newer smachpy."""
+"""Version of the tables; a store with a higher one was written by a newer smachpy."""
 
 _COLUMNS: Final = (
     "id, name, target, argv, status, outcome, robot, created, changed, owner, structure, version, "
@@ -49,14 +49,14 @@ _COLUMNS: Final = (
 
 @dataclass(frozen=True)
 class Dialect:
-    """The words that differ.
+    """The parts of SQL statements that differ between databases.
 
     Attributes:
-        placeholder: What stands for a value in a statement.
+        placeholder: Stands for a value in a statement.
         blob, real: Types of columns.
-        for_update, for_share: What locks the rows of a SELECT.
-        clustered: What keeps the entries of a mission side by side.
-        one_claimer: A statement that lets one transaction at a time claim, or "".
+        for_update, for_share: Ends of a SELECT that lock its rows.
+        clustered: End of a CREATE TABLE that stores rows in the order of their primary key.
+        one_claimer: A statement after which only this transaction can claim missions, or "".
     """
 
     placeholder: str
@@ -68,7 +68,7 @@ class Dialect:
     one_claimer: str = ""
 
     def tables(self) -> tuple[str, ...]:
-        """Return the statements that make the tables."""
+        """Return the statements that create the tables."""
         missions = (
             "id TEXT PRIMARY KEY, name TEXT NOT NULL, target TEXT NOT NULL, argv TEXT NOT NULL, "
             f"status TEXT NOT NULL, outcome TEXT, robot TEXT, created {self.real} NOT NULL, "
@@ -92,7 +92,7 @@ class Dialect:
 
 
 class Cursor(Protocol):
-    """What both databases' cursors offer within a transaction."""
+    """The methods of a database cursor that are used here; both drivers have them."""
 
     def execute(self, sql: str, values: Sequence[Any] = (), /) -> object:
         """Run a statement."""
@@ -121,25 +121,25 @@ class SqlStore(ABC):
     def __init__(self) -> None:
         self._mark = process_mark()
         self._host = host_and_pid(this_runner())[0]
-        self._written: dict[
-            Lease, int
-        ] = {}  # entries so far: what a server that restarts must have
+        # Number of the last entry that each lease has written. After a failover the server may have
+        # fewer: the standby took over without the newest transactions.
+        self._written: dict[Lease, int] = {}
 
     @abstractmethod
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:
         """Run `work` in one transaction, which is committed and durable when this returns.
 
-        `work` may run again after a connection was lost; its second argument is True then: what it
-        did before may have been committed.
+        If the connection is lost, `work` runs again. Its second argument is True then: the first
+        transaction may have been committed although its answer was lost.
 
         Args:
-            work: What is to be done.
-            reads: It changes nothing.
+            work: The function to run.
+            reads: Whether it only reads.
         """
 
     @abstractmethod
     def _now(self, cursor: Cursor) -> float:
-        """Return seconds since the Unix epoch, of one clock for all who use the store."""
+        """Return the time [s since the Unix epoch] of the one clock that all runners go by."""
 
     def create(self, row: MissionRow) -> None:
         """As `Store.create`."""
@@ -147,7 +147,7 @@ class SqlStore(ABC):
         def work(cursor: Cursor, again: bool) -> None:
             found = self._one(cursor, "SELECT created FROM smachpy_missions WHERE id = ?", row.id)
             if found is not None:
-                if again and found[0] == row.created:
+                if again and found[0] == row.created:  # by the first try, whose answer was lost
                     return
                 raise MissionError(
                     f"{self.where}: mission {row.id!r}: got an id that is taken; "
@@ -204,7 +204,7 @@ class SqlStore(ABC):
                     f"{self.where}: mission {id!r}: got a schedule, {every!r}; expected one of the "
                     "missions that it begins. Try: smachpy missions list"
                 )
-            if not (again and owner == runner and mark == self._mark):
+            if not (again and owner == runner and mark == self._mark):  # not by the first try
                 self._refuse_held(id, owner, mark, lease_end, now)
             if robot is not None:
                 self._take_robot(cursor, id, robot, now)
@@ -251,9 +251,10 @@ class SqlStore(ABC):
             if again and lease in self._written:
                 before = self._written[lease]
                 if entries and last == before + len(entries):
-                    return last  # the answer was lost, not the transaction
+                    return last  # the first try was committed; only its answer was lost
                 if last < before:
                     raise self._damaged(mission, f"the server has {last} entries of {before}")
+            # Numbers without gaps, and a checksum each: `read` notices lost and damaged entries.
             if entries:
                 rows = (
                     (mission, n, lease.fence, zlib.crc32(data), data)
@@ -284,6 +285,8 @@ class SqlStore(ABC):
 
         def work(cursor: Cursor, _: bool) -> tuple[Any, list[Any]]:
             self._verify(cursor)
+            # In PostgreSQL each statement sees what is committed by then; the locked row keeps a
+            # runner from compacting between the two below.
             self._known(cursor, id, "id" + self.dialect.for_share)
             snapshot = self._one(
                 cursor, "SELECT n, crc, data FROM smachpy_snapshots WHERE mission = ?", id
@@ -313,7 +316,7 @@ class SqlStore(ABC):
             try:
                 self._fenced(cursor, lease)
             except FencedError as error:
-                if again and error.runner is None:
+                if again and error.runner is None:  # released by the first try
                     return
                 raise
             self._do(
@@ -334,7 +337,7 @@ class SqlStore(ABC):
                 columns = "owner, mark, lease_end" + self.dialect.for_update
                 owner, mark, lease_end = self._known(cursor, id, columns)
             except UnknownMissionError:
-                if again:
+                if again:  # deleted by the first try
                     return
                 raise
             self._refuse_held(id, owner, mark, lease_end, self._now(cursor))
@@ -353,13 +356,14 @@ class SqlStore(ABC):
         def work(cursor: Cursor, again: bool) -> bool:
             if again:
                 found = self._one(cursor, "SELECT 1 FROM smachpy_missions WHERE id = ?", row.id)
-                if found is not None:
+                if found is not None:  # created by the first try
                     return True
             schedule = self._one(
                 cursor,
                 "SELECT status, due FROM smachpy_missions WHERE id = ?" + self.dialect.for_update,
                 row.schedule,
             )
+            # Another runner has seen the same schedule and was faster: it has moved `due`.
             if schedule is None or tuple(schedule) != (QUEUED, due):
                 return False
             self._insert(cursor, row)
@@ -391,7 +395,7 @@ class SqlStore(ABC):
 
     @abstractmethod
     def _verify(self, cursor: Cursor) -> None:
-        """Check that the database itself is whole, where it does not do so on its own."""
+        """Check that the database file is not damaged, if the database does not check it itself."""
 
     @abstractmethod
     def close(self) -> None:
@@ -419,10 +423,15 @@ class SqlStore(ABC):
         )
 
     def _known(self, cursor: Cursor, id: str, columns: str) -> Any:  # noqa: A002
-        """Return columns of a mission; what locks the row may follow them.
+        """Return columns of a mission.
+
+        Args:
+            cursor: The cursor.
+            id: The mission.
+            columns: Their names; an end that locks the row, as in `Dialect`, may follow.
 
         Raises:
-            UnknownMissionError: there is none.
+            UnknownMissionError: there is no such mission.
         """
         names, lock, how = columns.partition(" FOR ")
         row = self._one(cursor, f"SELECT {names} FROM smachpy_missions WHERE id = ?{lock}{how}", id)
@@ -432,11 +441,12 @@ class SqlStore(ABC):
         return row
 
     def _fenced(self, cursor: Cursor, lease: Lease) -> tuple[bool, int]:
-        """Lock the mission's row; return whether its end was asked for, and its last entry.
+        """Lock the mission's row; return whether a cancel was requested, and its last entry.
 
         Raises:
             FencedError: the lease is void.
         """
+        # Check and write are one transaction, and the row is locked: a claim cannot come between.
         row = self._one(
             cursor,
             "SELECT fence, owner, cancel, COALESCE("
@@ -477,10 +487,10 @@ class SqlStore(ABC):
             raise MissionInUseError(self.where, mission, owner)
 
     def _take_robot(self, cursor: Cursor, mission: str, robot: str, now: float) -> None:
-        """See to it that no other mission moves the robot of this one.
+        """Take the robot of this mission away from missions whose runner is gone.
 
         Raises:
-            MissionInUseError: one that lives does.
+            MissionInUseError: a mission with a living runner uses it.
         """
         self._do(
             cursor,
@@ -491,7 +501,8 @@ class SqlStore(ABC):
         for other, owner, mark, lease_end in cursor.fetchall():
             if not self._may_take(owner, mark, lease_end, now):
                 raise MissionInUseError(self.where, other, owner, robot=robot)
-            self._do(  # should that one come back, it is refused
+            # A higher fence: if its runner was only suspended, its next write is refused.
+            self._do(
                 cursor,
                 "UPDATE smachpy_missions SET owner = NULL, mark = NULL, fence = fence + 1 "
                 "WHERE id = ?",
@@ -513,7 +524,7 @@ class SqlStore(ABC):
     def _damaged(self, mission: str, what: str) -> StoreError:
         return StoreError(
             self.where,
-            f"mission {mission!r}: got a damaged journal: {what}; expected it as it was written. "
+            f"mission {mission!r}: got a damaged journal: {what}; expected an undamaged one. "
             "Nothing was changed. Try a copy, or: smachpy missions forget " + mission,
             reason="corrupt",
         )

@@ -1,14 +1,14 @@
-"""Journals in a file of SQLite: the default, for the missions of one computer.
+"""Journals in an SQLite file: the default, for the missions of one computer.
 
-The file is in WAL mode, so that readers see the journal while a mission writes it, and a
-transaction is one append to the log beside it, `FILE-wal`. SQLite keeps a checksum for each page of
-that log: a transaction that was written in part is as if it had not been begun
+The file is in WAL mode: others can read the journal while a mission writes it, and a transaction is
+one append to the log beside the file, `FILE-wal`. SQLite keeps a checksum for each page of the log,
+so a transaction that was written in part counts as not begun
 (https://sqlite.org/fileformat2.html#walformat).
 
-To SQLite a file without its log is a whole one, as it was earlier. So the file itself says in a bit
-of `PRAGMA user_version`, `_NEEDS_LOG`, that its log must be there. The log says the contrary, so
-that whoever takes all of it into the file (SQLite does when the last connection is closed, also
-that of another program) and deletes it, deletes the bit too.
+SQLite takes a file whose log is missing for a complete one, and shows an older state. To detect
+that, the file itself has the bit `_NEEDS_LOG` of `PRAGMA user_version` set, and the log has it
+cleared. Whenever the whole log is copied into the file and deleted (SQLite does so when the last
+connection is closed, even that of another program), the bit is cleared with it.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_APPLICATION: Final = 0x736D6A6C
-"""Marks the file as a journal of smachpy ("smjl", `PRAGMA application_id`)."""
+_APPLICATION: Final = 0x736D6A6C  # in ASCII, "smjl"
+"""The `PRAGMA application_id` of journals."""
 
 _NEEDS_LOG: Final = 1 << 16
 
 _REASONS: Final[dict[int, tuple[Reason, str]]] = {
     sqlite3.SQLITE_BUSY: (
         "busy",
-        "another process keeps it locked; expected a free one. Try again",
+        "another process keeps it locked; expected an unlocked file. Try again",
     ),
-    sqlite3.SQLITE_LOCKED: ("busy", "it is locked; expected a free one. Try again"),
-    sqlite3.SQLITE_FULL: ("full", "no space is left; expected some. Try making room"),
-    sqlite3.SQLITE_CORRUPT: ("corrupt", "it is damaged; expected it as it was written. Try a copy"),
+    sqlite3.SQLITE_LOCKED: ("busy", "it is locked; expected an unlocked file. Try again"),
+    sqlite3.SQLITE_FULL: ("full", "no space is left; expected some. Try to free space"),
+    sqlite3.SQLITE_CORRUPT: ("corrupt", "it is damaged; expected an undamaged file. Try a copy"),
     sqlite3.SQLITE_NOTADB: (
         "foreign",
-        "it is no SQLite file; expected a journal. Try another path",
+        "it is not an SQLite file; expected a journal. Try another path",
     ),
     sqlite3.SQLITE_CANTOPEN: (
         "unreachable",
@@ -52,7 +52,7 @@ _REASONS: Final[dict[int, tuple[Reason, str]]] = {
     ),
     sqlite3.SQLITE_READONLY: ("unreachable", "it cannot be written. Try its permissions"),
     sqlite3.SQLITE_PERM: ("unreachable", "it cannot be opened. Try its permissions"),
-    sqlite3.SQLITE_IOERR: ("failed", "the disk does not work. Try another one"),
+    sqlite3.SQLITE_IOERR: ("failed", "reading or writing the disk failed. Try another disk"),
 }
 
 
@@ -60,7 +60,7 @@ class SQLiteStore(SqlStore):
     """A store in one file; see `open_store` for the arguments.
 
     Raises:
-        StoreError: it cannot be opened; nothing in the file was changed.
+        StoreError: the file cannot be opened; it was not changed.
     """
 
     by_lease = False
@@ -79,7 +79,8 @@ class SQLiteStore(SqlStore):
             raise ValueError(f"synchronous: got {synchronous!r}; expected 'FULL' or 'NORMAL'.")
         self._file = file = Path(path).absolute()
         self.where = str(path)
-        self._marked: tuple[int, int] | None = None  # inode and time of the file when it was
+        # Inode and modification time of the file when it last had the bit `_NEEDS_LOG`.
+        self._marked: tuple[int, int] | None = None
         self._lock = threading.Lock()
         if create:
             self._make_folder(file.parent)
@@ -96,16 +97,16 @@ class SQLiteStore(SqlStore):
                 f"{file.as_uri()}?mode={mode}",
                 uri=True,
                 timeout=patience,
-                isolation_level=None,  # transactions are begun and ended here, by name
-                check_same_thread=False,
+                isolation_level=None,  # `_transact` begins and ends transactions itself
+                check_same_thread=False,  # `_lock` lets one thread at a time use the connection
             )
         except sqlite3.Error as error:
             raise self._error(error) from error
         try:
             version = self._transact(self._check, reads=True)  # before anything is written
             self._pragmas(synchronous)
-            if version != VERSION:  # a new file, or a process was killed as it set the mark
-                self._transact(self._make_tables)
+            if version != VERSION:  # a new file, or a process was killed inside `_mark_file`
+                self._transact(self._create_tables)
         except sqlite3.Error as error:
             self._connection.close()
             raise self._error(error) from error
@@ -130,10 +131,10 @@ class SQLiteStore(SqlStore):
         """Refuse a file without the log that it needs, and a log without its file."""
         log = self._file.with_name(f"{self._file.name}-wal")
         if log.exists():
-            # SQLite makes the file first, and would delete the log of one that is empty.
+            # SQLite creates the file first, and would delete the log of an empty file.
             if log.stat().st_size and not (self._file.exists() and self._file.stat().st_size):
                 raise self._incomplete("the file itself", self._file.name)
-        # Looked for again: another process may have begun to use the file meanwhile.
+        # `exists` a second time: another process may have begun to use the file meanwhile.
         elif self._file.is_file() and self._needs_log() and not log.exists():
             raise self._incomplete(f"the log {log.name!r}", log.name)
 
@@ -146,17 +147,17 @@ class SQLiteStore(SqlStore):
         )
 
     def _needs_log(self) -> bool:
-        """Tell whether the file says that it needs its log."""
-        # `immutable` reads what is in the file itself, and makes neither a lock nor a log.
+        """Return whether the bit `_NEEDS_LOG` is set in the file itself."""
+        # `immutable` reads the file without its log, and creates neither a lock nor a log.
         uri = f"{self._file.as_uri()}?mode=ro&immutable=1"
         with contextlib.closing(sqlite3.connect(uri, uri=True)) as raw:
             ours = raw.execute("PRAGMA application_id").fetchone()[0] == _APPLICATION
             return ours and bool(raw.execute("PRAGMA user_version").fetchone()[0] & _NEEDS_LOG)
 
     def _check(self, cursor: Cursor, _: bool) -> int:
-        """Refuse a file that is no journal, or one of a newer version; return what it says."""
-        says: int = self._one(cursor, "PRAGMA user_version")[0]
-        version = says & ~_NEEDS_LOG
+        """Refuse a file that is not a journal, or is newer; return its `user_version`."""
+        user_version: int = self._one(cursor, "PRAGMA user_version")[0]
+        version = user_version & ~_NEEDS_LOG
         if self._one(cursor, "PRAGMA application_id")[0] != _APPLICATION:
             if self._one(cursor, "SELECT COUNT(*) FROM sqlite_master")[0] or version:
                 raise StoreError(
@@ -171,7 +172,7 @@ class SQLiteStore(SqlStore):
                 "Try a newer smachpy.",
                 reason="future",
             )
-        return says
+        return user_version
 
     def _pragmas(self, synchronous: str) -> None:
         execute = self._connection.execute
@@ -181,15 +182,16 @@ class SQLiteStore(SqlStore):
             try:
                 execute("PRAGMA journal_mode = WAL")
             except sqlite3.OperationalError:
-                # SQLite does not wait here if two processes, which have both read a new file,
-                # change it at once. A write transaction does wait, for the other one's end.
+                # SQLite does not wait here if two processes that have read a new file change its
+                # mode at the same time. A write transaction waits until the other one has ended.
                 if not attempts_left:
                     raise
                 execute("BEGIN IMMEDIATE")
                 execute("ROLLBACK")
         execute(f"PRAGMA synchronous = {synchronous}")
 
-    def _make_tables(self, cursor: Cursor, _: bool) -> None:
+    def _create_tables(self, cursor: Cursor, _: bool) -> None:
+        # Again, now that this is the only writer: another process may have created them.
         if self._one(cursor, "PRAGMA application_id")[0] != _APPLICATION:
             for statement in self.dialect.tables():
                 cursor.execute(statement)
@@ -199,6 +201,8 @@ class SQLiteStore(SqlStore):
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:
         with self._lock:
             try:
+                # IMMEDIATE waits for other writers now. A transaction that reads first and then
+                # writes would fail at once, without waiting, if another one wrote in between.
                 self._connection.execute("BEGIN" if reads else "BEGIN IMMEDIATE")
                 try:
                     result = work(self._connection.cursor(), False)  # noqa: FBT003
@@ -214,13 +218,14 @@ class SQLiteStore(SqlStore):
             return result
 
     def _mark_file(self) -> None:
-        """See to it that the file says that it needs its log, whenever a log was taken into it.
+        """Set the bit `_NEEDS_LOG` in the file again after the log was copied into it.
 
         Raises:
-            StoreError: the file was deleted, or another one is in its place.
+            StoreError: the file was deleted or replaced.
         """
+        # Only a copied log changes the file itself, so usually this is one `stat` per write.
         try:
-            now = os.stat(self._file)  # noqa: PTH116  half the time of Path.stat, at each write
+            now = os.stat(self._file)  # noqa: PTH116  takes half the time of Path.stat
         except OSError as error:
             problem = f"got {error.strerror} after a write; expected the file that was opened."
             raise StoreError(self.where, problem, reason="missing") from error
@@ -230,8 +235,11 @@ class SQLiteStore(SqlStore):
             problem = "got another file in its place; expected the one that was opened."
             raise StoreError(self.where, problem, reason="missing")
         execute = self._connection.execute
-        with contextlib.suppress(sqlite3.Error):  # what was written is safe: the next write tries
+        # Errors can wait: the transaction is durable, and the next write tries again.
+        with contextlib.suppress(sqlite3.Error):
             if not self._needs_log():
+                # The checkpoint copies the set bit from the log into the file; then the log gets
+                # the cleared one, for the time when it is copied and deleted.
                 execute(f"PRAGMA user_version = {VERSION | _NEEDS_LOG}")
                 try:
                     execute("PRAGMA wal_checkpoint")
@@ -241,7 +249,7 @@ class SQLiteStore(SqlStore):
                 self._marked = now.st_ino, self._file.stat().st_mtime_ns
 
     def _verify(self, cursor: Cursor) -> None:
-        # A page that lost its parent would only look like fewer entries.
+        # A page that is missing from the tree of a table would only look like fewer entries.
         problem = self._one(cursor, "PRAGMA integrity_check(1)")[0]
         if problem != "ok":
             reason, text = _REASONS[sqlite3.SQLITE_CORRUPT]
@@ -251,6 +259,6 @@ class SQLiteStore(SqlStore):
         return current_clock().time_ns() / 1e9
 
     def _error(self, error: sqlite3.Error) -> StoreError:
-        code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # without its extension
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the primary code of an extended one
         reason, problem = _REASONS.get(code, ("failed", "SQLite cannot use it"))
         return StoreError(self.where, f"{problem} ({error}).", reason=reason)

@@ -1,9 +1,9 @@
-"""Where journals of missions are kept: the interface of a store, its rows and its errors.
+"""The interface of stores, which keep journals of missions; their rows and errors.
 
-A store keeps for each mission one row, its newest snapshot and the entries after it. Who writes
-holds a lease. Each lease of a mission has a higher fence than the one before, and every write names
-its fence, so that a runner that was suspended and comes back can change nothing any more (a fencing
-token; M. Kleppmann, "How to do distributed locking", 2016).
+A store keeps for each mission one row, its newest snapshot and the entries after that. Writing
+needs a lease. Each lease of a mission has a higher fence than the one before, and every write
+carries its fence, so a runner that was suspended and continues later can no longer change anything
+(a fencing token; M. Kleppmann, "How to do distributed locking", 2016).
 
     store = open_store("journal.db")                      # SQLite
     store = open_store("postgresql://db.example/missions")  # pip install 'smachpy[postgres]'
@@ -29,16 +29,16 @@ CANCELLED: Final = "cancelled"
 OVER: Final = (ENDED, CANCELLED)
 
 Reason = Literal["missing", "foreign", "future", "corrupt", "busy", "full", "unreachable", "failed"]
-"""What is wrong with a store:
+"""Reasons of a `StoreError`:
 
-- `"missing"`: there is none, and none was to be made
-- `"foreign"`: it is something else than a journal
+- `"missing"`: there is no store, and `create` is False
+- `"foreign"`: the file is not a journal
 - `"future"`: a newer smachpy has written it
-- `"corrupt"`: its bytes are damaged, or entries are gone
+- `"corrupt"`: its bytes are damaged, or entries are missing
 - `"busy"`: another process keeps it locked
 - `"full"`: no space is left
 - `"unreachable"`: it cannot be opened, or the server does not answer
-- `"failed"`: the rest; the text says what
+- `"failed"`: anything else; see the text
 """
 
 
@@ -48,8 +48,9 @@ class Lease:
 
     Attributes:
         mission: Its id.
-        fence: Counts the leases of this mission, from 1; a later one makes the earlier ones void.
-        runner: Who holds it, "host:pid".
+        fence: The number of the lease among those of this mission, from 1; only the newest is
+            valid.
+        runner: The process that holds it, "host:pid".
     """
 
     mission: str
@@ -59,25 +60,25 @@ class Lease:
 
 @dataclass(frozen=True)
 class MissionRow:
-    """What a store knows of a mission.
+    """The record of a mission in a store.
 
     Attributes:
         id: Its id.
         name: The name of its root.
-        target: What `smachpy run` was given.
-        argv: The arguments that belong to it.
+        target: The file or function that `smachpy run` was given.
+        argv: The mission's own arguments.
         status: "queued", "running", "interrupted" (its runner is gone), "ended" or "cancelled".
-        outcome: How it ended, else None.
-        robot: The robot that it needs, None for any.
-        created: When, in seconds since the Unix epoch.
-        changed: Its last sign of life: when an entry was written or its lease renewed.
+        outcome: The outcome with which it has ended, else None.
+        robot: The robot that it uses, None for any.
+        created: The time of its creation [s since the Unix epoch].
+        changed: Its last sign of life, an entry or a renewal of its lease [s since the Unix epoch].
         owner: The runner that holds it, "host:pid", or None.
-        structure: Its machine, as the journal's code writes it.
+        structure: The shape of its machine, see `smachpy.durable.structure`.
         version: Version of the entries.
-        due: When it may begin, in seconds since the Unix epoch; None: at once.
-        every: Of a schedule, its cron expression: each time it is `due`, a mission like it is
-            put into the queue. It is never run itself.
-        schedule: The id of the schedule that it belongs to, else None.
+        due: The time from which it may begin [s since the Unix epoch]; None: at once.
+        every: For a schedule, its cron expression: each time it is `due`, a mission like it is put
+            into the queue. The schedule itself is never run.
+        schedule: The id of the schedule that created it, else None.
         cancel: Whether `request_cancel` was called.
     """
 
@@ -100,23 +101,23 @@ class MissionRow:
 
     @property
     def run(self) -> str:
-        """What names this mission and no other: an id may be used again when one has ended."""
+        """A unique name of this run: when a mission has ended, its id may be used again."""
         return f"{self.id} {round(self.created * 1e6)}"
 
 
 class Store(Protocol):
     """Keeps the journals of missions; every method may be called from any thread.
 
-    All methods raise `StoreError` when the store cannot be read or written, and
-    `UnknownMissionError` for an id that it does not have. They block for the disk or the server, at
-    most for the store's `patience`.
+    All methods raise `StoreError` if the store cannot be read or written, and `UnknownMissionError`
+    for an unknown id. They block until the disk or the server has answered, at most for the store's
+    `patience`.
     """
 
     def create(self, row: MissionRow) -> None:
         """Add a mission; its `owner` is ignored.
 
         Raises:
-            MissionError: there is one of this id.
+            MissionError: the id exists.
         """
         ...
 
@@ -124,37 +125,37 @@ class Store(Protocol):
         """Return all missions, the oldest first.
 
         Args:
-            open_only: Leave out those that have ended or were cancelled.
+            open_only: Omit missions that have ended or were cancelled.
         """
         ...
 
     def mission(self, id: str) -> MissionRow:  # noqa: A002  the word of the interface
-        """Return one mission."""
+        """Return the row of one mission."""
         ...
 
     def claim(self, id: str, runner: str, *, seconds: float) -> Lease:  # noqa: A002
-        """Take a mission over, or begin it; its status becomes "running".
+        """Take a lease of a mission, to begin or resume it; its status becomes "running".
 
         Args:
             id: The mission.
             runner: This process, `this_runner()`.
-            seconds: How long the lease lasts without `renew` [s].
+            seconds: The duration of the lease without `renew` [s].
 
         Raises:
-            MissionInUseError: another one that lives holds it, or another mission of its robot.
+            MissionInUseError: a living runner holds it, or another mission that uses its robot.
             MissionOverError: it has ended or was cancelled.
             MissionError: it is a schedule.
         """
         ...
 
     def renew(self, lease: Lease, *, seconds: float) -> bool:
-        """Let a lease last `seconds` [s] from now.
+        """Extend a lease to `seconds` [s] from now.
 
         Returns:
             Whether `request_cancel` was called for the mission.
 
         Raises:
-            FencedError: another one has taken the mission over.
+            FencedError: another runner has taken the mission over.
         """
         ...
 
@@ -170,26 +171,27 @@ class Store(Protocol):
         """Add entries in one transaction, which is durable when this returns.
 
         Args:
-            lease: The right to do so.
-            entries: In order.
-            snapshot: Replaces all entries so far, with these: they are deleted.
-            status: The mission's new one.
-            outcome: How it ended.
+            lease: The writer's lease.
+            entries: The new entries, oldest first.
+            snapshot: Replaces all entries including the new ones, which are deleted; None: nothing
+                is replaced.
+            status: The mission's new status; None: unchanged.
+            outcome: The mission's outcome; None: unchanged.
 
         Raises:
-            FencedError: another one has taken the mission over; nothing is written.
+            FencedError: another runner has taken the mission over; nothing is written.
         """
         ...
 
     def read(self, id: str) -> tuple[bytes | None, list[bytes]]:  # noqa: A002
-        """Return the newest snapshot, None when there is none, and the entries after it."""
+        """Return the newest snapshot, or None, and the entries after it."""
         ...
 
     def release(self, lease: Lease, status: str) -> None:
-        """Give a lease back; the mission has `status` from now on.
+        """Give a lease back, and set the status of the mission.
 
         Raises:
-            FencedError: another one has taken the mission over.
+            FencedError: another runner has taken the mission over.
         """
         ...
 
@@ -197,27 +199,28 @@ class Store(Protocol):
         """Delete a mission with its journal.
 
         Raises:
-            MissionInUseError: one that lives holds it.
+            MissionInUseError: a living runner holds it.
         """
         ...
 
     def begin_next(self, row: MissionRow, *, due: float | None, next_due: float) -> bool:
-        """Put one mission of a schedule into the queue, and set when the next one is due.
+        """Put one mission of a schedule into the queue, and set the next due time.
 
         Args:
-            row: The mission; it is created.
-            due: When the schedule was due, as read; in seconds since the Unix epoch.
-            next_due: When it is due again.
+            row: The mission to create.
+            due: The due time of the schedule as read before [s since the Unix epoch].
+            next_due: The next one [s since the Unix epoch].
 
         Returns:
-            Whether that was done: False when another runner has, or the schedule is over.
+            Whether this call did it; False if another runner did, or the schedule was cancelled.
         """
         ...
 
     def request_cancel(self, id: str) -> None:  # noqa: A002
-        """Ask for the end of a mission: one that is queued is "cancelled", the others are marked.
+        """Request the end of a mission; a queued one is cancelled at once.
 
-        The runner that holds it learns of it from `renew`, the next one from `MissionRow.cancel`.
+        A runner that holds the mission gets the request from `renew`, one that resumes it from
+        `MissionRow.cancel`.
 
         Raises:
             MissionOverError: it has ended or was cancelled before.
@@ -225,7 +228,7 @@ class Store(Protocol):
         ...
 
     def close(self) -> None:
-        """Close the file or the connection; again has no effect. Leases stay as they are."""
+        """Close the file or the connection; leases are not released. May be called twice."""
         ...
 
 
@@ -234,7 +237,7 @@ class StoreError(MissionError):
 
     Attributes:
         where: The file, or the server's URL without its password.
-        reason: What is wrong in one word, see `Reason`.
+        reason: The reason in one word, see `Reason`.
     """
 
     def __init__(self, where: str, problem: str, *, reason: Reason) -> None:
@@ -248,7 +251,7 @@ class UnknownMissionError(MissionError):
 
     Attributes:
         mission: The id.
-        known: Those that it has.
+        known: The ids of its missions.
     """
 
     def __init__(self, where: str, mission: str, known: Iterable[str]) -> None:
@@ -262,13 +265,13 @@ class UnknownMissionError(MissionError):
 
 
 class MissionInUseError(MissionError):
-    """A mission, or its robot, is held by a process that lives.
+    """A living process holds a mission, or another mission that uses the same robot.
 
     Attributes:
-        mission: The mission that is held: another one when it is the robot that is in use.
-        runner: Who holds it, "host:pid".
-        host, pid: The same in parts.
-        robot: The robot, when that is in use by another mission, else None.
+        mission: The mission that is held; if the robot is in use, the mission that uses it.
+        runner: The process, "host:pid".
+        host, pid: Its two parts.
+        robot: The robot, if another mission uses it, else None.
     """
 
     def __init__(self, where: str, mission: str, runner: str, *, robot: str | None = None) -> None:
@@ -280,12 +283,12 @@ class MissionInUseError(MissionError):
         for_what = "" if robot is None else f" for mission {mission!r}"
         super().__init__(
             f"{where}: {what}: got one that process {self.pid} on {self.host!r} runs{for_what}; "
-            "expected one that nobody runs. Try again when that process has ended."
+            "expected one that no process runs. Try again when that process has ended."
         )
 
 
 class MissionOverError(MissionError):
-    """A mission has ended already.
+    """A mission has ended already or was cancelled.
 
     Attributes:
         mission: Its id.
@@ -296,17 +299,17 @@ class MissionOverError(MissionError):
         self.mission = mission
         self.status = status
         super().__init__(
-            f"{where}: mission {mission!r}: got one that is {status}; expected one that can go on. "
-            "Try running it anew."
+            f"{where}: mission {mission!r}: got one that is {status}; expected one that can be "
+            "resumed. Try to start it anew."
         )
 
 
 class FencedError(MissionError):
-    """Another runner has taken the mission over, or it was deleted: this one may not go on.
+    """This process has lost its lease: another runner took the mission over, or it was deleted.
 
     Attributes:
-        lease: The lease that is void.
-        runner: Who holds the mission now, "host:pid", or None.
+        lease: The lost lease.
+        runner: The process that holds the mission now, "host:pid", or None.
     """
 
     def __init__(self, where: str, lease: Lease, runner: str | None) -> None:
@@ -315,7 +318,7 @@ class FencedError(MissionError):
         by = f"{runner} has taken it over" if runner else "it was taken over, released or deleted"
         super().__init__(
             f"{where}: mission {lease.mission!r}: got a write of {lease.runner}, but {by}; "
-            "expected one of who holds it. This process may not go on with the mission."
+            "expected one of its holder. This process must not continue the mission."
         )
 
 
@@ -326,21 +329,21 @@ def open_store(
     create: bool = True,
     patience: float | None = None,
 ) -> Store:
-    """Open a file of SQLite, or a database of PostgreSQL.
+    """Open an SQLite file or a PostgreSQL database.
 
     Args:
         where: A path, or "postgresql://[user[:password]@]host[:port]/database".
-        synchronous: Of SQLite, when a transaction is durable: "FULL", when it returns; "NORMAL", it
-            survives the end of the process, but the newest ones not a power loss. PostgreSQL: as
-            the server is set up, but never with `synchronous_commit = off`.
-        create: Whether to make a file that is missing. A folder is made, too.
-        patience: How long a lock, and a server that is gone, are waited for [s]; None: 5 for
-            SQLite, 8 for PostgreSQL. It must be less than a lease minus the time between two
-            renewals: who cannot reach the store stops before another one takes over.
+        synchronous: For SQLite. "FULL": a transaction is on the disk when it returns. "NORMAL": it
+            survives the end of the process, but a power loss may undo the newest ones. PostgreSQL
+            uses the server's setting, except `synchronous_commit = off`.
+        create: Whether to create a missing file, and its folder.
+        patience: Longest wait for a lock or an unreachable server [s]; None: 5 for SQLite, 8 for
+            PostgreSQL. It must be less than a lease minus the time between two renewals, so that a
+            runner that cannot reach the store stops before another one takes over.
 
     Raises:
-        StoreError: it cannot be opened; `reason` says why.
-        ModuleNotFoundError: psycopg is missing, the extra `postgres`.
+        StoreError: it cannot be opened; see `reason`.
+        ModuleNotFoundError: the package psycopg of the extra `postgres` is missing.
     """
     text = str(where)
     if "://" in text:
@@ -351,7 +354,7 @@ def open_store(
                 f"store: got a URL of {scheme!r}; expected a path, or postgresql://HOST/DATABASE.",
                 reason="unreachable",
             )
-        from smachpy.durable.postgres import PostgresStore
+        from smachpy.durable.postgres import PostgresStore  # needs psycopg, an optional extra
 
         return PostgresStore(text, patience=8.0 if patience is None else patience)
     from smachpy.durable.sqlite import SQLiteStore
@@ -364,8 +367,9 @@ def host_and_pid(runner: str) -> tuple[str, int]:
     """Split "host:pid".
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text has another form.
     """
+    # From the right: the host may be an IPv6 address, with colons in it.
     host, colon, pid = runner.rpartition(":")
     if not colon or not host or not pid.isdecimal():
         raise ValueError(f"runner: got {runner!r}; expected 'host:pid'.")
@@ -373,10 +377,10 @@ def host_and_pid(runner: str) -> tuple[str, int]:
 
 
 def check_lease_seconds(seconds: float) -> None:
-    """Check how long a lease is to last.
+    """Check the duration of a lease.
 
     Raises:
-        ValueError: it is no finite number above 0.
+        ValueError: it is not a finite number above 0.
     """
     number = isinstance(seconds, (int, float)) and not isinstance(seconds, bool)
     if not number or not math.isfinite(seconds) or seconds <= 0:
@@ -386,19 +390,20 @@ def check_lease_seconds(seconds: float) -> None:
 def may_take(
     holder_lives: bool | None, lease_left: float, *, by_lease: bool, same_host: bool
 ) -> bool:
-    """Tell whether a mission may be taken from its holder.
+    """Return whether a mission may be taken from the process that holds it.
 
     Args:
-        holder_lives: Whether its process does; None: cannot be told from here.
-        lease_left: How long its lease still lasts [s].
-        by_lease: The store is shared by computers: a process that lives but has stopped renewing
-            loses its mission. Else it keeps it until it ends.
-        same_host: The holder's host is called as this one.
+        holder_lives: Whether that process is alive; None: unknown.
+        lease_left: Time until its lease ends [s].
+        by_lease: Whether computers share the store. Then a living process that has stopped renewing
+            loses its mission; otherwise it keeps the mission until it ends.
+        same_host: Whether its host has the name of this one.
     """
     if holder_lives is False:
         return True
     if not by_lease and holder_lives:
         return False
-    if not by_lease and same_host:  # a file of this computer, and it has been restarted since
+    # Unknown on a computer of the same name: it has been restarted since, see `process_lives`.
+    if not by_lease and same_host:
         return True
     return lease_left <= 0

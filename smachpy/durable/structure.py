@@ -1,4 +1,4 @@
-"""What a machine looks like to its journal, and how two of them differ; pure."""
+"""The shape of a machine as a journal keeps it, and the differences between two shapes; pure."""
 
 from __future__ import annotations
 
@@ -13,19 +13,22 @@ if TYPE_CHECKING:
     from smachpy.introspection import Described, StateRecord
 
 Shape = dict[str, dict[str, Any]]
-"""Path -> what a position depends on: kind, outcomes, and of a container children and edges."""
+"""Path -> the facts that a position depends on: kind, outcomes, keys; for a container its children
+and transitions; for a plan its net.
+"""
 
 
 def shape_of(machine: Described) -> Shape:
-    """Return the shape of a machine.
+    """Return the shape of a machine, without what may change between two processes.
 
-    What may change between two processes is left out: timeouts, texts, classes, callbacks.
+    Timeouts, texts, classes and callbacks are no part of it.
     """
     return {record.path: _facts(record) for record in describe(machine).walk()}
 
 
 def _facts(record: StateRecord) -> dict[str, Any]:
     facts: dict[str, Any] = {
+        # A leaf may be rewritten, as a function or a class: only actions have goals to follow.
         "kind": record.kind if record.is_container or record.kind == "action" else "state",
         "outcomes": sorted(record.outcomes),
         "keys": sorted({*record.input_keys, *record.output_keys}),
@@ -53,15 +56,15 @@ def _arcs(arcs: Iterable[tuple[str, int]]) -> str:
 
 
 def to_bytes(shape: Shape) -> bytes:
-    """Return a shape as the store keeps it."""
+    """Encode a shape for the store."""
     return json.dumps(shape, separators=(",", ":"), sort_keys=True).encode()
 
 
 def from_bytes(data: bytes) -> Shape:
-    """Return the shape that a store keeps.
+    """Decode a shape from the store.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the data are damaged.
     """
     shape = json.loads(data)
     if not isinstance(shape, dict) or not all(isinstance(facts, dict) for facts in shape.values()):
@@ -70,8 +73,8 @@ def from_bytes(data: bytes) -> Shape:
 
 
 def differences(old: Shape, new: Shape) -> list[str]:
-    """Return in words how `new` differs from `old`, one text for each difference."""
-    found = [f"{path}: is no more" for path in old if path not in new]
+    """Return the differences between two shapes, one text each."""
+    found = [f"{path}: is missing" for path in old if path not in new]
     found += [f"{path}: is new" for path in new if path not in old]
     for path in old.keys() & new.keys():
         was, now = old[path], new[path]
@@ -92,7 +95,8 @@ def _changes(where: str, was: Any, now: Any) -> Iterable[str]:
 
 
 def missing_paths(visits: Mapping[str, Mapping[str, Any]], shape: Shape) -> list[str]:
-    """Return the paths that a position needs and a machine does not have, or as something else."""
+    """Return the paths that a position needs and a machine lacks, or has as another kind."""
+    # A leaf may have become a container, but a container with active children must remain one.
     containers = {visit["in"] for visit in visits.values()} - {""}
     return sorted(
         {path for path in visits if path not in shape}
@@ -101,7 +105,7 @@ def missing_paths(visits: Mapping[str, Mapping[str, Any]], shape: Shape) -> list
 
 
 def missing_places(markings: Mapping[str, Iterable[str]], shape: Shape) -> list[str]:
-    """Return "path: place" for each place that holds tokens in a position and is in no plan."""
+    """Return "path: place" for each place that holds tokens in a position and no longer exists."""
     return sorted(
         f"{path}: place {place!r}"
         for path, marking in markings.items()
