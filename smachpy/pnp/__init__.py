@@ -1,4 +1,4 @@
-"""Petri Net Plans: nets whose places run actions, beside state machines.
+"""Petri Net Plans: Petri nets whose places run actions, an alternative to state machines.
 
 from smachpy import pnp
 

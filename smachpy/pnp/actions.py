@@ -1,4 +1,4 @@
-"""What the names of a plan's actions run: states, functions, goals, sub-plans."""
+"""The states that a plan's action names stand for: the user's, functions, goals, sub-plans."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ OUTCOMES: Final = ("succeeded", "aborted", "preempted")
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """An executable's name, taken apart: `[ROBOT#]ACTION[_P1[_P2...]]`.
+    """The parts of an executable's name, `[ROBOT#]ACTION[_P1[_P2...]]`.
 
     Attributes:
         name: The whole name.
         robot: The robot, or "".
-        action: The action; of names that hold a `_`, the one that is registered.
-        parameters: What follows; "@VAR" stands for the userdata key VAR.
+        action: The action. If it contains a `_` itself, it must be registered to be recognised.
+        parameters: The parameters; "@VAR" stands for the userdata key VAR.
     """
 
     name: str
@@ -40,36 +40,35 @@ class Call:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Userdata keys that the parameters stand for."""
+        """The userdata keys that parameters stand for."""
         return tuple(dict.fromkeys(p[1:] for p in self.parameters if p.startswith("@")))
 
     def values(self, userdata: Any) -> tuple[str, ...]:
-        """Return the parameters with the values of their variables."""
+        """Return the parameters, variables replaced by their values."""
         return tuple(str(userdata[p[1:]]) if p.startswith("@") else p for p in self.parameters)
 
 
-def take_apart(name: str, actions: Iterable[str] = ()) -> Call:
-    """Return what an executable's name says; `actions` are those that are known."""
+def parse_name(name: str, actions: Iterable[str] = ()) -> Call:
+    """Split an executable's name; `actions` are the registered names."""
     robot, hash_, rest = name.partition("#")
     if not hash_:
         robot, rest = "", name
-    if rest in set(actions):
-        return Call(name, robot, rest, ())
     parts = rest.split("_")
     known = set(actions)
-    for count in range(len(parts) - 1, 0, -1):
+    # '_' separates parameters, but action names contain it, too: the longest registered name wins.
+    for count in range(len(parts), 0, -1):
         action = "_".join(parts[:count])
         if action in known:
             return Call(name, robot, action, tuple(parts[count:]))
     return Call(name, robot, parts[0], tuple(parts[1:]))
 
 
-# -- what can be registered ------------------------------------------------------------------------
+# -- kinds of actions that can be registered -------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """An action whose state a function makes.
+    """An action whose state is created by a function.
 
     Attributes:
         make: Called with the `Call`, once for each name, when the plan is built; returns a state.
@@ -80,15 +79,15 @@ class Made:
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """An action that a function does, `function(userdata, *parameters)`.
+    """An action that a function executes, `function(userdata, *parameters)`.
 
-    It may be `async`; a preempt cancels it then. None and true end with 'succeeded', None after a
-    request to stop with 'preempted', false with 'aborted', a text is the outcome. A parameter of
-    the function that is called `robot` gets the robot's name.
+    It may be `async`; then a preempt cancels it. If it returns None or True the outcome is
+    'succeeded' (None after a request to stop: 'preempted'), False: 'aborted', a text: that text. If
+    the function has a parameter named `robot`, it gets the robot's name.
 
     Attributes:
         function: The function.
-        outcomes: Outcomes beside 'succeeded', 'aborted' and 'preempted'.
+        outcomes: Outcomes other than 'succeeded', 'aborted' and 'preempted'.
         input_keys: Userdata keys that it reads.
         output_keys: Userdata keys that it writes.
         options: See `smachpy.machines.state.StateOptions`.
@@ -103,15 +102,15 @@ class Function:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """An action that a goal at an action server does.
+    """An action that sends a goal to an action server.
 
     Attributes:
-        action: Name of the action; of a robot's, below the robot's name.
+        action: Name of the action. If the plan's name has a robot, it is below the robot's name.
         spec: Its class (XAction).
         goal: Field of the goal, with dots ("target_pose.pose.position.x"), -> value. In a text
             "{1}" stands for the first parameter of the plan's name, "{robot}" for the robot and
-            "{NAME}" for a userdata key; the field's type says what it becomes.
-        cases: First parameter -> more of such fields ("kitchen" -> where that is).
+            "{NAME}" for a userdata key; the text is converted to the type of the field.
+        cases: First parameter -> further fields ("kitchen" -> its position).
         options: See `smachpy.SimpleActionState`.
     """
 
@@ -123,14 +122,14 @@ class Goal:
 
 
 class Unbound(State):
-    """Stands for an action that nothing is registered for; a plan with one does not run."""
+    """Stands for an action for which nothing is registered; a plan with one does not run."""
 
     def __init__(self, call: Call) -> None:
         super().__init__(OUTCOMES)
         self.call = call
 
     def execute(self, ud: Any) -> str:
-        """Refuse.
+        """Refuse to run.
 
         Raises:
             InvalidStateError: always.
@@ -161,11 +160,12 @@ class FunctionAction(State):
     def execute(self, ud: Any) -> str:
         """Call the function.
 
-        Blocks: as long as it does.
+        Blocks: until it returns.
         """
         return self._outcome(self._function(ud, *self._call.values(ud), **self._kwargs))
 
     def _outcome(self, result: Any) -> str:
+        # A function that stops early because of the request need not return 'preempted'.
         if result is None and self.preempt_requested():
             self.service_preempt()
             return "preempted"
@@ -176,7 +176,10 @@ class FunctionAction(State):
 
 
 class AsyncFunctionAction(FunctionAction):
-    """Runs an `async` `Function`; a preempt cancels it."""
+    """Runs an `async` `Function`; a preempt cancels it.
+
+    A class of its own, as states are recognised as async by their `execute`.
+    """
 
     async def execute(self, ud: Any) -> str:  # type: ignore[override]
         """Await the function."""
@@ -187,14 +190,14 @@ class AsyncFunctionAction(FunctionAction):
 
 
 class Wait(State):
-    """`wait_N`: lets N seconds pass. Outcomes: 'succeeded', 'preempted'."""
+    """`wait_N`: waits N seconds. Outcomes: 'succeeded', 'preempted'."""
 
     def __init__(self, call: Call) -> None:
         super().__init__(("succeeded", "preempted"), call.variables)
         _check_count(call, "seconds, as in wait_5", 1)
         self._call = call
         (text,) = call.parameters
-        if not text.startswith("@"):
+        if not text.startswith("@"):  # the value of a variable is known only when it runs
             _seconds(call.name, text)
 
     def execute(self, ud: Any) -> str:
@@ -221,7 +224,7 @@ def _seconds(name: str, text: str) -> float:
 
 
 class WaitFor(State):
-    """`waitfor_C`: waits until a condition holds; `waitfor_not_C` until it does not."""
+    """`waitfor_C`: waits until a condition is true; `waitfor_not_C`: until it is false."""
 
     def __init__(self, call: Call, knowledge: Knowledge) -> None:
         super().__init__(("succeeded", "preempted"), call.variables)
@@ -234,14 +237,16 @@ class WaitFor(State):
     def execute(self, ud: Any) -> str:
         """Wait.
 
-        Blocks: until then, or a preempt.
+        Blocks: until the condition has that value, or a preempt.
         """
         del ud
         clock, knowledge = clock_of_run(), self._knowledge
         wake = clock.event(f"condition {self._name}")
+        # Both end the wait: a change of a condition, and a preempt.
         forget = [knowledge.subscribe(wake.set), on_preempt(self, wake.set)]
         try:
             while not self.preempt_requested():
+                # Clear before looking: a change between the look and the wait sets it again.
                 wake.clear()
                 if knowledge.value(self._name, self._name, clock.now()) is not self._negated:
                     return "succeeded"
@@ -254,18 +259,18 @@ class WaitFor(State):
 
 
 class SetVariable(State):
-    """`setvar_@V_value`: writes the userdata key V. `unknownvar_@V` forgets it."""
+    """`setvar_@V_value`: writes the userdata key V. `unknownvar_@V`: deletes it."""
 
     def __init__(self, call: Call, forget: Callable[[str], None] | None = None) -> None:
         _check_count(call, "a variable, as in setvar_@place_kitchen")
         self._key, *rest = call.parameters
         self._key = self._key.removeprefix("@")
         super().__init__(("succeeded",), (), [self._key])
-        self._value = "_".join(rest)
+        self._value = "_".join(rest)  # a value may contain '_'
         self._forget = forget
 
     def execute(self, ud: Any) -> str:
-        """Write it."""
+        """Write or delete the key."""
         if self._forget is not None:
             self._forget(self._key)
         else:
@@ -291,14 +296,14 @@ class Order(State):
 
 
 class Binder:
-    """Makes the states of a plan's executables.
+    """Creates the states of a plan's executables.
 
     Args:
-        actions: Name of an action, or a whole name, -> what does it: a state (for one name), a
-            class of states (called with the parameters), a function (called with the userdata and
-            the parameters), `Function`, `Goal`, or `Made`.
-        built_in: Name -> function that makes the state from the call.
-        server: Does what nothing else does; see `PNPServer`.
+        actions: Name of an action, or a whole name -> a state (for one name), a class of states
+            (called with the parameters), a function (called with the userdata and the parameters),
+            `Function`, `Goal`, or `Made`.
+        built_in: Name -> function that creates the state from the call.
+        server: Executes all other actions; see `PNPServer`.
     """
 
     def __init__(
@@ -315,22 +320,18 @@ class Binder:
             if not (isinstance(name, str) and name and fits):
                 problems.add(f"got {name!r}: {given!r}; expected {holds}.")
         problems.raise_all()
-        if server is not None:
+        if server is not None:  # the others are the robot's own, such as its variables
             built_in = {name: built_in[name] for name in built_in.keys() & server.LOCAL}
         self._built_in = built_in
         self._server = server
-        self._taken: dict[int, str] = {}
-
-    def has(self, name: str) -> bool:
-        """Tell whether this very name is registered, as it stands in the plan."""
-        return name in self._actions
+        self._taken: dict[int, str] = {}  # id of a state -> the name that has it
 
     def bind(self, name: str) -> tuple[State, str]:
-        """Return the state of an executable, and what is wrong with it or ""."""
+        """Return the state of an executable, and the problem with it or ""."""
         known = {*self._actions, *self._built_in}
-        call = take_apart(name, known)
+        call = parse_name(name, known)
         given = self._actions.get(name, self._actions.get(call.action))
-        if name in self._actions:
+        if name in self._actions:  # registered under its whole name: it has no parameters
             call = Call(name, call.robot, name, ())
         try:
             if given is None and call.action in self._built_in:
@@ -342,16 +343,17 @@ class Binder:
             return self._made(call, given), ""
         except InvalidStateError as error:
             return Unbound(call), error.message
-        except Exception as error:  # noqa: BLE001  the user's constructor; told with the others
+        except Exception as error:  # noqa: BLE001  the user's constructor; reported with the others
             text = f"{name}: making its state raised {type(error).__name__}: {error}"
             return Unbound(call), text
 
     def _made(self, call: Call, given: Any) -> State:
+        # One name for each state: actions run at the same time, and a state object runs once.
         if isinstance(given, State):
             other = self._taken.setdefault(id(given), call.name)
             if other != call.name:
                 raise InvalidStateError(
-                    f"{call.name}: got the state that does {other!r}, too; expected one of its "
+                    f"{call.name}: got the state that {other!r} has, too; expected one of its "
                     "own. Try its class, or pnp.Made(function)."
                 )
             return given
@@ -401,7 +403,7 @@ def _unknown(call: Call, known: Iterable[str]) -> str:
 
 
 def _goal_state(call: Call, goal: Goal) -> State:
-    """Return the state that sends a goal, its fields checked now as far as they are known."""
+    """Return the state that sends a goal; fields that do not depend on userdata are checked now."""
     from smachpy.actions.simple_action_state import SimpleActionState
 
     fields = {**goal.goal}
@@ -412,6 +414,7 @@ def _goal_state(call: Call, goal: Goal) -> State:
                 f"{call.name}: cases: got {case!r}; expected one of {sorted(goal.cases)}."
                 f"{did_you_mean(case, goal.cases)}"
             )
+    # "{NAME}" in any text is a userdata key, which the state must declare; "{1}" is a parameter.
     keys = {
         key
         for text in (*fields.values(), *(v for c in goal.cases.values() for v in c.values()))
@@ -424,7 +427,7 @@ def _goal_state(call: Call, goal: Goal) -> State:
     def fill(ud: Any, made: Any) -> None:
         parameters = call.values(ud)
         case = goal.cases.get(parameters[0] if parameters else "", {}) if goal.cases else {}
-        for path, value in {**fields, **case}.items():
+        for path, value in {**fields, **case}.items():  # a case replaces fields of the goal
             _set_field(call, made, path, _filled(call, value, parameters, ud))
 
     state = SimpleActionState(
@@ -436,7 +439,7 @@ def _goal_state(call: Call, goal: Goal) -> State:
     )
     if not (call.variables or keys):
         spec: Any = goal.spec
-        fill({}, spec().action_goal.goal)  # a wrong field is told now, not when it runs
+        fill({}, spec().action_goal.goal)  # reports a wrong field now, not during the run
     return state
 
 
@@ -460,14 +463,15 @@ def _filled(call: Call, value: Any, parameters: tuple[str, ...], ud: Any) -> Any
 
 
 def _set_field(call: Call, message: Any, path: str, value: Any) -> None:
-    """Set a field of a message, a text as what the field holds.
+    """Set a field of a message; a text is converted to the type of the field.
 
     Raises:
-        InvalidStateError: there is no such field, or the value is none for it.
+        InvalidStateError: there is no such field, or the value does not fit it.
     """
     *outer, last = path.split(".")
     for name in outer:
         message = _field(call, message, name, path)
+    # New messages have default values, whose types are those of the fields.
     before = _field(call, message, last, path)
     kind = type(before)
     if isinstance(value, str) and kind is not str:
@@ -483,15 +487,9 @@ def _set_field(call: Call, message: Any, path: str, value: Any) -> None:
         raise InvalidStateError(f"{call.name}: goal: {path}: {error}") from error
 
 
-def _truth(text: str) -> bool:
-    if text.lower() not in {"true", "false", "1", "0"}:
-        raise ValueError(text)
-    return text.lower() in {"true", "1"}
-
-
 def _read(kind: type, text: str) -> Any:
-    if kind is bool:
-        return _truth(text)
+    if kind is bool and text.lower() in {"true", "false", "1", "0"}:
+        return text.lower() in {"true", "1"}
     if kind not in {int, float}:
         raise ValueError(text)
     return kind(text)

@@ -1,4 +1,4 @@
-"""Plans built in Python: actions, sequences, branches, forks, interrupts, loops; made into nets.
+"""Plans built in Python from actions, sequences, branches, forks, interrupts and loops, as nets.
 
     from smachpy import pnp
 
@@ -27,19 +27,20 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 LASTS: Final = ("restart_action", "skip_action", "restart_plan", "fail_plan", "goal")
-"""What may come after a recovery; or GOTO_ and a label."""
+"""How a recovery may end; or with GOTO_ and a label."""
 
 ACTION_FAILED: Final = "action_failed"
+# Dots, brackets, ';', '|' and others separate parts of labels or of plans in text form.
 _NAME = re.compile(r"[^\s()\[\].;|<>{}:?!*][^\s()\[\];|<>{}:?!*]*")
 _DEEPEST: Final = 100
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a plan; made by `action`, `sense`, `choose`, `fork`, `loop`, `mark`, `go_to`, ...
+    """A part of a plan; `action`, `sense`, `choose`, `fork`, `loop`, `mark` and `go_to` return one.
 
     Attributes:
-        line: Of the text it was read from; 0 when there is none.
+        line: Its line in the text of the plan; 0 if there is no text.
     """
 
     line: int = 0
@@ -49,12 +50,12 @@ class Part:
         return Sequence_(0, tuple(_flat((self, *parts))))
 
     def net(self, name: str = "plan", *, file: str = "") -> Net:
-        """Return the plan as a net; where the part ends is its goal.
+        """Return the plan as a net; its goal is the end of the part.
 
         Raises:
-            InvalidStateError: a label that is gone to is not there, or the plan is empty.
+            InvalidStateError: the label of a jump is missing, or the plan is empty.
         """
-        return _Weaver(name, file).net(self)
+        return _NetBuilder(name, file).net(self)
 
 
 def _flat(parts: tuple[Any, ...]) -> list[Part]:
@@ -70,19 +71,19 @@ def _flat(parts: tuple[Any, ...]) -> list[Part]:
 
 @dataclass(frozen=True)
 class Sequence_(Part):  # noqa: N801  `Sequence` is a container of smachpy
-    """Parts one after the other."""
+    """Parts that run one after the other."""
 
     parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What interrupts an action, and what is done then.
+    """A condition that interrupts an action, and the recovery that follows.
 
     Attributes:
-        condition: Its text; "action_failed" for the failure of the action.
-        recovery: What is done.
-        last: What comes after: one of `LASTS`, or GOTO_ and a label.
+        condition: The text of the condition; "action_failed" for the failure of the action.
+        recovery: The parts of the recovery.
+        last: The step after the recovery: one of `LASTS`, or GOTO_ and a label.
     """
 
     condition: str
@@ -95,10 +96,11 @@ class Action(Part):
     """One action.
 
     Attributes:
-        name: As in labels.
-        seconds: It is interrupted after so long [s]; None: no limit.
-        rules: What else interrupts it.
-        branches: Pairs (condition, part): its ends. Empty: it ends when it has finished.
+        name: Its name, as in labels.
+        seconds: Time after which it is interrupted [s], as a text; None: no limit.
+        rules: Other interrupts.
+        branches: Its ends, pairs (condition, part that follows); if empty, it has one end, when it
+            has finished.
     """
 
     name: str = ""
@@ -107,13 +109,13 @@ class Action(Part):
     branches: tuple[tuple[str, Part], ...] = ()
 
     def interrupt(self, condition: str, *recovery: Part, then: str = "restart_action") -> Action:
-        """Return the action with something that interrupts it.
+        """Return the action with an interrupt.
 
         Args:
-            condition: When; "action_failed": when the action fails.
-            recovery: What is done then.
-            then: What comes after: 'restart_action', 'skip_action', 'restart_plan', 'fail_plan',
-                'goal', or 'GOTO_' and a label.
+            condition: The condition that interrupts it; "action_failed": its failure.
+            recovery: The parts that follow.
+            then: The step after the recovery: 'restart_action', 'skip_action', 'restart_plan',
+                'fail_plan', 'goal', or 'GOTO_' and a label.
 
         Raises:
             InvalidStateError: an argument is wrong; all problems at once.
@@ -130,30 +132,31 @@ class Action(Part):
         return replace(self, rules=(*self.rules, rule))
 
     def within(self, seconds: float) -> Action:
-        """Return the action with a limit: it is interrupted after so long [s]."""
+        """Return the action with a limit [s] after which it is interrupted."""
         problems = Problems(self.name)
         checked = problems.seconds("within", seconds, optional=False)
         problems.raise_all()
+        # As in the label `wait_N`: no exponent, and no zeros at the end.
         return replace(self, seconds=f"{checked:.9f}".rstrip("0").rstrip("."))
 
 
 @dataclass(frozen=True)
 class Choice(Part):
-    """The first branch whose condition holds."""
+    """Waits until the condition of a branch is true, and runs that branch."""
 
     branches: tuple[tuple[str, Part], ...] = ()
 
 
 @dataclass(frozen=True)
 class Fork(Part):
-    """All parts at once; it ends when all have."""
+    """Parts that run at the same time; it ends when all of them have ended."""
 
     parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True)
 class Loop(Part):
-    """A part again and again, until a condition holds when it has ended; "": for ever."""
+    """A part that is repeated until a condition is true when it has ended; "": for ever."""
 
     part: Part = Part()
     until: str = ""
@@ -161,14 +164,14 @@ class Loop(Part):
 
 @dataclass(frozen=True)
 class Mark(Part):
-    """A label that `go_to` leads to."""
+    """A label, the target of a `go_to`."""
 
     name: str = ""
 
 
 @dataclass(frozen=True)
 class GoTo(Part):
-    """The plan goes on at a label; "goal" and "fail" are the plan's ends, "init" its beginning."""
+    """A jump to a label; "goal" and "fail" are the ends of the plan, "init" is its beginning."""
 
     name: str = ""
 
@@ -180,7 +183,7 @@ def action(name: str, *parameters: object, robot: str = "") -> Action:
     """Return an action: `action("goto", "kitchen", robot="r1")` is `r1#goto_kitchen`.
 
     Raises:
-        InvalidStateError: that is no name for a label.
+        InvalidStateError: the name cannot be used in a label.
     """
     words = "_".join(map(str, (name, *parameters)))
     whole = f"{robot}#{words}" if robot else words
@@ -192,22 +195,22 @@ def action(name: str, *parameters: object, robot: str = "") -> Action:
 
 
 def sense(act: Action, branches: Mapping[str, Part | None]) -> Part:
-    """Return an action that ends in one of several ways: condition -> what comes then."""
+    """Return an action with several ends: condition -> part that follows, or None."""
     return replace(act, branches=_branches("sense", branches))
 
 
 def choose(branches: Mapping[str, Part | None]) -> Part:
-    """Return a choice: condition -> what comes then; it waits until one holds."""
+    """Return a choice: condition -> part that follows, or None; it waits until one is true."""
     return Choice(0, _branches("choose", branches))
 
 
 def fork(*parts: Part) -> Part:
-    """Return parts that run at once; it ends when all have ended."""
+    """Return parts that run at the same time; it ends when all of them have ended."""
     return Fork(0, tuple(Sequence_(0, tuple(_flat((part,)))) for part in parts))
 
 
 def loop(*parts: Part, until: str = "") -> Part:
-    """Return parts that are done again and again until a condition holds at their end."""
+    """Return parts that are repeated until a condition is true at their end."""
     if until:
         problems = Problems("loop")
         _check_condition(problems, until)
@@ -216,12 +219,12 @@ def loop(*parts: Part, until: str = "") -> Part:
 
 
 def mark(name: str) -> Part:
-    """Return a label that `go_to` leads to."""
+    """Return a label, as the target of a `go_to`."""
     return Mark(0, name)
 
 
 def go_to(name: str) -> Part:
-    """Return a jump to a label; "goal", "fail" and "init" are there by themselves."""
+    """Return a jump to a label; "goal", "fail" and "init" always exist."""
     return GoTo(0, name)
 
 
@@ -245,29 +248,31 @@ def _check_condition(problems: Problems, condition: object) -> None:
         problems.add(f"condition: got {condition!r}: {error.problem}")
 
 
-class _Weaver:
-    """Makes a net of a part.
+class _NetBuilder:
+    """Builds the net of a part.
 
-    A place is known by its number until the end: its name may change, when it becomes the goal.
+    Places have numbers here, as the name of the last one changes if it becomes the goal.
     """
 
     def __init__(self, name: str, file: str) -> None:
         self._name = name
         self._file = file
-        self._places: list[tuple[str, int]] = []
-        self._transitions: list[tuple[str, int]] = []
+        self._places: list[tuple[str, int]] = []  # name, line
+        self._transitions: list[tuple[str, int]] = []  # name, line
         self._arcs: list[Arc] = []
-        self._labels: dict[str, int] = {}
-        self._jumps: list[tuple[str, int, int]] = []
+        self._labels: dict[str, int] = {}  # label of a jump -> place
+        self._jumps: list[tuple[str, int, int]] = []  # label, place before the jump, line
         self._problems = Problems(name)
         self._depth = 0
 
     def net(self, part: Part) -> Net:
         init = self._place("init")
         self._labels["init"] = init
-        end = self._weave(part, init)
+        end = self._add(part, init)
         if end == init:
             self._problems.add("got no action; expected some.")
+        # The last place is the goal, unless jumps lead to the goal or to that place: these get a
+        # goal place of their own.
         wants_goal = any(label == "goal" for label, _, _ in self._jumps)
         if end is not None and not wants_goal and end not in self._labels.values():
             self._places[end] = ("goal", self._places[end][1])
@@ -276,6 +281,7 @@ class _Weaver:
         for label in ("goal", "fail"):
             if label not in self._labels and any(one == label for one, _, _ in self._jumps):
                 self._labels[label] = self._place(label)
+        # Last, as a label may stand behind the jumps to it.
         for label, place, line in self._jumps:
             if label not in self._labels:
                 known = sorted(self._labels)
@@ -312,17 +318,17 @@ class _Weaver:
         self._arcs += [Arc(f"p{place}", own) for place in inputs]
         self._arcs += [Arc(own, f"p{place}") for place in outputs]
 
-    def _weave(self, part: Part, entry: int) -> int | None:
-        """Add a part that begins at a place; return where it ends, None when it goes elsewhere."""
+    def _add(self, part: Part, entry: int) -> int | None:
+        """Add a part from the place `entry`; return its last place, None if it ends in a jump."""
         self._depth += 1
         if self._depth > _DEEPEST:
             raise InvalidStateError(f"{self._name}: got more than {_DEEPEST} parts in each other.")
         try:
-            return self._woven(part, entry)
+            return self._add_part(part, entry)
         finally:
             self._depth -= 1
 
-    def _woven(self, part: Part, entry: int) -> int | None:  # noqa: PLR0911  one for each kind
+    def _add_part(self, part: Part, entry: int) -> int | None:  # noqa: PLR0911  one for each kind
         match part:
             case Action():
                 return self._action(part, entry)
@@ -349,8 +355,8 @@ class _Weaver:
     def _sequence(self, parts: tuple[Part, ...], entry: int) -> int | None:
         at: int | None = entry
         for part in parts:
-            # What follows a jump is reached by a label in it, or by nobody.
-            at = self._weave(part, self._place() if at is None else at)
+            # The part after a jump can only be reached by a label in it: it gets its own place.
+            at = self._add(part, self._place() if at is None else at)
         return at
 
     def _guarded(self, condition: str, entry: int, line: int) -> int:
@@ -359,9 +365,9 @@ class _Weaver:
         return place
 
     def _merge(self, branches: list[tuple[int, Part]]) -> int | None:
-        """Weave each part from its place, and bring their ends together."""
-        ends = [self._weave(part, place) for place, part in branches]
-        left = [end for end in ends if end is not None]
+        """Add each part from its place, and join their ends."""
+        ends = [self._add(part, place) for place, part in branches]
+        left = [end for end in ends if end is not None]  # the others end in jumps
         if len(left) <= 1:
             return left[0] if left else None
         out = self._place()
@@ -372,27 +378,29 @@ class _Weaver:
     def _fork(self, parts: tuple[Part, ...], entry: int, line: int) -> int:
         begins = [self._place("", line) for _ in parts]
         self._transition("fork", [entry], begins, line)
-        ends = [self._weave(part, place) for part, place in zip(parts, begins, strict=True)]
-        if None in ends:
-            self._problems.add("fork: got a branch that goes elsewhere; expected it to end.")
+        ends = [self._add(part, place) for part, place in zip(parts, begins, strict=True)]
+        if None in ends:  # the join would never get its token
+            self._problems.add("fork: got a branch that ends in a jump; expected none.")
         out = self._place()
         self._transition("join", [end for end in ends if end is not None], [out], line)
         return out
 
     def _loop(self, body: Part, until: str, entry: int) -> int | None:
-        end = self._weave(body, entry)
+        end = self._add(body, entry)
         if end is None:
             return None
         if not until:
             self._transition("", [end], [entry], 0)
             return None
         out = self._place()
+        # The guards exclude each other: exactly one of the two transitions fires.
         self._transition(f"[{until}]", [end], [out], 0)
         self._transition(f"[not ({until})]", [end], [entry], 0)
         return out
 
     def _action(self, part: Action, entry: int) -> int | None:
         name, line = part.name, part.line
+        # A time limit is an action `wait_N` beside it: the first of the two to end stops the other.
         execs = [self._place(f"{name}.exec", line)]
         limit = "" if part.seconds is None else f"wait_{part.seconds}"
         if limit:
@@ -410,7 +418,7 @@ class _Weaver:
         else:
             out = self._place("", line)
             self._transition(f"{name}.end{stop}", execs, [out], line)
-        if limit:
+        if limit:  # the time is over first
             out = self._place("", line) if out is None else out
             self._transition(f"{limit}.end {name}.interrupt", execs, [out], line)
         for rule in part.rules:
@@ -420,7 +428,7 @@ class _Weaver:
     def _rule(
         self, part: Action, rule: Rule, execs: list[int], stop: str, entry: int, out: int | None
     ) -> int | None:
-        """Add an interrupt and its recovery; return where the action ends."""
+        """Add an interrupt and its recovery; return the last place of the action."""
         begin = self._place("", part.line)
         label = f"{part.name}.interrupt{stop} [{rule.condition}]"
         if rule.condition == ACTION_FAILED:
@@ -432,7 +440,7 @@ class _Weaver:
         if rule.last == "skip_action":
             out = self._place() if out is None else out
             self._transition("", [end], [out], part.line)
-        elif rule.last == "restart_action":
+        elif rule.last == "restart_action":  # back to the place before its start
             self._transition("", [end], [entry], part.line)
         else:
             words = {"restart_plan": "init", "fail_plan": "fail", "goal": "goal"}

@@ -1,4 +1,4 @@
-"""What is wrong with a plan, found without running it; no threads, time or I/O."""
+"""Finds problems of a plan without running it; no threads, time or I/O."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from smachpy.pnp.reach import Reachable
 
 MOST_SHOWN = 20
-"""Dead transitions and places that are never marked, told one by one."""
+"""Dead transitions, and unmarked places, that are reported one by one; the rest is counted."""
 
 
 def check_plan(plan: Plan) -> tuple[PlanProblem, ...]:
-    """Return what is wrong with a plan: its labels, and what its net can do.
+    """Return the problems of a plan's labels, and of the markings that its net can reach.
 
-    Guards count as what may be true or false at any time, so a run that is shown may be one that
-    they rule out.
+    Guards count as true or false at any time, so the guards may rule out a run that is shown.
     """
+    # The search is done once, for all rules of the net.
     reached = explore(plan.net)
     return (*plan.problems, *_net_problems(plan, reached))
 
@@ -37,14 +37,14 @@ def _net_problems(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
         text = "got no token in any place; expected an initial marking."
         yield problem_of(net, "no-token", "error", text)
         return
-    if reached.covering is not None:
+    if reached.covering is not None:  # the search has ended there: more cannot be said
         yield _unbounded(plan, reached)
         return
     if not reached.complete:
-        text = f"has more than {len(reached.came) - 1} markings; looked at no more."
+        text = f"has more than {len(reached.came) - 1} markings; the others were not checked."
         yield problem_of(net, "too-many", "note", text)
     yield from _ends(plan, reached)
-    if reached.complete:
+    if reached.complete:  # otherwise the rest of the markings may have them
         yield from _never(plan, reached)
     yield from _shared(plan, reached)
     yield from _races(plan, reached)
@@ -69,10 +69,10 @@ def _unbounded(plan: Plan, reached: Reachable) -> PlanProblem:
 
 
 def _ends(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
-    """Yield what is wrong with the ends of the plan."""
+    """Yield the problems of the plan's goal, of its failure, and deadlocks."""
     net = plan.net
     if not plan.goals:
-        text = "has no goal place: the plan ends with 'fail' where nothing can fire any more."
+        text = "has no goal place: the plan ends with 'fail' when nothing can fire any more."
         yield problem_of(net, "no-goal", "note", text, hint="Try the label 'goal'.")
     elif reached.complete and not any(map(plan.is_goal, reached.came)):
         names = [net.name_of(place) for place in plan.goals]
@@ -82,6 +82,7 @@ def _ends(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
         names = [net.name_of(place) for place in plan.fails]
         text = f"no firing sequence leads to the failed plan: expected tokens in all of {names}."
         yield problem_of(net, "unreachable-fail", "warning", text, place=next(iter(plan.fails)))
+    # The nearest deadlock is shown, the others are counted.
     stuck = [m for m in reached.dead if not (plan.is_goal(m) or plan.is_fail(m))]
     if stuck and plan.goals:
         more = f" So are {len(stuck) - 1} more markings." if len(stuck) > 1 else ""
@@ -100,6 +101,7 @@ def _ends(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
 
 
 def _never(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    # Transitions without inputs have a rule of their own, "no-input".
     net = plan.net
     transitions = [
         t for t in range(len(net.transitions)) if t not in reached.fired and net.inputs[t]
@@ -118,7 +120,7 @@ def _never(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
 
 
 def _shared(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
-    """Yield the actions that two tokens share."""
+    """Yield the actions whose single run two tokens share."""
     net = plan.net
     for name, known in plan.executables.items():
         places = known.places
@@ -130,9 +132,10 @@ def _shared(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
             if len(marked) > 1:
                 labels = sorted({net.places[place].id for place in marked})
                 text = (
-                    f"{name!r} runs once for {len(marked)} tokens, in {labels}: what ends it for "
-                    "one ends it for all. Expected one token, or names that differ."
+                    f"{name!r} runs once for {len(marked)} tokens, in {labels}: if it ends for "
+                    "one, it ends for all. Expected one token, or different names."
                 )
+                # One example for each name is enough.
                 yield problem_of(
                     net,
                     "shared-name",
@@ -146,7 +149,7 @@ def _shared(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
 
 
 def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
-    """Yield pairs of ends of one exec place of which nothing decides which one fires."""
+    """Yield pairs of ends of one exec place that may fire at the same time."""
     net = plan.net
     for name, known in plan.executables.items():
         for place in known.places:
@@ -158,6 +161,7 @@ def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
             for one, other in combinations(ends, 2):
                 if not _may_both_hold(plan.conditions[one], plan.conditions[other]):
                     continue
+                # They race only if both have their tokens at the same marking.
                 marking = next(
                     (
                         m
@@ -171,7 +175,7 @@ def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
                 text = (
                     f"races with {net.transition_name(other)!r} (transition "
                     f"{net.transitions[other].id!r}) for the token of {name!r}; the first in the "
-                    "file wins. Expected conditions that rule each other out."
+                    "file wins. Expected conditions that exclude each other."
                 )
                 yield problem_of(
                     net,
@@ -185,5 +189,8 @@ def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
 
 
 def _may_both_hold(one: Condition | None, other: Condition | None) -> bool:
-    """Tell whether two ends race: they have the same condition, or one has none."""
+    """Return whether two ends race: they have the same condition, or one has none.
+
+    Two different conditions count as exclusive, as "door_open" and "not door_open" are.
+    """
     return one is None or other is None or one == other

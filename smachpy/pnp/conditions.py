@@ -1,10 +1,10 @@
-"""The conditions of PNP: their text, and what they are worth; no threads, time or I/O.
+"""The conditions of PNP: how they are read and evaluated; no threads, time or I/O.
 
     guard  = body | "(" body ")"            cond = ATOM | "(" body ")"
     body   = "and" cond cond {cond} | "or" cond cond {cond} | "not" cond | ATOM
 
-Source: the grammar of PetriNetPlans 1.4. It reads what is wrong as false and passes unknown
-characters over; here both are errors.
+Source: the grammar of PetriNetPlans 1.4. There a wrong condition is false, and unknown characters
+are skipped; here both are errors.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 
 Operator: TypeAlias = Literal["atom", "not", "and", "or"]
 
+# An atom as in PNP's grammar; any other character is an error, except brackets.
 _TOKEN = re.compile(r"\s*(?:(?P<atom>@?[A-Za-z][A-Za-z0-9\-@._#{},<>+^/\"]*)|(?P<other>\S))")
 _KEYWORDS = {"and": "and", "AND": "and", "or": "or", "OR": "or", "not": "not", "NOT": "not"}
-_DEEPEST = 50
+_DEEPEST = 50  # brackets; the reader is recursive
 OF_ACTION = ("finished", "failed")
-"""What a condition may ask of an action: `goto_kitchen.finished`."""
+"""States of an action that a condition may test: `goto_kitchen.finished`."""
 
 
 class ConditionError(ValueError):
@@ -30,8 +31,8 @@ class ConditionError(ValueError):
 
     Attributes:
         text: The condition.
-        at: Where in it, from 0.
-        problem: What was found, what was expected, and what to try.
+        at: The position in it, from 0.
+        problem: The characters found, those expected, and a hint.
     """
 
     def __init__(self, text: str, at: int, problem: str) -> None:
@@ -46,9 +47,9 @@ class Condition:
     """A condition.
 
     Attributes:
-        operator: What it is.
-        name: Of an atom.
-        parts: What "not", "and" and "or" are about.
+        operator: Its operator; "atom" for a name.
+        name: The name, for an atom.
+        parts: The operands of "not", "and" and "or".
     """
 
     operator: Operator
@@ -56,15 +57,15 @@ class Condition:
     parts: tuple[Condition, ...] = ()
 
     def atoms(self) -> tuple[str, ...]:
-        """Return the names that it asks for, each once, in their order."""
+        """Return the names in it, each once, in their order."""
         if self.operator == "atom":
             return (self.name,)
         return tuple(dict.fromkeys(name for part in self.parts for name in part.atoms()))
 
     def holds(self, value: Callable[[str], bool]) -> bool:
-        """Tell whether it is true when `value` gives that of each atom.
+        """Return whether it is true, if `value` returns the value of each atom.
 
-        Every atom is asked, also when the answer is known before: asking may use an event up.
+        Every atom is evaluated, even if the result is known before: reading an event uses it up.
         """
         if self.operator == "atom":
             return value(self.name)
@@ -81,12 +82,12 @@ class Condition:
 
 
 def atom(name: str) -> Condition:
-    """Return the condition that is one atom."""
+    """Return a condition of one atom."""
     return Condition("atom", name)
 
 
 def both(*parts: Condition) -> Condition:
-    """Return the condition that all of these hold; of one part, that part."""
+    """Return the conjunction of conditions; for a single one, that one."""
     return parts[0] if len(parts) == 1 else Condition("and", "", parts)
 
 
@@ -94,7 +95,7 @@ def parse(text: str) -> Condition:
     """Read a condition: `c`, `not c`, `and a b (not c)`.
 
     Raises:
-        ConditionError: it is none.
+        ConditionError: the text cannot be read.
     """
     reader = _Reader(text)
     found = reader.body(0)
@@ -148,6 +149,7 @@ class _Reader:
             return self._atom()
         self._take()
         if operator == "not":
+            # The grammar requires brackets here: not (and a b).
             if self._next() in _KEYWORDS:
                 raise self._fail("a name or ( ) after not", " Try not (...).")
             return Condition("not", "", (self._operand(depth),))
@@ -185,6 +187,7 @@ class _Reader:
             raise self._fail("its end", self._infix())
 
     def _infix(self) -> str:
+        # Most languages write "a and b".
         token = self._next()
         if token in _KEYWORDS and _KEYWORDS[token] != "not":
             return f" Operators stand in front: try {_KEYWORDS[token]} A B."

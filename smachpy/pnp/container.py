@@ -1,4 +1,4 @@
-"""`PetriNetPlan`: a plan as a container, and how one is loaded from files."""
+"""`PetriNetPlan`, a plan as a container; and `load`, which reads one from files."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ OUTCOMES = ("goal", "fail", "preempted")
 
 
 class PlanData(ContainerData):
-    """What the library knows of one plan.
+    """The library's data of one plan.
 
     Attributes:
         net_plan: The plan itself.
         names: Label of a child -> the plan's name for it.
-        knowledge: What its guards ask.
-        has_actions: Somebody has said what does some actions.
-        unbound: Label -> why nothing does that action.
-        execution: Its run, while there is one.
+        knowledge: The conditions and events that its guards ask for.
+        has_actions: Whether actions were registered.
+        unbound: Label -> the problem of an action for which nothing is registered.
+        execution: The current run, or None.
     """
 
     __slots__ = ("execution", "has_actions", "knowledge", "names", "net_plan", "unbound")
@@ -73,7 +73,7 @@ class PlanData(ContainerData):
 
 
 class _Compiled:
-    """A plan, compiled: its children, and the table of what fires."""
+    """A plan, compiled: its children, and the table of its firings."""
 
     __slots__ = ("epoch", "steps", "table", "userdata")
 
@@ -83,6 +83,7 @@ class _Compiled:
         self.userdata = machine.userdata
         self.steps = {label: make_step(machine, label) for label in data.children}
         for step in self.steps.values():
+            # A child's outcome leads nowhere by itself: the net decides what follows.
             step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
         self.table = Table(
             data.net_plan,
@@ -91,12 +92,13 @@ class _Compiled:
             lambda name: data.knowledge.source_of(name) is not None,
         )
 
+    # See `smachpy.machines.container`: a changed child makes the plan compile again.
     def is_stale(self) -> bool:
         return any(step.is_stale() for step in self.steps.values())
 
 
-class _Noting(dict[str, Any]):
-    """The values of userdata; who asked is told of each write."""
+class _WatchedValues(dict[str, Any]):
+    """The values of userdata; calls `on_write` after each write, as conditions may depend on it."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.on_write: Any = None
@@ -113,8 +115,8 @@ class _Noting(dict[str, Any]):
             self.on_write()
 
 
-class _NotingChecked(_Noting, CheckedDict):
-    """The same of typed userdata."""
+class _WatchedCheckedValues(_WatchedValues, CheckedDict):
+    """The same for typed userdata."""
 
     def __init__(self, fields: Fields) -> None:
         self.on_write = None
@@ -122,7 +124,7 @@ class _NotingChecked(_Noting, CheckedDict):
 
 
 class Parameters(NamedTuple):
-    """How a plan and its sub-plans run; see `PetriNetPlan`."""
+    """The arguments that a plan shares with its sub-plans; see `PetriNetPlan`."""
 
     actions: Mapping[str, Any]
     conditions: Mapping[str, Any]
@@ -135,29 +137,29 @@ class Parameters(NamedTuple):
 class PetriNetPlan(Container):
     """A container that runs a Petri Net Plan. Outcomes: 'goal', 'fail', 'preempted'.
 
-    Each child is an action of the plan, under the name that the plan calls it by (a '/' in it
-    becomes a ':'). A transition `A.start` lets A begin, `A.end` and `A.interrupt` let it stop if it
-    still runs: the token goes on at once, the plan's end waits for all of them. A has finished when
-    its outcome is no failure and no preempt (`smachpy.outcome_classes`), and has failed when it is
-    one: `A.end` without a condition waits for the first, `A.fail` for the second. An outcome of A
-    is a condition for the transitions behind A, true once A has ended with it.
+    Each child is an action of the plan, and its label is the plan's name for it ('/' is replaced by
+    ':'). A transition `A.start` starts A; `A.end` and `A.interrupt` ask A to stop if it is still
+    running. The token moves on at once, but the end of the plan waits for all actions. A has failed
+    if its outcome is a failure or a preempt (`smachpy.outcome_classes`), otherwise it has finished;
+    `A.end` without a condition waits until it has finished, `A.fail` until it has failed. An
+    outcome of A is a condition for the transitions behind A, true once A has ended with it.
 
-    The plan ends with 'goal' when all goal places hold exactly their tokens, with 'fail' when all
-    fail places do, or when nothing can fire any more: it says so in the log.
+    The plan ends with 'goal' when all goal places hold exactly their tokens, and with 'fail' when
+    all fail places do, or when nothing can fire any more, which is logged.
 
     Args:
         plan: The plan, or its net.
-        actions: Name of an action, or a whole name ("goto_kitchen"), -> what does it: a state (for
-            one name), a class of states, called with the parameters of the name, a function, called
-            with the userdata and the parameters, or `Function`, `Goal`, `Made`.
-        conditions: Name -> function of the userdata (and of the parameters behind the name),
-            `Expression`, `TopicCondition`, `Polled`, or a truth value. Others are events: `post`.
-        strict: A guarded end waits for the end of its action, too; only for a net.
-        events: "once": an event is used up by the first guard that reads it; "lasting": it holds
-            until "not_" and its name is posted.
-        event_life: An event that nobody has read is forgotten after so long [s]; with "once".
-        sub_plans: Name of an action -> the plan that does it.
-        server: A robot that does the other actions and knows the other conditions.
+        actions: Name of an action, or a whole name ("goto_kitchen") -> a state (for one name), a
+            class of states, called with the parameters of the name, a function, called with the
+            userdata and the parameters, or `Function`, `Goal`, `Made`.
+        conditions: Name -> function of the userdata (and of the parameters in the name),
+            `Expression`, `TopicCondition`, `Polled`, or a bool. Other names are events: `post`.
+        strict: Whether a guarded end also waits for the end of its action; only for a net.
+        events: "once": the first guard that reads an event uses it up; "lasting": it holds until
+            "not_" and its name is posted.
+        event_life: Time after which an unread event is dropped [s]; for "once".
+        sub_plans: Name of an action -> the plan that executes it.
+        server: A robot that executes the other actions and evaluates the other conditions.
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
         name: Name when it is the root; default: the net's.
@@ -167,11 +169,11 @@ class PetriNetPlan(Container):
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
 
-    Threads: an action that nothing but its own end can follow runs in the plan's thread, others in
-        threads of their own. Conditions are asked in the plan's thread.
+    Threads: an action runs in the plan's thread if nothing can fire before it ends, otherwise in a
+        thread of its own. Conditions are evaluated in the plan's thread.
 
-    Source of the rules of firing: the executor of PetriNetPlans 1.4; docs/petri_net_plans.md says
-    what differs.
+    Source of the firing rules: the executor of PetriNetPlans 1.4; docs/petri_net_plans.md lists the
+    differences.
     """
 
     _smachpy: DataOf[PlanData] = DataOf(PlanData)
@@ -215,11 +217,14 @@ class PetriNetPlan(Container):
         data.net_plan = plan
         before = data_of(self.userdata)
         checked = before if isinstance(before, CheckedDict) else None
-        values = _Noting(before) if checked is None else _NotingChecked(checked.fields)
+        values = (
+            _WatchedValues(before) if checked is None else _WatchedCheckedValues(checked.fields)
+        )
         object.__setattr__(self.userdata, "_data", values)
         data.knowledge = Knowledge(
             conditions, lambda: self.userdata, events=events, life=event_life, server=server
         )
+        # Functions and expressions may depend on the userdata.
         if any(map(callable, data.knowledge.sources.values())):
             values.on_write = data.knowledge.changed
         problems = Problems(type(self).__name__)
@@ -240,11 +245,11 @@ class PetriNetPlan(Container):
         }
 
     def __bind(self, binder: Binder) -> None:
-        """Make the states of all actions, and note what is wrong with them."""
+        """Create the states of all actions, and record their problems."""
         data = self._smachpy
         for name, known in data.net_plan.executables.items():
-            label = name.replace("/", ":")
-            while label in data.children:
+            label = name.replace("/", ":")  # '/' separates the labels of a path
+            while label in data.children:  # "a/b" and "a:b" would have the same label
                 label += "'"
             state, problem = binder.bind(name)
             if problem:
@@ -258,18 +263,18 @@ class PetriNetPlan(Container):
     # -- structure -----------------------------------------------------------------------------
 
     def get_initial_states(self) -> list[str]:
-        """Return no labels: what begins first, the net says."""
+        """Return no labels: the net decides what begins first."""
         return []
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the actions that run now."""
+        """Return the labels of the running actions."""
         execution = self._smachpy.execution
         return [] if execution is None else list(execution.active())
 
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Add to the userdata; the net says where the plan begins.
+        """Add to the userdata; the tokens of the net determine where the plan begins.
 
         Raises:
             InvalidStateError: labels are given.
@@ -283,7 +288,7 @@ class PetriNetPlan(Container):
             self.userdata.update(userdata)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return (label of a transition, label of a child, label of the next), by the net."""
+        """Return (name of a transition, label of a child, label of the next child) for the net."""
         net, child = self._smachpy.net_plan.net, self.__children_of_places()
         return [
             (net.transition_name(number), child[source], child[target])
@@ -295,14 +300,15 @@ class PetriNetPlan(Container):
         ]
 
     def __children_of_places(self) -> dict[int, str]:
-        """Return the number of an exec place -> label of the child that runs there."""
+        """Return number of an exec place -> label of the child that runs there."""
         labels = self._smachpy.labels()
         executables = self._smachpy.net_plan.executables
         return {p: labels[name] for name, known in executables.items() for p in known.places}
 
     def find_problems(self, where: str) -> tuple[str, ...]:
-        """Return what keeps the plan from running: wrong labels, actions that nothing does."""
+        """Return the problems that keep the plan from running: wrong labels, unknown actions."""
         errors = [p for p in self._smachpy.net_plan.problems if p.severity == "error"]
+        # A plan that was loaded without any actions gets one problem, not one for each action.
         unbound = self.__unbound()
         if len(unbound) > 1 and not self._smachpy.has_actions:
             unbound = [self.__no_actions()]
@@ -310,12 +316,12 @@ class PetriNetPlan(Container):
         return (*wrong, *self.__shared_states(where))
 
     def __unbound(self) -> list[PlanProblem]:
-        """Return the problems of actions that nothing does, not even a double."""
+        """Return the problems of actions that have no state, and no test double either."""
         data = self._smachpy
         return [p for label, p in data.unbound.items() if isinstance(data.children[label], Unbound)]
 
     def __no_actions(self) -> PlanProblem:
-        """Return the one problem of a plan of which nobody has said what does its actions."""
+        """Return the single problem of a plan for which no actions were registered at all."""
         plan = self._smachpy.net_plan
         names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
         text = f"runs once it is said what does its actions: {', '.join(names)}."
@@ -323,18 +329,19 @@ class PetriNetPlan(Container):
         return problem_of(plan.net, "unbound", "note", text, hint=hint)
 
     def binding_problems(self) -> tuple[PlanProblem, ...]:
-        """Return the actions and conditions that nothing is registered for."""
+        """Return the problems of actions and conditions for which nothing is registered."""
         plan, knowledge = self._smachpy.net_plan, self._smachpy.knowledge
         found = self.__unbound()
         if found and not self._smachpy.has_actions:
             found = [self.__no_actions()]
         table = _Compiled(self).table
+        # Name -> its first transition: in reverse, so that earlier transitions replace later ones.
         asked = {
             name: number
             for number, guard in reversed(tuple(enumerate(table.guards)))
             if guard is not None
             for name in guard.atoms()
-            if name not in table.asks and not knowledge.asks_server(name)
+            if name not in table.outcome_tests and not knowledge.asks_server(name)
         }
         if not knowledge.sources:
             names = sorted(asked)
@@ -355,6 +362,7 @@ class PetriNetPlan(Container):
         return tuple(found)
 
     def __shared_states(self, where: str) -> Iterator[str]:
+        # Actions run at the same time, and a state object has only one run at a time.
         label_of: dict[int, str] = {}
         for label, child in self._smachpy.children.items():
             for state in {id(state): state for state in below(child)}.values():
@@ -421,20 +429,22 @@ class PetriNetPlan(Container):
         return list(self._smachpy.children)
 
     def marking(self) -> dict[str, int]:
-        """Return the ids of the places that hold tokens now -> how many; when idle, at the start.
+        """Return id of a place -> its tokens, for places that hold some; if idle, at the start.
 
         Threads: any.
         """
+        # No lock: a run replaces its moment in one assignment, and a moment never changes its
+        # marking.
         execution, net = self._smachpy.execution, self._smachpy.net_plan.net
         marking = net.initial if execution is None else execution.moment.marking
         places = net.places
         return {places[p].id: marking.count(p) for p in dict.fromkeys(marking)}
 
     def post(self, event: str) -> None:
-        """Tell the plan, and its sub-plans, that something happened: an event for its guards.
+        """Post an event to the guards of the plan and its sub-plans.
 
         Args:
-            event: Its name; "not_NAME" and "!NAME" say that NAME is false from now on.
+            event: Its name; "not_NAME" and "!NAME" make NAME false from now on.
 
         Threads: any; does not wait.
         """
@@ -445,22 +455,22 @@ class PetriNetPlan(Container):
                 child.post(event)
 
     def set_condition(self, name: str, value: bool | None) -> None:
-        """Say what a condition is from now on; None forgets it. A registered one has its own say.
+        """Set a condition; None deletes it. It has no effect if one of this name is registered.
 
         Threads: any; does not wait.
         """
         self._smachpy.knowledge.set(name, value)
 
     def fire(self, transition: str) -> None:
-        """Let a transition fire now whatever its guard says, if its places hold their tokens.
+        """Fire a transition now regardless of its guard, if its places hold their tokens.
 
-        An action that it ends, or that alone was waited for, is asked to stop.
+        An action that it ends, or the only one that the plan was waiting for, is asked to stop.
 
         Args:
             transition: Its id.
 
         Raises:
-            InvalidStateError: there is no such transition, or the plan does not run.
+            InvalidStateError: there is no such transition, or the plan is not running.
 
         Threads: any; does not wait.
         """
@@ -475,7 +485,7 @@ class PetriNetPlan(Container):
     def __order(self, what: str, which: str = "") -> None:
         execution = self._smachpy.execution
         if execution is None:
-            raise InvalidStateError(f"{self.name}: {what}: the plan does not run.")
+            raise InvalidStateError(f"{self.name}: {what}: the plan is not running.")
         execution.order(what, which)
 
     def __forget_variable(self, key: str) -> None:
@@ -499,13 +509,13 @@ def load(
 ) -> PetriNetPlan:
     """Load a plan from a file: `.pnml`, or a text form, `.plan` or `.pddlout`.
 
-    A text form takes the execution rules of the file with the same name and the ending `.er`. An
-    action that is not registered under its whole name and for which there is a file NAME.pnml (or
-    .plan, .pddlout) beside `file` is that plan.
+    A text form uses the execution rules in the file with the same name and the ending `.er`. If an
+    action is not registered under its whole name and a file NAME.pnml (or .plan, .pddlout) is
+    beside `file`, it is that plan.
 
     Args:
         file: The file.
-        actions: See `PetriNetPlan`; for sub-plans, too.
+        actions: See `PetriNetPlan`; they also apply to sub-plans.
         conditions: Likewise.
         strict: Likewise.
         events: Likewise.
@@ -514,7 +524,7 @@ def load(
         **options: Likewise.
 
     Raises:
-        PlanError: it cannot be read, or has errors; all problems at once, its sub-plans' too.
+        PlanError: it cannot be read, or has errors; all problems at once, with those of sub-plans.
         InvalidStateError: an argument is wrong.
     """
     parameters = Parameters(actions or {}, conditions or {}, strict, events, event_life, server)
@@ -523,7 +533,7 @@ def load(
     return plan
 
 
-_DEEPEST = 20
+_DEEPEST = 20  # sub-plans in each other
 
 
 def read_plan(
@@ -532,16 +542,16 @@ def read_plan(
     options: Mapping[str, Any] | None = None,
     above: tuple[Path, ...] = (),
 ) -> PetriNetPlan:
-    """Load a plan to look at: one with errors in its labels is drawn and checked, but does not run.
+    """Load a plan even if its labels have errors: it can be drawn and checked, but does not run.
 
     Args:
         file: As for `load`.
-        parameters: Of the plan and its sub-plans.
-        options: Of the plan.
-        above: The files of the plans that it is a sub-plan of.
+        parameters: The parameters of the plan and its sub-plans.
+        options: Other arguments of the plan itself.
+        above: The files of the plans above it, if it is a sub-plan.
 
     Raises:
-        PlanError: as for `load`, but for errors in its labels.
+        PlanError: as for `load`, except errors in labels.
         InvalidStateError: an argument is wrong.
     """
     file = Path(file)
@@ -551,12 +561,13 @@ def read_plan(
     stack = (*above, file.resolve())
     subs: dict[str, PetriNetPlan] = {}
     for name, known in plan.executables.items():
+        # No '/': the name of an action must not lead to files of another folder.
         part = None if "/" in name else find_plan(file.parent, name)
         if name in parameters.actions or part is None:
             continue
         if part.resolve() in stack or len(stack) > _DEEPEST:
             line = net.places[known.places[0]].line if known.places else 0
-            text = f"{name!r} is the plan {str(part)!r}, which is run to run it; expected another."
+            text = f"{name!r} is the plan {str(part)!r}, which contains itself; expected another."
             found.append(PlanProblem("recursion", "error", text, "", net.file, line))
             continue
         try:
@@ -564,6 +575,7 @@ def read_plan(
         except PlanError as error:
             found += error.found
     raise_errors(found)
+    # The constructor refuses a plan with errors: it gets one without them, replaced below.
     runnable = tuple(problem for problem in plan.problems if problem.severity != "error")
     machine = PetriNetPlan(
         replace(plan, problems=runnable),

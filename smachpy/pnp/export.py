@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 
 PREEMPTED: Final = "preempted"
 MOST_COMBINATIONS: Final = 1000
-"""Of the outcomes of a concurrence's children."""
+"""Most combinations of outcomes of a concurrence's children; each becomes a transition or more."""
 
 
 class Stop(NamedTuple):
-    """How a child of a concurrence is preempted.
+    """The places by which a child of a concurrence is preempted; one of the two has a token.
 
     Attributes:
-        place: Holds a token once it is asked to stop.
-        goes_on: Holds that token before, and again once the child has taken the request up.
-        deep: This is a machine in a machine below the child.
+        place: Has the token once the child is asked to stop.
+        runs_on: Has the token before, and again once the child has serviced the preempt.
+        deep: Whether this is a machine inside a machine of the child.
     """
 
     place: str
-    goes_on: str
+    runs_on: str
     deep: bool = False
 
 
@@ -49,7 +49,7 @@ class Exported(NamedTuple):
 
     Attributes:
         net: The net.
-        states: Name of an action in it -> path of its state.
+        states: Name of an action in the net -> path of its state.
     """
 
     net: Net
@@ -57,20 +57,20 @@ class Exported(NamedTuple):
 
 
 def export_net(machine: Container) -> Exported:
-    """Return a machine as a net; a plan, as its own.
+    """Return a machine as a net; for a plan, its own net.
 
-    State machines and concurrences are opened, at any depth. Any other state, an iterator too, is
-    an action, named by the labels down to it with '_' between them; its outcomes are conditions at
-    its ends. Outcomes of the machine that sound good lead to the goal, the others to the failed
-    plan. Userdata, remappings and options are no part of a net.
+    State machines and concurrences are opened at any depth. Any other state, including an iterator,
+    is an action, named by the labels of its path joined with '_'; its outcomes are conditions at
+    its ends. Failures and preempts among the machine's outcomes (`smachpy.outcome_classes`) lead to
+    the failed plan, the others to the goal. A net has no userdata, remappings or options.
 
-    The callbacks of a concurrence that decide are called, once for each combination of outcomes
-    that they can be asked about, and their answers are written: of one that looks at more than its
-    argument, the net knows what it said now.
+    The callbacks with which a concurrence decides are called once for each combination of outcomes
+    that can occur, and the net gets their answers. If a callback depends on more than its argument,
+    the net has the answer of this moment.
 
     Raises:
-        InconsistentMachineError: the machine does not hold together.
-        InvalidStateError: something in it cannot be written as a net; all problems at once.
+        InconsistentMachineError: the machine is not consistent.
+        InvalidStateError: a part of it cannot be written as a net; all problems at once.
     """
     if isinstance(machine, PetriNetPlan):
         return Exported(machine._smachpy.net_plan.net, {})
@@ -89,7 +89,7 @@ class _Writer:
         self._transitions: list[Transition] = []
         self._arcs: list[Arc] = []
         self._states: dict[str, str] = {}
-        self._answers: set[str] = set()  # transitions for what callbacks may be asked about
+        self._answers: set[str] = set()  # transitions for the answers of callbacks
         self._problems = Problems(f"export of {record.path}")
 
     def write(self, machine: State, record: StateRecord) -> None:
@@ -106,6 +106,7 @@ class _Writer:
         self._problems.raise_all()
         places, transitions, arcs = tuple(self._places), self._transitions, self._arcs
         net = Net(self._name, places, tuple(transitions), tuple(arcs))
+        # Callbacks were called for all combinations; those that cannot occur are removed again.
         if self._answers:
             reachable = explore(net)
             gone = {
@@ -116,6 +117,7 @@ class _Writer:
             }
             transitions = [each for each in transitions if each.id not in gone]
             arcs = [arc for arc in arcs if not {arc.source, arc.target} & gone]
+            # Places without arcs belonged to removed transitions.
             used = {end for arc in arcs for end in (arc.source, arc.target)}
             places = tuple(place for place in places if place.id in used)
             net = Net(self._name, places, tuple(transitions), tuple(arcs))
@@ -136,7 +138,8 @@ class _Writer:
     def _state(
         self, state: State, record: StateRecord, begin: str, stop: Stop | None = None
     ) -> dict[str, str]:
-        """Add a state that begins at a place; return outcome -> place where it has ended so."""
+        """Add a state that begins at a place; return outcome -> place of this end."""
+        # A subclass that overrides `execute` may do anything: it is an action, not opened.
         if type(state).execute is Container.execute and "execute" not in vars(state):
             if isinstance(state, Concurrence):
                 if stop is not None:
@@ -153,6 +156,7 @@ class _Writer:
         self, state: State, record: StateRecord, begin: str, stop: Stop | None
     ) -> dict[str, str]:
         path = record.path.removeprefix(self._root).strip("/") or record.label
+        # Characters that labels do not allow become '_'; then two names may be the same.
         name = re.sub(r"[^\w@#<>+^{},-]", "_", path)
         while name in self._states or name in {"goal", "fail"}:
             name += "_"
@@ -175,7 +179,7 @@ class _Writer:
         if stop is not None and isinstance(state, Container) and PREEMPTED not in ends:
             ends[PREEMPTED] = self._place(_plain(f"{name} {PREEMPTED}"))  # declared or not
         if stop is not None and PREEMPTED in ends:
-            self._fire(f"{name}.interrupt", [place, stop.place], [ends[PREEMPTED], stop.goes_on])
+            self._fire(f"{name}.interrupt", [place, stop.place], [ends[PREEMPTED], stop.runs_on])
         return ends
 
     def _machine(
@@ -189,14 +193,17 @@ class _Writer:
             inner = stop._replace(deep=True)
             if PREEMPTED not in outs:  # it ends so, declared or not
                 outs[PREEMPTED] = self._place(_plain(f"{words} {PREEMPTED}"))
-            for entry in entries.values():  # before the transitions that begin what is next
-                self._fire("stopped", [entry, stop.place], [outs[PREEMPTED], stop.goes_on])
+            # Added before the transitions that begin the children: the first in the file wins, so
+            # a machine that is asked to stop begins no other child.
+            for entry in entries.values():
+                self._fire("stopped", [entry, stop.place], [outs[PREEMPTED], stop.runs_on])
         for label in record.initial:
             self._fire("", [begin], [entries[label]])
         children = machine.get_children()
         for child in record.children:
             ends = self._state(children[child.label], child, entries[child.label], inner)
             for edge in record.transitions:
+                # A concurrence has places only for outcomes that occur.
                 if edge.source != child.label or edge.outcome not in ends:
                     continue
                 target = outs if edge.target_is_outcome else entries
@@ -206,7 +213,7 @@ class _Writer:
                         f"{child.path}: preempted: got {edge.target!r}; expected an outcome of its "
                         "machine, as that is in a machine that a concurrence preempts."
                     )
-            if PREEMPTED in ends:  # undeclared: the machine ends so, too
+            if PREEMPTED in ends:  # without a transition: the machine ends with it, too
                 self._fire(PREEMPTED, [ends[PREEMPTED]], [outs[PREEMPTED]])
         return outs
 
@@ -225,12 +232,13 @@ class _Writer:
                 )
                 for c in record.children
             }
-            stops = [Stop(stop, goes_on) for goes_on, stop in asks.values()]
-        self._fire("fork", [begin], [*begins, *(goes_on for goes_on, _ in asks.values())])
+            stops = [Stop(stop, runs_on) for runs_on, stop in asks.values()]
+        self._fire("fork", [begin], [*begins, *(runs_on for runs_on, _ in asks.values())])
         ends = {
             child.label: self._state(children[child.label], child, place, stop)
             for child, place, stop in zip(record.children, begins, stops, strict=True)
         }
+        # With preempts a child may also run on, or be asked to stop, when another one has ended.
         count = math.prod(2 + len(each) if preempts else len(each) for each in ends.values())
         if count > MOST_COMBINATIONS:
             self._problems.add(
@@ -253,11 +261,12 @@ class _Writer:
     def _joined(
         self, state: Concurrence, record: StateRecord, ends: dict[str, dict[str, str]]
     ) -> dict[str, str]:
-        """Add what follows when all children have ended."""
+        """Add a join for each combination of the children's outcomes."""
         data = state._smachpy
         outs: dict[str, str] = {}
         for chosen in itertools.product(*ends.values()):
             outcomes: dict[str, str | None] = dict(zip(ends, chosen, strict=True))
+            # As in `Concurrence`: the callback, else the rules, else the default outcome.
             answer = None if data.outcome_cb is None else data.outcome_cb(dict(outcomes))
             ruled = decide(data.rules, outcomes)
             outcome = answer or (data.default_outcome if ruled is None else ruled[0])
@@ -277,16 +286,16 @@ class _Writer:
         ends: dict[str, dict[str, str]],
         asks: dict[str, tuple[str, str]],
     ) -> dict[str, dict[str, str]]:
-        """Add what `child_termination_cb` answers each time a child has ended.
+        """Add the answers of `child_termination_cb` for each end of a child.
 
         Args:
             state: The concurrence.
-            ends: Label -> outcome -> place where the child has ended so.
-            asks: Label -> the place that holds a token while the child runs on, and the one that
-                does when it is asked to stop.
+            ends: Label -> outcome -> place of this end.
+            asks: Label -> the place that has a token while the child runs on, and the one that has
+                it when the child is asked to stop.
 
         Returns:
-            As `ends`, after the callback has been asked.
+            As `ends`, with the places after the call of the callback.
         """
         ask = state._smachpy.child_termination_cb
         assert ask is not None
@@ -296,7 +305,7 @@ class _Writer:
         }
         for label, places in ends.items():
             others = [other for other in ends if other != label]
-            # Of each other child: None it runs on, True it is asked to stop, or its outcome.
+            # Each other child runs on (None), is asked to stop (True), or has an outcome (a text).
             known = [[None, True, *ends[other]] for other in others]
             for outcome, end in places.items():
                 for stands in itertools.product(*known):
@@ -307,14 +316,16 @@ class _Writer:
                     asked = _labels(ask(dict(outcomes)), ends)
                     before, after = [end], [done[label][outcome]]
                     for other, stand in how.items():
-                        goes_on, stop = asks[other]
+                        runs_on, stop = asks[other]
                         if stand is None:
-                            before.append(goes_on)
-                            after.append(stop if other in asked else goes_on)
+                            before.append(runs_on)
+                            after.append(stop if other in asked else runs_on)
                         else:
                             place = stop if stand is True else done[other][str(stand)]
                             before.append(place)
                             after.append(place)
+                    # The child may have been asked to stop before, or not: its token is in one of
+                    # the two places, and a transition takes it from there.
                     for own in asks[label]:
                         name = _plain(f"{label} {outcome}")
                         self._answers.add(self._fire(name, [*before, own], after))
@@ -336,7 +347,7 @@ def _labels(answer: Any, known: Collection[str]) -> set[str]:
 
 
 def _plain(text: str) -> str:
-    """Return a text that means nothing as a label: no dots, no brackets, no goal."""
+    """Return a text without the parts that have a meaning in labels: dots, brackets, "goal", ..."""
     words = re.sub(r"[.()\[\]]", "_", text).split()
     taken = {"goal", "fail", "start", "end", "interrupt", "interr", "resume", "res"}
     return " ".join(f"'{w}'" if w in taken or w.startswith(("goal", "fail")) else w for w in words)

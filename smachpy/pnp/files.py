@@ -1,4 +1,4 @@
-"""Plans as files: a plan with what belongs to it, whatever form it has."""
+"""Loads a plan of any form together with the files that belong to it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def load_plan(
 ) -> PetriNetPlan:
     """Load a plan, with the actions and conditions that its mapping file names.
 
-    What is doubtful about it goes to the log.
+    Warnings are logged.
 
     Args:
         file: The plan.
-        mapping: The mapping file (`smachpy.pnp.mapping`); None looks for one beside the plan.
-        to_run: False: a plan with errors in its labels is loaded, too; it does not run.
+        mapping: The mapping file (`smachpy.pnp.mapping`); None: the one beside the plan, if any.
+        to_run: False to load a plan with errors in its labels, too, which cannot run.
 
     Raises:
         PlanError: one of the files is wrong; all problems at once.

@@ -1,8 +1,8 @@
-"""What fires next, as a table that fills itself; no threads, time or I/O.
+"""A table of what fires at each marking, filled as markings are reached; no threads, time or I/O.
 
-One step of PNP: the guards of all transitions that have their tokens are read on the marking before
-any firing; then those whose guards hold fire one after the other, in the order of the document,
-each at most once and only if it still has its tokens.
+One step of PNP: first the guards of all transitions that have their tokens are evaluated; then the
+transitions whose guards are true fire one after the other, in the order of the document, each at
+most once and only if it still has its tokens.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from smachpy.pnp.plan import Plan
 
 ACTION_FAILED = "action_failed"
-"""The name that rules of PNP use for the failure of the action that runs."""
+"""The name for the failure of the running action in rules of PNP."""
 
 
-class Asks(NamedTuple):
-    """What a name in a guard asks of an action.
+class OutcomeTest(NamedTuple):
+    """A name in a guard that tests the outcome of an action.
 
     Attributes:
         label: The action's label.
-        holds: Called with its outcome; None while it has not ended.
+        holds: Called with its outcome, None while it has not ended; returns the name's value.
     """
 
     label: str
@@ -56,15 +56,15 @@ _OF_ACTION: Mapping[str, Callable[[str | None], bool]] = {
 }
 
 
-class Jump(NamedTuple):
-    """What one step does.
+class Firing(NamedTuple):
+    """The transitions that fire in one step, and their effect.
 
     Attributes:
-        fired: Transitions, in their order.
+        fired: The transitions, in their order.
         calls: Pairs (label, True: it begins, False: it ends), in their order.
-        moment: What follows.
-        ends: Labels of the actions that end, when none runs.
-        begins: Labels of those that begin, likewise.
+        moment: The moment after it.
+        ends: Labels of the actions that end, if none is running before.
+        begins: Labels of the actions that begin, if none is running before.
     """
 
     fired: tuple[int, ...]
@@ -78,6 +78,8 @@ def called(
     calls: Collection[tuple[str, bool]], running: Container[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the labels of the actions that end, and then of those that begin."""
+    # Several transitions of one step may call the same action: an end cancels the begin before it,
+    # and a running action begins again only if it ends before.
     ends: list[str] = []
     begins: list[str] = []
     for label, begin in calls:
@@ -91,22 +93,22 @@ def called(
 
 
 class Moment:
-    """A marking, as a run sees it.
+    """A marking, with all that a run needs to know about it.
 
     Attributes:
         marking: The marking.
-        end: Outcome of the plan here: "goal", "fail", or None.
+        end: The outcome with which the plan ends here, "goal" or "fail", or None.
         candidates: Transitions that have their tokens.
         guards: Their guards.
-        free: What happens, when it needs no guard and is known already; None else.
-        only: The one action that all guards ask about, if they ask nothing else: nothing can
-            happen before it ends.
-        asks_world: Names that the guards ask the world for.
-        jumps: The table: what the guards say -> what happens, None for nothing; with `only` the
-            outcome of that action -> what happens.
+        free: The firing, if no candidate has a guard and it has been computed; otherwise None.
+        only: The action that all guards test, if they test nothing else: nothing can fire before it
+            ends.
+        externals: Names in the guards that do not test actions.
+        firings: The table: values of the guards -> firing, or None if nothing fires. If `only` is
+            set: outcome of that action -> firing.
     """
 
-    __slots__ = ("asks_world", "candidates", "end", "free", "guards", "jumps", "marking", "only")
+    __slots__ = ("candidates", "end", "externals", "firings", "free", "guards", "marking", "only")
 
     def __init__(self, table: Table, marking: Marking) -> None:
         plan = table.plan
@@ -115,13 +117,14 @@ class Moment:
         self.candidates = () if self.end else tuple(plan.net.enabled(marking))
         self.guards = tuple(table.guards[t] for t in self.candidates)
         names = [name for guard in self.guards if guard is not None for name in guard.atoms()]
-        self.asks_world = tuple(dict.fromkeys(n for n in names if n not in table.asks))
-        labels = {table.asks[name].label for name in names if name in table.asks}
+        self.externals = tuple(dict.fromkeys(n for n in names if n not in table.outcome_tests))
+        labels = {table.outcome_tests[name].label for name in names if name in table.outcome_tests}
         self.only = None
-        if len(labels) == 1 and not self.asks_world and all(self.guards):
+        # All must have a guard: a transition without one fires at once.
+        if len(labels) == 1 and not self.externals and all(self.guards):
             self.only = next(iter(labels))
-        self.jumps: dict[object, Jump | None] = {}
-        self.free: Jump | None = None
+        self.firings: dict[object, Firing | None] = {}
+        self.free: Firing | None = None
 
 
 class Table:
@@ -131,8 +134,13 @@ class Table:
         plan: The plan.
         labels: Name of an executable -> label of its state.
         outcomes: Label -> outcomes of its state.
-        known: Names that the world gives; any other one that an action beside the transition has
-            as an outcome asks for that.
+        known: Returns whether a condition is registered for a name. Any other name that is an
+            outcome of an action beside the transition tests that outcome.
+
+    Attributes:
+        plan: The plan.
+        outcome_tests: Name in a guard -> its test, for names that test outcomes.
+        guards: For each transition: its guard, with names of actions written out, or None.
     """
 
     def __init__(
@@ -143,12 +151,14 @@ class Table:
         known: Callable[[str], bool],
     ) -> None:
         self.plan = plan
-        self.asks: dict[str, Asks] = {}
+        self.outcome_tests: dict[str, OutcomeTest] = {}
         self._labels = labels
         self._moments: dict[Marking, Moment] = {}
         place_action = {p: name for name, e in plan.executables.items() for p in e.places}
         self.guards: list[Condition | None] = []
         for number, guard in enumerate(plan.guards):
+            # The actions whose outcomes the guard may name: those of the exec places in front of
+            # the transition, and those that its label ends.
             beside = [place_action[p] for p, _ in plan.net.inputs[number] if p in place_action]
             beside += [name for name, function in plan.calls[number] if function not in BEGINS]
             own = {labels[name]: outcomes[labels[name]] for name in beside}
@@ -160,7 +170,10 @@ class Table:
         beside: Mapping[str, Collection[str]],
         known: Callable[[str], bool],
     ) -> Condition:
-        """Return a guard whose names say what they ask."""
+        """Return a guard in which tests of outcomes have a unique name, and record the tests.
+
+        The same name may be an outcome of different actions at different transitions.
+        """
         if guard.operator != "atom":
             parts = tuple(self._bound(part, beside, known) for part in guard.parts)
             return Condition(guard.operator, "", parts)
@@ -169,19 +182,19 @@ class Table:
             action, _, what = name.rpartition(".")
             label = self._labels.get(action)
             if label is not None:
-                self.asks[name] = Asks(label, _OF_ACTION[what])
+                self.outcome_tests[name] = OutcomeTest(label, _OF_ACTION[what])
             return guard
-        if known(name):
+        if known(name):  # a registered condition takes precedence over an outcome of this name
             return guard
         for label, outcomes in beside.items():
             if name in outcomes:
                 bound = f"{label} ended with {name}"
-                self.asks[bound] = Asks(label, partial(eq, name))
+                self.outcome_tests[bound] = OutcomeTest(label, partial(eq, name))
                 return Condition("atom", bound)
         if name == ACTION_FAILED and beside:
             label = next(iter(beside))
             bound = f"{label}.failed"
-            self.asks[bound] = Asks(label, _failed)
+            self.outcome_tests[bound] = OutcomeTest(label, _failed)
             return Condition("atom", bound)
         return guard
 
@@ -192,27 +205,30 @@ class Table:
             found = self._moments[marking] = Moment(self, marking)
         return found
 
-    def jump(self, moment: Moment, key: object, true: Collection[int]) -> Jump | None:
-        """Return what happens when the guards of the transitions `true` hold; kept under `key`."""
-        moment.jumps[key] = found = self._jump(moment, true)
+    def firing(self, moment: Moment, key: object, true: Collection[int]) -> Firing | None:
+        """Return the firing if the guards of the transitions `true` hold; kept under `key`."""
+        moment.firings[key] = found = self._make_firing(moment, true)
         return found
 
-    def jump_without_begins(self, moment: Moment, true: Collection[int]) -> Jump | None:
-        """Return what happens when nothing more may begin."""
+    def firing_without_begins(self, moment: Moment, true: Collection[int]) -> Firing | None:
+        """Return the firing of the transitions `true` that begin no action."""
         calls = self.plan.calls
-        return self._jump(moment, [t for t in true if not any(f in BEGINS for _, f in calls[t])])
+        return self._make_firing(
+            moment, [t for t in true if not any(f in BEGINS for _, f in calls[t])]
+        )
 
-    def forced(self, moment: Moment, transition: int) -> Jump:
-        """Return what happens when a transition that has its tokens fires, whatever its guard."""
-        jump = self._jump(moment, [transition])
-        assert jump is not None
-        return jump
+    def forced(self, moment: Moment, transition: int) -> Firing:
+        """Return the firing of one transition that has its tokens, regardless of its guard."""
+        firing = self._make_firing(moment, [transition])
+        assert firing is not None
+        return firing
 
-    def _jump(self, moment: Moment, true: Collection[int]) -> Jump | None:
+    def _make_firing(self, moment: Moment, true: Collection[int]) -> Firing | None:
         plan = self.plan
         marking = moment.marking
         fired: list[int] = []
         for transition in true:
+            # The first one has its tokens; it may have taken those of the others.
             if not fired or plan.net.has_tokens(marking, transition):
                 marking = plan.net.fire(marking, transition)
                 fired.append(transition)
@@ -223,7 +239,4 @@ class Table:
             for transition in fired
             for name, function in plan.calls[transition]
         )
-        return Jump(tuple(fired), calls, self._made(marking, moment), *called(calls, ()))
-
-    def _made(self, marking: Marking, moment: Moment) -> Moment:
-        return moment if marking == moment.marking else self.moment(marking)
+        return Firing(tuple(fired), calls, self.moment(marking), *called(calls, ()))

@@ -1,8 +1,9 @@
-"""What a plan's guards ask the world: conditions, events and variables.
+"""The conditions, events and variables that a plan's guards ask for.
 
-A name is answered by the first of these that knows it: a condition registered under it, or under
-its beginning up to a `_`, called with the rest; `timeout_ACTION_SECONDS`; `equal_A_B`; an event;
-what `set` said last; `true`. Anything else is false. Source: PNPActionServer of PetriNetPlans 1.4.
+The value of a name comes from the first of these that exists: a condition registered under the
+name, or under its beginning up to a `_`, which is called with the rest; `timeout_ACTION_SECONDS`;
+`equal_A_B`; an event; the value of the last `set`; `true`. Other names are false. Source:
+PNPActionServer of PetriNetPlans 1.4.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Clock
     from smachpy.pnp.server import PNPServer
 
-EVENT_LIFE_S: Final = 2.0
+EVENT_LIFE_S: Final = 2.0  # an unread event is dropped then
 Events: TypeAlias = Literal["once", "lasting"]
-_MOST_EVENTS: Final = 1000
+_MOST_EVENTS: Final = 1000  # unread; a topic may post faster than the plan reads
 BUILT_IN: Final = ("timeout_", "equal_", "equals_", "true", "action_failed")
-"""Beginnings of the names that plans answer themselves."""
+"""Beginnings of built-in names."""
 
 
 @dataclass(frozen=True, slots=True)
 class TopicCondition:
-    """A condition that the newest message of a topic answers; false before the first one.
+    """A condition on the newest message of a topic; false before the first message.
 
     Attributes:
         topic: Name of the topic.
@@ -51,11 +52,11 @@ class TopicCondition:
 
 @dataclass(frozen=True, slots=True)
 class Polled:
-    """A condition that nothing tells of, so that it is asked again and again.
+    """A condition that changes without notice, so that it has to be evaluated again and again.
 
     Attributes:
         function: Called with the plan's userdata; true or false.
-        every: Time between two questions while the plan waits for it [s].
+        every: Time between two calls while the plan waits for it [s].
     """
 
     function: Callable[..., object]
@@ -65,14 +66,14 @@ class Polled:
 class Expression:
     """A condition on the userdata, as text: "battery < 20 and not charging".
 
-    Numbers, texts, comparisons, `and`, `or`, `not`, `in`, `+ - * / %` and keys of the userdata;
-    nothing is called. It is false while a key has no value.
+    It may contain numbers, texts, comparisons, `and`, `or`, `not`, `in`, `+ - * / %` and keys of
+    the userdata, but no calls. It is false while a key has no value.
 
     Args:
         text: The expression.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text cannot be read, or contains something else.
     """
 
     def __init__(self, text: str) -> None:
@@ -89,7 +90,7 @@ class Expression:
                 )
 
     def __call__(self, userdata: Any) -> bool:
-        """Tell whether it holds."""
+        """Return whether it is true."""
         try:
             return bool(_value(self._tree, userdata))
         except KeyError:
@@ -140,29 +141,30 @@ def _value(node: ast.expr, userdata: Any) -> Any:  # noqa: PLR0911  one for each
             return _OPERATORS[type(op)](_value(left, userdata), _value(right, userdata))
         case ast.Compare(left=left, ops=ops, comparators=rest):
             values = [_value(part, userdata) for part in (left, *rest)]
-            pairs = zip(ops, values, values[1:], strict=False)
+            pairs = zip(ops, values, values[1:], strict=False)  # a < b < c
             return all(_OPERATORS[type(op)](one, other) for op, one, other in pairs)
-    raise ValueError(f"got {ast.dump(node)}")  # __init__ lets no other through
+    raise ValueError(f"got {ast.dump(node)}")  # cannot happen: `__init__` refuses other nodes
 
 
 class Knowledge:
-    """What guards ask, of one plan.
+    """The values of names in the guards of one plan.
 
     Args:
         conditions: Name -> function of the userdata (and of the name's parameters), `Expression`,
-            `TopicCondition`, `Polled`, or a truth value.
-        userdata: Gives the plan's userdata.
-        events: "once": an event is used up by the first guard that reads it, and forgotten after
+            `TopicCondition`, `Polled`, or a bool.
+        userdata: Returns the plan's userdata.
+        events: "once": the first guard that reads an event uses it up, and it is dropped after
             `life`, as in PNP. "lasting": it holds until its opposite is posted.
-        life: [s].
-        server: Knows what nobody else knows; see `PNPServer`.
+        life: Time after which an unread event is dropped [s].
+        server: Evaluates the names that are not known here; see `PNPServer`.
 
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
 
     Attributes:
-        dropped: Events that were dropped because so many waited for a guard.
-        changes: Counts the changes of what `kept` returns.
+        sources: Name -> the condition registered for it.
+        dropped: Events that were dropped because too many were unread.
+        changes: The number of changes so far of the value of `kept`.
 
     Threads: `post`, `set` and `subscribe` from any thread; `value` from the plan's and from those
         of its actions.
@@ -177,6 +179,7 @@ class Knowledge:
         life: float = EVENT_LIFE_S,
         server: PNPServer | None = None,
     ) -> None:
+        # A server without a service for conditions only executes actions.
         self._server = server if server is not None and server.conditions else None
         problems = Problems("conditions")
         holds = "name -> function, Expression, TopicCondition, Polled, or true or false"
@@ -197,24 +200,27 @@ class Knowledge:
         self._userdata = userdata
         self.dropped = self.changes = 0
         self._lock = threading.Lock()
+        # Unread events: name, and the time [s] from which its life counts, None if not yet known.
         self._posted: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
         self._set: dict[str, bool] = {}
-        self._newest: dict[str, Any] = {}
+        self._newest: dict[str, Any] = {}  # name of a topic's condition -> its newest message
+        # Replaced, never changed: `changed` iterates over it without the lock.
         self._listeners: tuple[Callable[[], object], ...] = ()
 
     # -- from outside --------------------------------------------------------------------------
 
     def post(self, event: str, clock: Clock | None = None) -> None:
-        """Note that something happened; "not_NAME" and "!NAME" say that NAME is false.
+        """Post an event; "not_NAME" and "!NAME" make NAME false.
 
         Args:
             event: Its name.
-            clock: Of the run, when there is one: the event's life begins now. Without, it begins
-                when the plan first looks.
+            clock: The clock of the run, if there is one: then the event's life begins now. If None,
+                it begins when the plan first evaluates its guards.
         """
         problems = Problems("post")
         event = problems.word("event", event)
         problems.raise_all()
+        # The opposite of an event is a value, which holds: it does not end after `life`.
         name = event[1:] if event.startswith("!") else event.removeprefix("not_")
         if name != event:
             self.set(name, value=False)
@@ -223,13 +229,13 @@ class Knowledge:
             self.set(name, value=True)
             return
         with self._lock:
-            full = len(self._posted) == _MOST_EVENTS
+            full = len(self._posted) == _MOST_EVENTS  # then `append` drops the oldest
             oldest = self._posted[0][0] if full else ""
             self.dropped += full
             first = full and self.dropped == 1
             self._posted.append((name, None if clock is None else clock.now()))
             self.changes += 1
-        if first:
+        if first:  # logged once; `dropped` has the count
             log.logwarn(
                 f"event {name!r}: {_MOST_EVENTS} events wait for a guard: the oldest are dropped, "
                 f"{oldest!r} first. Try events='lasting', or post what guards ask for."
@@ -237,8 +243,9 @@ class Knowledge:
         self.changed()
 
     def set(self, name: str, value: bool | None) -> None:
-        """Say what a condition is from now on, unless one is registered; None forgets it."""
+        """Set a condition, unless one is registered; None deletes it."""
         with self._lock:
+            # Unread events of this name are older than this value.
             self._posted = deque(
                 (pair for pair in self._posted if pair[0] != name), maxlen=_MOST_EVENTS
             )
@@ -250,12 +257,16 @@ class Knowledge:
         self.changed()
 
     def changed(self) -> None:
-        """Say that conditions may have changed: a plan that waits looks again."""
+        """Notify the listeners: a waiting plan evaluates its guards again."""
         for listener in self._listeners:
             listener()
 
     def subscribe(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener` at each change, in the thread of the change; returns what ends that."""
+        """Call `listener` at each change, in the thread of the change.
+
+        Returns:
+            A function that ends this.
+        """
         with self._lock:
             self._listeners = (*self._listeners, listener)
 
@@ -268,10 +279,11 @@ class Knowledge:
     # -- for a journal -------------------------------------------------------------------------
 
     def kept(self, clock: Clock) -> tuple[int, dict[str, Any]]:
-        """Return the count of changes, and what was said and not used up, as plain JSON.
+        """Return the number of changes, and the set values and unread events, as plain JSON.
 
         `set`: name -> truth; `events`: pairs [name, stamp since the epoch [ns]].
         """
+        # Stamps, because the clock of a run in another process begins anew.
         with self._lock:
             now, now_ns = clock.now(), clock.time_ns()
             events = [
@@ -281,7 +293,7 @@ class Knowledge:
             return self.changes, {"set": dict(self._set), "events": events}
 
     def restore(self, kept: Mapping[str, Any], shift_ns: int) -> None:
-        """Know what `kept` returned in an earlier process, its stamps `shift_ns` later."""
+        """Restore the value of `kept` from an earlier process, with stamps `shift_ns` later."""
         clock = current_clock()
         now, now_ns = clock.now(), clock.time_ns()
         with self._lock:
@@ -293,7 +305,7 @@ class Knowledge:
 
     @contextlib.contextmanager
     def listening(self) -> Any:
-        """Listen to the topics of the conditions while this lasts."""
+        """Subscribe to the topics of the conditions within the block."""
         topics = {n: s for n, s in self.sources.items() if isinstance(s, TopicCondition)}
         with contextlib.ExitStack() as stack:
             if self._server is not None:
@@ -302,7 +314,7 @@ class Knowledge:
                 from actionlib_core.pubsub.topic import NotingSubscriber
 
                 for name, source in topics.items():
-                    self._newest.pop(name, None)
+                    self._newest.pop(name, None)  # of an earlier run
                     stack.enter_context(
                         NotingSubscriber(source.topic, source.msg_type, self._noting(name))
                     )
@@ -318,7 +330,7 @@ class Knowledge:
     # -- for guards ----------------------------------------------------------------------------
 
     def source_of(self, name: str) -> tuple[Any, tuple[str, ...]] | None:
-        """Return what is registered for a name, and the parameters in the name; None if nothing."""
+        """Return the condition registered for a name, and the parameters in the name, or None."""
         if name in self.sources:
             return self.sources[name], ()
         parts = name.split("_")
@@ -329,7 +341,7 @@ class Knowledge:
         return None
 
     def asks_server(self, name: str) -> bool:
-        """Tell whether a robot answers for a name, unless somebody has said it here."""
+        """Return whether a robot evaluates a name, unless it was posted or set here."""
         return (
             self._server is not None
             and not name.startswith(BUILT_IN)
@@ -337,21 +349,21 @@ class Knowledge:
         )
 
     def is_code(self, name: str) -> bool:
-        """Tell whether code of the user, or a robot, answers for a name."""
+        """Return whether the value of a name comes from the user's code or a robot."""
         found = self.source_of(name)
         if found is None:
             return self.asks_server(name)
         return not isinstance(found[0], (bool, Expression))
 
     def every(self, name: str) -> float | None:
-        """Return how often a name is to be asked for [s]; None when its changes are told."""
+        """Return the time between two evaluations of a name [s]; None if changes are notified."""
         if self._server is not None and self.asks_server(name):
             return self._server.every
         found = self.source_of(name)
         return found[0].every if found is not None and isinstance(found[0], Polled) else None
 
     def value(self, name: str, path: str, now: float) -> bool:
-        """Return what a name is worth now; an event is used up by it.
+        """Return the value of a name now; an event is used up.
 
         Raises:
             InvalidUserCodeError: the condition raised.
@@ -386,14 +398,17 @@ class Knowledge:
         return bool(function(self._userdata(), *map(self.text, parameters)))
 
     def _happened(self, name: str, now: float) -> bool:
+        """Use up an event of this name, if there is one, and drop those whose life is over."""
         with self._lock:
             kept: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
             hit = False
+            # From the newest on: the newest event of the name is used up. Events without a time
+            # were posted before the run, and their life begins now.
             for event, since in reversed(self._posted):
                 if since is not None and now - since > self._life:
                     continue
                 if event == name and not hit:
-                    hit = True  # the newest one, used up
+                    hit = True
                     continue
                 kept.appendleft((event, now if since is None else since))
             self.changes += len(kept) != len(self._posted)
@@ -401,7 +416,7 @@ class Knowledge:
             return hit
 
     def text(self, parameter: str) -> str:
-        """Return a parameter; "@NAME" stands for the userdata key NAME."""
+        """Return a parameter, or the value of the userdata key NAME for "@NAME"."""
         if not parameter.startswith("@"):
             return parameter
         data = self._userdata()

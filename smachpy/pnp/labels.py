@@ -1,7 +1,7 @@
 """The labels of PNP's places and transitions; no threads, time or I/O.
 
-A label is tokens with blanks between them; what is in ( ) or [ ] is one token. Source:
-PetriNetPlans 1.4, which passes over in silence what is a warning here.
+A label consists of tokens separated by blanks; text in ( ) or [ ] belongs to one token. Source:
+PetriNetPlans 1.4, which silently ignores the cases that are warnings here.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ FUNCTIONS = {
     "res": "resume",
     "fail": "fail",
 }
-"""What may stand after the dot of a transition's label -> what it means."""
+"""Words after the dot of a transition's label -> their function."""
 
 BEGINS = frozenset({"start", "resume"})
-"""Functions that let an action run; the others end it."""
+"""Functions that begin an action; the others end it."""
+
 
 _GOAL = re.compile(r"(goal|fail)(?:\((\d{1,6})\))?")
 _NEAR_EXEC = re.compile(r".+\.(exec\w+|\w?exec|execute|start|end|run)", re.IGNORECASE)
@@ -34,13 +35,13 @@ _NEAR_EXEC = re.compile(r".+\.(exec\w+|\w?exec|execute|start|end|run)", re.IGNOR
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something wrong in a label.
+    """A problem of a label.
 
     Attributes:
         rule: Id of the rule, see `smachpy.pnp.problems`.
         severity: "error": the plan is refused.
-        message: What was found, what was expected.
-        hint: What to try, or "".
+        message: The text found and the text expected.
+        hint: A suggestion, or "".
     """
 
     rule: str
@@ -51,13 +52,13 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class PlaceLabel:
-    """What the label of a place says.
+    """The meaning of a place's label.
 
     Attributes:
-        action: The action that runs while the place is marked; "" when there is none.
-        goal: Tokens that the place holds at the plan's goal; None when it is no goal place.
+        action: The action that runs while the place is marked, or "".
+        goal: Tokens that the place holds at the plan's goal; None if it is not a goal place.
         fail: Likewise for a failed plan.
-        faults: What is wrong with it.
+        faults: The problems of the label.
     """
 
     action: str = ""
@@ -68,13 +69,13 @@ class PlaceLabel:
 
 @dataclass(frozen=True, slots=True)
 class TransitionLabel:
-    """What the label of a transition says.
+    """The meaning of a transition's label.
 
     Attributes:
-        calls: Pairs (action, function) in their order; the action is "" when the label leaves it
-            to the exec places beside the transition.
-        condition: Its guard as written; None when there is none.
-        faults: What is wrong with it.
+        calls: Pairs (action, function) in their order; the action is "" if it is that of the exec
+            places beside the transition.
+        condition: Its guard as written, or None.
+        faults: The problems of the label.
     """
 
     calls: tuple[tuple[str, str], ...] = ()
@@ -87,7 +88,7 @@ def split(label: str) -> list[str]:
     tokens: list[str] = []
     token, depth = "", 0
     for char in label:
-        if char.isspace() and depth == 0:
+        if char.isspace() and depth == 0:  # blanks in brackets do not separate tokens
             tokens += [token] if token else []
             token = ""
             continue
@@ -122,7 +123,7 @@ def place_label(label: str) -> PlaceLabel:
 
 
 def _faults_of_comment(token: str) -> list[Fault]:
-    """Return what looks wrong with a token that PNP takes for a comment."""
+    """Return the likely mistakes in a token that PNP takes for a comment."""
     low = token.lower()
     if low in {"goal", "fail"}:
         text = f"got {token!r}, which is a comment; expected {low!r} for a {low} place."
@@ -143,7 +144,7 @@ def transition_label(label: str) -> TransitionLabel:
     As in PNP, an unknown function ends the reading: a condition behind it is lost.
     """
     calls: list[tuple[str, str]] = []
-    conditions: list[Condition | None] = []
+    conditions: list[Condition | None] = []  # None: an empty or wrong one, which also counts
     faults: list[Fault] = []
     tokens = split(label)
     for number, token in enumerate(tokens):
@@ -168,6 +169,7 @@ def transition_label(label: str) -> TransitionLabel:
 def _unknown_function(token: str, rest: list[str]) -> Fault:
     known = ", ".join(dict.fromkeys(FUNCTIONS.values()))
     text = f"got {token!r}; expected one of {known} after the dot."
+    # "A.end[c]" without a blank is one token, and its function is unknown.
     bracket = token.find("[")
     hint = ""
     if bracket > 0:
@@ -193,6 +195,7 @@ def _condition(token: str, faults: list[Fault]) -> Condition | None:
     except ConditionError as error:
         faults.append(Fault("condition", "error", f"[{text}]: {error.problem}"))
         return None
+
     if text.startswith(" ") and text.lstrip().startswith("(") and found.operator in {"and", "or"}:
         message = f"got {token!r}, which PNP itself reads as false; expected no blank after '['."
         faults.append(Fault("condition", "warning", message, f"Try '[{text.strip()}]'."))
@@ -200,7 +203,7 @@ def _condition(token: str, faults: list[Fault]) -> Condition | None:
         Fault(
             "condition",
             "warning",
-            f"got {name!r}, in which PNP itself passes the '@' over; expected a name.",
+            f"got {name!r}, in which PNP itself ignores the '@'; expected a name.",
         )
         for name in found.atoms()
         if name.startswith("@")

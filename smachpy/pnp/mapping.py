@@ -1,4 +1,4 @@
-"""The YAML file that says what a plan's actions and conditions are.
+"""The YAML file that maps the names of a plan's actions and conditions to code.
 
 actions:
   goto:                                # goto_kitchen: a goal for move_base
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Registered:
-    """What such a file says; the attributes are the arguments of `smachpy.pnp.load`."""
+    """The content of the file; the attributes are the arguments of `smachpy.pnp.load`."""
 
     actions: dict[str, Any] = field(default_factory=dict)
     conditions: dict[str, Any] = field(default_factory=dict)

@@ -1,7 +1,8 @@
-"""Petri nets: places, transitions, arcs, markings and what fires; no threads, time or I/O.
+"""Petri nets: places, transitions, arcs, markings and firing; no threads, time or I/O.
 
-A marking is the sorted tuple of the marked places' numbers, a place with two tokens twice. Plans
-have few tokens and up to thousands of places, so that firing costs as much as there are tokens.
+A marking is the sorted tuple of the numbers of the marked places; a place with two tokens is in it
+twice. Plans have few tokens and up to thousands of places, so firing must not take time for places
+that are not marked.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class Place:
         id: Its id, unique among all nodes of the net.
         name: Its label; for a plan see `smachpy.pnp.labels`.
         tokens: Its tokens in the initial marking.
-        line: Of its file; 0 when it is in none.
+        line: Its line in the file; 0 if the net is not from a file.
     """
 
     id: str
@@ -59,10 +60,10 @@ class Net:
 
     Attributes:
         name: Its name.
-        places: In the order of the document, which is the order of all that follows.
+        places: The places in the order of the document; numbers of places are indices of it.
         transitions: Likewise.
-        arcs: Two between the same nodes count as one with both weights.
-        file: Where it was read; "" when it was built.
+        arcs: The arcs; two between the same nodes count as one with the sum of their weights.
+        file: The file that it was read from; "" if it was built.
 
     Raises:
         ValueError: an id is used twice, or an arc does not join a place and a transition.
@@ -93,22 +94,22 @@ class Net:
 
     @cached_property
     def place_numbers(self) -> dict[str, int]:
-        """Id of a place -> its number."""
+        """The number of each place, by id."""
         return {place.id: number for number, place in enumerate(self.places)}
 
     @cached_property
     def transition_numbers(self) -> dict[str, int]:
-        """Id of a transition -> its number."""
+        """The number of each transition, by id."""
         return {transition.id: number for number, transition in enumerate(self.transitions)}
 
     @cached_property
     def inputs(self) -> tuple[tuple[tuple[int, int], ...], ...]:
-        """For each transition: pairs (place, weight) that it takes from."""
+        """For each transition: pairs (place, weight) of the tokens that it takes."""
         return self._weights(into_transition=True)
 
     @cached_property
     def outputs(self) -> tuple[tuple[tuple[int, int], ...], ...]:
-        """For each transition: pairs (place, weight) that it gives to."""
+        """For each transition: pairs (place, weight) of the tokens that it gives."""
         return self._weights(into_transition=False)
 
     def _weights(self, *, into_transition: bool) -> tuple[tuple[tuple[int, int], ...], ...]:
@@ -125,17 +126,18 @@ class Net:
     @cached_property
     def consumers(self) -> tuple[tuple[int, ...], ...]:
         """For each place: the transitions that take from it."""
-        found: list[list[int]] = [[] for _ in self.places]
-        for number, pairs in enumerate(self.inputs):
-            for place, _ in pairs:
-                found[place].append(number)
-        return tuple(map(tuple, found))
+        return self._by_place(self.inputs)
 
     @cached_property
     def producers(self) -> tuple[tuple[int, ...], ...]:
         """For each place: the transitions that give to it."""
+        return self._by_place(self.outputs)
+
+    def _by_place(
+        self, weights: tuple[tuple[tuple[int, int], ...], ...]
+    ) -> tuple[tuple[int, ...], ...]:
         found: list[list[int]] = [[] for _ in self.places]
-        for number, pairs in enumerate(self.outputs):
+        for number, pairs in enumerate(weights):
             for place, _ in pairs:
                 found[place].append(number)
         return tuple(map(tuple, found))
@@ -150,6 +152,7 @@ class Net:
 
         One that takes from no place is never among them, as in PNP.
         """
+        # Only transitions behind a marked place, rather than all of the net.
         marked = set(marking)
         candidates = {t for place in marked for t in self.consumers[place]}
         found = [t for t in candidates if self._needs[t] <= marked]
@@ -169,7 +172,7 @@ class Net:
         return frozenset(t for t, pairs in enumerate(self.inputs) if any(w > 1 for _, w in pairs))
 
     def has_tokens(self, marking: Marking, transition: int) -> bool:
-        """Tell whether the places that a transition takes from hold enough tokens."""
+        """Return whether the places that a transition takes from hold enough tokens."""
         return all(
             place in marking if weight == 1 else marking.count(place) >= weight
             for place, weight in self.inputs[transition]
@@ -187,7 +190,7 @@ class Net:
         return tuple(tokens)
 
     def words(self, marking: Marking) -> str:
-        """Return a marking for people: "{ready, item(2)}"."""
+        """Return a marking as text: "{ready, item (2 tokens)}"."""
         return "{" + ", ".join(self._counted(marking)) + "}"
 
     def _counted(self, marking: Marking) -> Iterator[str]:
@@ -196,11 +199,11 @@ class Net:
             yield name if count == 1 else f"{name} ({count} tokens)"
 
     def name_of(self, place: int) -> str:
-        """Return the label of a place, its id when it has none or shares it."""
+        """Return the label of a place, or its id if it has none."""
         node = self.places[place]
         return node.name.strip() or node.id
 
     def transition_name(self, transition: int) -> str:
-        """Return the label of a transition, its id when it has none."""
+        """Return the label of a transition, or its id if it has none."""
         node = self.transitions[transition]
         return node.name.strip() or node.id

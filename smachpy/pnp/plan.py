@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Executable:
-    """An action of a plan, and where it is spoken of.
+    """An action of a plan, and the nodes whose labels have its name.
 
     Attributes:
-        name: As in the labels: `[ROBOT#]ACTION[_P1[_P2...]]`.
+        name: Its name in the labels: `[ROBOT#]ACTION[_P1[_P2...]]`.
         places: Its exec places.
         starts: Transitions that start or resume it.
         ends: Transitions that end, fail or interrupt it.
@@ -37,20 +37,20 @@ class Executable:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a net means as a plan.
+    """The meaning of a net as a plan.
 
     Attributes:
         net: The net.
-        strict: A guarded end waits for the end of its action, too, as in the papers on PNP; else
-            its condition alone counts, as in PNP's code.
-        executables: By their names, in the order of their exec places.
+        strict: Whether a guarded end also waits for the end of its action, as in the papers on PNP;
+            otherwise only its condition counts, as in PNP's code.
+        executables: The actions by name, in the order of their exec places.
         calls: For each transition: pairs (name of an executable, function), in their order.
         conditions: For each transition: the condition as written, or None.
-        guards: For each transition: what has to hold, or None. `NAME.finished`, `NAME.failed` and
-            `NAME.ended` ask for the end of an executable.
+        guards: For each transition: the condition for its firing, or None. `NAME.finished`,
+            `NAME.failed` and `NAME.ended` test the end of an executable.
         goals: Place -> tokens that it holds at the goal.
         fails: Place -> tokens that it holds when the plan has failed.
-        problems: What is doubtful about the labels.
+        problems: The problems of the labels.
     """
 
     net: Net
@@ -64,20 +64,20 @@ class Plan:
     problems: tuple[PlanProblem, ...]
 
     def is_goal(self, marking: Marking) -> bool:
-        """Tell whether all goal places hold exactly their tokens."""
+        """Return whether all goal places hold exactly their tokens."""
         return _holds(self.goals, marking)
 
     def is_fail(self, marking: Marking) -> bool:
-        """Tell whether all fail places hold exactly their tokens."""
+        """Return whether all fail places hold exactly their tokens."""
         return _holds(self.fails, marking)
 
     def external(self, transition: int) -> tuple[str, ...]:
-        """Return the names that the guard of a transition asks the world for."""
+        """Return the names in the guard of a transition that do not test an action."""
         guard = self.guards[transition]
         return () if guard is None else tuple(n for n in guard.atoms() if "." not in n)
 
     def externals(self) -> dict[str, list[int]]:
-        """Return all names that guards ask the world for, with the transitions that do."""
+        """Return all names in guards that do not test an action -> transitions with them."""
         found: dict[str, list[int]] = {}
         for number in range(len(self.net.transitions)):
             for name in self.external(number):
@@ -90,7 +90,7 @@ def _holds(wanted: dict[int, int], marking: Marking) -> bool:
 
 
 def element(net: Net, *, place: int = -1, transition: int = -1) -> str:
-    """Return how problems speak of a node: "place 'p1' (A.exec)"."""
+    """Return the text for a node in problems: "place 'p1' (A.exec)"."""
     if place < 0 and transition < 0:
         return ""
     kind, node = (
@@ -132,12 +132,12 @@ def problem_of(
 
 
 def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem] = ()) -> Plan:
-    """Return what the labels of `net` mean.
+    """Return the plan that the labels of `net` describe.
 
     Args:
         net: The net.
         strict: See `Plan`.
-        problems: What its file was found to have already.
+        problems: Problems that were found in its file before.
     """
     found = list(problems)
     if not net.places:
@@ -151,6 +151,7 @@ def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem
             )
             for fault in place.faults
         ]
+    # Exec places first, so that executables are in their order; transitions may name others.
     executables: dict[str, Executable] = {}
     for number, place in enumerate(places):
         if place.action:
@@ -182,7 +183,8 @@ def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem
         {n: place.fail for n, place in enumerate(places) if place.fail is not None},
         (),
     )
-    found += _doubts(plan)
+    # These problems are found with the plan itself, which is frozen.
+    found += _label_problems(plan)
     object.__setattr__(plan, "problems", tuple(found))
     return plan
 
@@ -194,7 +196,7 @@ def _resolved(
     label: TransitionLabel,
     found: list[PlanProblem],
 ) -> Iterator[tuple[str, str]]:
-    """Yield the calls of a label; those without a name take the exec places beside it."""
+    """Yield the calls of a label; those without a name are for the exec places beside it."""
     for name, function in label.calls:
         if name:
             yield name, function
@@ -212,6 +214,7 @@ def _resolved(
 def _guard(
     calls: tuple[tuple[str, str], ...], condition: Condition | None, *, strict: bool
 ) -> Condition | None:
+    # An interrupt or a start waits for nothing but its own condition.
     ends = [(name, function) for name, function in calls if function in {"end", "fail"}]
     if strict:
         waits = {"end": "finished" if condition is None else "ended", "fail": "failed"}
@@ -224,8 +227,8 @@ def _guard(
     return atom(f"{name}.{'finished' if function == 'end' else 'failed'}")
 
 
-def _doubts(plan: Plan) -> Iterator[PlanProblem]:
-    """Yield what the labels of a plan have that PNP passes over in silence."""
+def _label_problems(plan: Plan) -> Iterator[PlanProblem]:
+    """Yield problems of labels that PNP silently accepts."""
     net = plan.net
     placed = [name for name, known in plan.executables.items() if known.places]
     for name, known in plan.executables.items():
@@ -247,6 +250,7 @@ def _doubts(plan: Plan) -> Iterator[PlanProblem]:
             text = "takes from no place, so that it never fires; expected an arc to it."
             yield problem_of(net, "no-input", "warning", text, transition=number)
         count = Counter(function for _, function in calls)
+        # `_guard` waits for the first of several ends only, as PNP does.
         if count["end"] > 1 and plan.conditions[number] is None and not plan.strict:
             names = [name for name, function in calls if function == "end"]
             others = ", ".join(map(repr, names[1:]))
@@ -260,7 +264,7 @@ def _doubts(plan: Plan) -> Iterator[PlanProblem]:
                 hint=f"Try [and {' '.join(f'{name}.finished' for name in names)}], or strict.",
             )
         if count["resume"]:
-            text = "resumes an action, which begins anew here; expected start."
+            text = "resumes an action, which starts anew here; expected start."
             yield problem_of(net, "resume", "note", text, transition=number)
 
 

@@ -1,4 +1,4 @@
-"""PNML files, read and written: the dialect of PNP (JARP, PNPgenerator) and PNML 2009.
+"""Reads and writes PNML files, in the dialect of PNP (JARP, PNPgenerator) and in PNML 2009.
 
 Sources: the loader of PetriNetPlans 1.4; ISO/IEC 15909-2:2011, place/transition nets.
 """
@@ -25,16 +25,17 @@ Dialect: TypeAlias = Literal["pnp", "2009"]
 NAMESPACE: Final = "http://www.pnml.org/version-2009/grammar/pnml"
 PT_NET: Final = "http://www.pnml.org/version-2009/grammar/ptnet"
 MOST_TOKENS: Final = 1000
-"""Of one place or arc: more is a mistake, or somebody who wants to fill the memory."""
+"""Tokens of one place or arc: more is a mistake or an attack, as markings list each token."""
 
-_LINE: Final = "{smachpy}line"
+_LINE: Final = "{smachpy}line"  # in a namespace, as the file may have an attribute "line"
 _PLAN_NAME: Final = "PLAN NAME:"
+# Characters outside the production `Char` of XML 1.0; the standard library writes them as they are.
 _NOT_XML: Final = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass
 class _Found:
-    """What was read so far."""
+    """The parts of a net that were read so far."""
 
     file: str
     dialect: Dialect = "pnp"
@@ -62,10 +63,10 @@ def read_pnml(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
     """Read a net.
 
     Returns:
-        The net, and what is doubtful about the file.
+        The net, and the warnings about the file.
 
     Raises:
-        PlanError: the file cannot be read, or is no net; all problems at once.
+        PlanError: the file cannot be read, or is not a net; all problems at once.
     """
     path = Path(file)
     try:
@@ -83,9 +84,9 @@ def parse_pnml(
     """Read a net from the text of a file; arguments and errors as for `read_pnml`.
 
     Args:
-        data: The text; bytes say their encoding themselves.
-        name: Of the plan, unless a comment "PLAN NAME:" says another.
-        file: For the problems.
+        data: The text, or bytes in the encoding that their XML declaration names.
+        name: The name of the plan, unless it is in a comment "PLAN NAME:".
+        file: The file, for the problems.
     """
     found = _Found(file, name=name)
     root = _parse(data, found)
@@ -101,9 +102,10 @@ def parse_pnml(
 
 
 def _parse(data: bytes | str, found: _Found) -> Element | None:
-    """Return the root of the XML, each element with its line; None when it is no XML."""
+    """Return the root of the XML, with the line of each element; None if it is not XML."""
     from xml.etree.ElementTree import ParseError, TreeBuilder
 
+    # The standard parser expands entities, by which a small file can fill the memory.
     from defusedxml.common import DefusedXmlException
     from defusedxml.ElementTree import DefusedXMLParser
 
@@ -136,6 +138,7 @@ def _read_root(root: Element, found: _Found) -> None:
     if len(nets) != 1:
         found.problem("error", "xml", root, f"got {len(nets)} nets; expected one.")
         return
+    # PNP's dialect has no pages.
     if _namespace(root) == NAMESPACE or any(_tag(child) == "page" for child in nets[0]):
         found.dialect = "2009"
     kind = nets[0].get("type", "")
@@ -148,7 +151,7 @@ def _read_root(root: Element, found: _Found) -> None:
     _read_nodes(nets[0], found, 0)
 
 
-_DEEPEST_PAGE: Final = 50
+_DEEPEST_PAGE: Final = 50  # pages may contain pages; the reader is recursive
 
 
 def _read_nodes(parent: Element, found: _Found, depth: int) -> None:
@@ -201,6 +204,7 @@ def _read_arc(element: Element, found: _Found) -> None:
     kind = "" if not kinds else (kinds[0].get("value") or "".join(kinds[0].itertext())).strip()
     if kind not in {"", "normal"}:
         found.problem("error", "arc", element, f"got type {kind!r}; expected an ordinary arc.")
+    # PNP ignores an arc that stands above one of its nodes; `_checked_arcs` reports it.
     late = source not in found.places and source not in found.transitions
     late = late or (target not in found.places and target not in found.transitions)
     if late and found.dialect == "pnp":
@@ -214,10 +218,11 @@ def _read_arc(element: Element, found: _Found) -> None:
 
 
 def _checked_arcs(found: _Found) -> tuple[Arc, ...]:
-    """Return the arcs whose ends are there; with what is wrong noted.
+    """Return the arcs whose two nodes exist, and record the problems of the others.
 
-    PNP drops an arc that stands above one of its ends, so it is dropped here too, with a warning.
+    PNP drops an arc that stands above one of its nodes, so it is dropped here too, with a warning.
     """
+    # At the end, as in PNML 2009 an arc may stand above its nodes, and so may references to them.
     arcs = []
     for arc, element in found.arcs:
         source = _resolved(arc.source, found)
@@ -246,7 +251,7 @@ def _checked_arcs(found: _Found) -> tuple[Arc, ...]:
 
 
 def _resolved(name: str, found: _Found) -> str:
-    seen: set[str] = set()
+    seen: set[str] = set()  # references may form a circle
     while name in found.references and name not in seen:
         seen.add(name)
         name = found.references[name]
@@ -254,7 +259,7 @@ def _resolved(name: str, found: _Found) -> str:
 
 
 def _number(element: Element, tag: str, default: int, found: _Found) -> int:
-    """Return the number below `tag`, of "Colour,N" the last part; `default` when there is none."""
+    """Return the number in the child `tag`, or `default`; in "Colour,N" it is the last part."""
     if not any(_tag(child) == tag for child in element):
         return default
     text = _text_below(element, tag, found).strip().rpartition(",")[2].strip()
@@ -267,7 +272,7 @@ def _number(element: Element, tag: str, default: int, found: _Found) -> int:
 
 
 def _text_below(element: Element, tag: str | None, found: _Found) -> str:
-    """Return the text of `element`'s child `tag`, which is in its `value` or `text`."""
+    """Return the text of `element`'s child `tag`; it is in that child's `value` or `text`."""
     holder = element
     if tag is not None:
         holders = [child for child in element if _tag(child) == tag]
@@ -309,7 +314,7 @@ def pnml_text(net: Net, *, dialect: Dialect = "pnp") -> str:
     """Return a net as the text of a file; reading that gives the same net.
 
     Raises:
-        InvalidStateError: a name has a character that XML cannot hold.
+        InvalidStateError: a name has a character that XML does not allow.
     """
     from xml.etree import ElementTree as ET
 
@@ -331,13 +336,14 @@ def pnml_text(net: Net, *, dialect: Dialect = "pnp") -> str:
 
     for place in net.places:
         element = ET.SubElement(page, "place", {"id": place.id})
-        add(element, "name", place.name or " ")
+        add(element, "name", place.name or " ")  # an empty name ends PNP's own loader
         if place.tokens:
             add(element, "initialMarking", str(place.tokens))
     for transition in net.transitions:
         element = ET.SubElement(page, "transition", {"id": transition.id})
         add(element, "name", transition.name or " ")
-    weights: Counter[tuple[str, str]] = Counter()  # two arcs that are alike: not all tools add them
+    # One arc for two between the same nodes: not all tools add their weights.
+    weights: Counter[tuple[str, str]] = Counter()
     for arc in net.arcs:
         weights[arc.source, arc.target] += arc.weight
     for number, ((source, target), weight) in enumerate(weights.items(), 1):
@@ -350,7 +356,7 @@ def pnml_text(net: Net, *, dialect: Dialect = "pnp") -> str:
     odd = _NOT_XML.search(text)
     if odd is not None:
         raise InvalidStateError(
-            f"net {net.name!r}: got {odd[0]!r} in it; expected characters that XML can hold."
+            f"net {net.name!r}: got {odd[0]!r} in it; expected characters that XML allows."
         )
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 

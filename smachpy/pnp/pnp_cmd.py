@@ -1,11 +1,11 @@
-"""`PNPCmd`: actions one by one from a Python program, as PNP's own class of that name has them.
+"""`PNPCmd`: runs single actions from a Python program, like PNP's class of the same name.
 
     with PNPCmd({"goto": goto, "say": say}) as cmd:
         cmd.exec_action("goto", "hall", interrupt="obstacle", recovery="wait_5; restart_action")
         if cmd.get_condition("door_open"):
             cmd.start_action("say", "hello")
 
-Source of names and arguments: `pnp_cmd_base` of PetriNetPlans 1.4.
+The names and arguments are those of `pnp_cmd_base` of PetriNetPlans 1.4.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_
 from smachpy.machines.problems import Problems
 from smachpy.outcome_classes import outcome_class
 from smachpy.pnp.build import Action, action
-from smachpy.pnp.container import PetriNetPlan
+from smachpy.pnp.container import PetriNetPlan, load
 from smachpy.pnp.files import load_plan
 from smachpy.pnp.knowledge import Knowledge, Polled
+from smachpy.pnp.reading import plan_file
 from smachpy.pnp.text import rule_of
 from smachpy.userdata.user_data import UserData
 
@@ -54,13 +55,13 @@ class PNPCmd:
     Args:
         actions: As for `PetriNetPlan`.
         conditions: Likewise.
-        plan_folder: Where `start_plan` finds plans.
+        plan_folder: The folder of the plans for `start_plan` and `execute_plan`.
         server: As for `PetriNetPlan`.
 
     Raises:
         InvalidStateError: an argument is wrong.
 
-    Threads: all of it from any thread. An action that was started runs in a thread of its own.
+    Threads: any thread may call the methods. A started action runs in a thread of its own.
     """
 
     def __init__(
@@ -72,30 +73,30 @@ class PNPCmd:
         server: PNPServer | None = None,
     ) -> None:
         problems = Problems(type(self).__name__)
-        self._actions = problems.mapping("actions", actions, "name -> what does it")
+        self._actions = problems.mapping("actions", actions, "name -> state or function")
         problems.raise_all()
         self._folder = plan_folder
         self._userdata = UserData()
         self._server = server
         self._knowledge = Knowledge(conditions, lambda: self._userdata, server=server)
         self._lock = threading.Lock()
-        self._status: dict[str, Status] = {}
+        self._status: dict[str, Status] = {}  # name -> how its last run ended; the newest is last
         self._running: dict[str, _Running] = {}
         self._listening: contextlib.ExitStack | None = None
-        self._plan: tuple[str, str] = ("", "")
+        self._plan: tuple[str, str] = ("", "")  # of the last plan: name, outcome or ""
 
     # -- beginning and end ---------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Begin to listen to the topics of the conditions."""
+        """Subscribe to the topics of the conditions."""
         if self._listening is None:
             self._listening = contextlib.ExitStack()
             self._listening.enter_context(self._knowledge.listening())
 
     def end(self) -> None:
-        """Stop what runs, and listen no more.
+        """Stop all actions, and unsubscribe.
 
-        Blocks: until everything has stopped, each action within its grace.
+        Blocks: until all actions have stopped, each within its grace.
         """
         self.quit_running_actions()
         self.wait_for_termination()
@@ -123,23 +124,25 @@ class PNPCmd:
 
         Args:
             name: The action.
-            params: Its parameters, as in "kitchen", "hello_you" or a list.
+            params: Its parameters, such as "kitchen", "hello_you" or a list.
             interrupt: A condition that interrupts it, or "timeout_" and seconds.
-            recovery: What is done then: "a; b_c; restart_action". Its last word is one of
-                "restart_action", "skip_action", "fail_plan", "goal"; left out: "skip_action".
+            recovery: The actions after an interrupt, "a; b_c; restart_action". The last word is one
+                of "restart_action", "skip_action", "fail_plan", "goal"; the default is
+                "skip_action".
 
         Returns:
-            "success", "failure" or "interrupt": how its last run ended.
+            The end of its last run: "success", "failure" or "interrupt".
 
         Raises:
-            InvalidStateError: an argument is wrong, or nothing does the action.
+            InvalidStateError: an argument is wrong, or the action is unknown.
             InvalidUserCodeError: the action raised.
 
-        Blocks: until then.
+        Blocks: until the action has ended.
         """
         part = self._part(name, params)
         if interrupt:
             limit = interrupt.removeprefix("timeout_")
+            # Programs leave the action's name out; guards have `timeout_ACTION_SECONDS`.
             if limit != interrupt and "_" not in limit:
                 interrupt = f"timeout_{part.name}_{limit}"
             rule = rule_of(interrupt, recovery or "skip_action")
@@ -151,17 +154,17 @@ class PNPCmd:
         return self.action_status(part.name)
 
     def start_action(self, name: str, params: str | Iterable[object] = "") -> None:
-        """Start an action and go on.
+        """Start an action without waiting for its end.
 
         Raises:
-            InvalidStateError: it runs already, an argument is wrong, or nothing does it.
+            InvalidStateError: it is running already, an argument is wrong, or it is unknown.
         """
         part = self._part(name, params)
         running = self._begin(part)
         running.task = current_clock().spawn(lambda: self._run(part.name, running), name=part.name)
 
     def interrupt_action(self, name: str, params: str | Iterable[object] = "") -> None:
-        """Ask an action to stop; with no parameters, all that run under this name.
+        """Ask an action to stop; without parameters, all running actions of this name.
 
         Threads: any; does not wait.
         """
@@ -188,9 +191,9 @@ class PNPCmd:
         known[cmd](name, params)
 
     def action_status(self, name: str, params: str | Iterable[object] = "") -> Status:
-        """Return "run", how the last run ended, or "" when there was none.
+        """Return "run", the end of the last run, or "" if there was none.
 
-        With no parameters, of any that ran under this name.
+        Without parameters, it is that of any action of this name.
         """
         if self._tasks_of(name, params):
             return "run"
@@ -199,21 +202,28 @@ class PNPCmd:
         return found[-1] if found else ""
 
     def running_actions(self) -> list[str]:
-        """Return the names of the actions that run."""
+        """Return the names of the running actions."""
         with self._lock:
             return list(self._running)
 
     def quit_running_actions(self) -> None:
-        """Ask all actions, and a plan, to stop."""
+        """Ask all running actions and plans to stop."""
+        # Without the lock: a plan that ends meanwhile needs it to remove itself.
         with self._lock:
             plans = [running.plan for running in self._running.values()]
         for plan in plans:
             plan.request_preempt(by="PNPCmd")
 
     def wait_for_termination(self, timeout: float | None = None) -> bool:
-        """Wait until nothing that was started runs; tell whether that came within `timeout` [s].
+        """Wait until all started actions and plans have ended.
 
-        Blocks: until then; None waits for ever.
+        Args:
+            timeout: Longest wait [s]; None: no limit.
+
+        Returns:
+            Whether they have ended within `timeout`.
+
+        Blocks: until then.
         """
         clock = current_clock()
         until = None if timeout is None else clock.now() + timeout
@@ -229,45 +239,45 @@ class PNPCmd:
     # -- conditions ----------------------------------------------------------------------------
 
     def get_condition(self, name: str) -> bool:
-        """Return what a condition is worth now; an event is used up by it."""
+        """Return the value of a condition now; an event is used up."""
         return self._knowledge.value(name, "PNPCmd", current_clock().now())
 
     def set_condition(self, name: str, value: bool) -> None:
-        """Say what a condition is from now on."""
+        """Set a condition."""
         self._knowledge.set(name, value)
 
     def post(self, event: str) -> None:
-        """Tell that something happened."""
+        """Post an event."""
         self._knowledge.post(event, current_clock())
 
     # -- plans ---------------------------------------------------------------------------------
 
     def execute_plan(self, name: str) -> str:
-        """Run a plan of the folder to its end; returns "goal", "fail" or "preempted".
+        """Run a plan of the folder to its end; return "goal", "fail" or "preempted".
 
         Raises:
             PlanError: it cannot be loaded.
 
-        Blocks: until then.
+        Blocks: until the plan has ended.
         """
         running = self._plan_of(name)
         self._run(name, running)
         return self._plan[1]
 
     def start_plan(self, name: str) -> None:
-        """Start a plan of the folder and go on; errors as for `execute_plan`."""
+        """Start a plan of the folder without waiting; errors as for `execute_plan`."""
         running = self._plan_of(name)
         running.task = current_clock().spawn(lambda: self._run(name, running), name=name)
 
     def stop_plan(self) -> None:
-        """Ask the plan that runs to stop."""
+        """Ask the running plan to stop."""
         with self._lock:
             running = self._running.get(self._plan[0])
         if running is not None:
             running.plan.request_preempt(by="PNPCmd")
 
     def plan_cmd(self, name: str, cmd: str = "start") -> None:
-        """Start a plan, or stop the one that runs: `cmd` is "start" or "stop"."""
+        """Start a plan, or stop the running one: `cmd` is "start" or "stop"."""
         if cmd not in {"start", "stop"}:
             raise InvalidStateError(f"plan_cmd: got {cmd!r}; expected 'start' or 'stop'.")
         if cmd == "start":
@@ -280,18 +290,19 @@ class PNPCmd:
         return self._plan[0]
 
     def plan_status(self) -> str:
-        """Return "run", how the last plan ended, or ""."""
+        """Return "run", the outcome of the last plan, or ""."""
         return "run" if self._plan[0] in self._running else self._plan[1]
 
     # -- inside --------------------------------------------------------------------------------
 
     def _is(self, whole: str, name: str, params: str | Iterable[object]) -> bool:
-        """Tell whether the action `whole` is one that a caller means."""
+        """Return whether `name` and `params` of a caller mean the action `whole`."""
+        # "goto" without parameters also means "goto_kitchen".
         meant = self._part(name, params).name
         return whole == meant or (not params and whole.startswith(f"{meant}_"))
 
     def _tasks_of(self, name: str, params: str | Iterable[object] = "") -> list[Task | None]:
-        """Return the tasks of the actions that run; None for one that a caller waits for."""
+        """Return the tasks of the running actions; None for one in its caller's thread."""
         with self._lock:
             running = tuple(self._running.items())
         return [one.task for key, one in running if self._is(key, name, params)]
@@ -301,6 +312,8 @@ class PNPCmd:
         return action(name, *[word for word in words if word != ""])
 
     def _begin(self, part: Action) -> _Running:
+        # Two plans: the first one reads the names in the guards. In the second one these names are
+        # conditions that ask this object, which has the events and set values.
         net = part.net("PNPCmd")
         first = PetriNetPlan(net, self._actions, server=self._server)
         names = [n for n in first.plan.externals() if not n.startswith(_BUILT_IN)]
@@ -321,9 +334,7 @@ class PNPCmd:
         return ask if every is None else Polled(ask, every)
 
     def _plan_of(self, name: str) -> _Running:
-        from smachpy.pnp.container import load
-        from smachpy.pnp.reading import plan_file
-
+        # With own actions the plan uses them; otherwise those of its `actions.yaml`.
         file = plan_file(self._folder, name)
         if self._actions or self._server is not None:
             plan = load(file, self._actions, self._knowledge.sources, server=self._server)
@@ -339,11 +350,15 @@ class PNPCmd:
     def _note(self, name: str, plan: PetriNetPlan) -> _Running:
         with self._lock:
             if name in self._running:
-                raise InvalidStateError(f"{name}: it runs already; expected one run at a time.")
+                raise InvalidStateError(
+                    f"{name}: it is already running; expected one run at a time."
+                )
             self._running[name] = running = _Running(plan)
             return running
 
     def _run(self, name: str, running: _Running) -> None:
+        # The last outcome of the action itself: a recovery may start it again, and the plan's
+        # outcome does not show an interrupt.
         last: list[str] = []
 
         def listen(event: Event) -> None:
@@ -352,6 +367,7 @@ class PNPCmd:
 
         plan = running.plan
         plan.subscribe(listen)
+        # An event that is posted to this object must wake the plan, whose guards ask for it.
         forget = self._knowledge.subscribe(plan._smachpy.knowledge.changed)
         status: Status = "failure"
         try:
@@ -365,6 +381,6 @@ class PNPCmd:
         finally:
             forget()
             with self._lock:
-                self._status.pop(name, None)  # the newest is the last
+                self._status.pop(name, None)  # so that the newest is the last
                 self._status[name] = status
                 del self._running[name]

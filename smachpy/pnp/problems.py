@@ -1,4 +1,4 @@
-"""What is wrong with plans: problems with file, line and element."""
+"""Problems of plans, with file, line and element."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PlanProblem:
-    """One thing wrong with a plan.
+    """One problem of a plan.
 
     Attributes:
-        rule: Id of the rule; `smachpy.checks.RULES` has "net-" and it.
-        severity: "error": the plan is not run. "warning": it runs, as in PNP, which is silent
-            about it. "note": worth knowing.
-        message: What was found, what was expected.
-        element: What it is about: "place 'p1' (A.exec)"; "" for the whole plan.
-        file: The file, "" when the plan was built.
-        line: Of it, from 1; 0 when not known.
-        hint: What to try, or "".
-        run: Labels of the transitions whose firing leads there, first to last.
-        marking: The marking that they lead to, in words.
+        rule: Id of the rule; in `smachpy.checks.RULES` it has the prefix "net-".
+        severity: "error": the plan does not run. "warning": it runs, as in PNP, which does not
+            report it. "note": information.
+        message: The text found and the text expected.
+        element: The node, "place 'p1' (A.exec)"; "" for the whole plan.
+        file: The file, "" if the plan was built.
+        line: The line in it, from 1; 0 if unknown.
+        hint: A suggestion, or "".
+        run: Labels of the transitions whose firing leads to the problem, first to last.
+        marking: The marking that they lead to, as text.
     """
 
     rule: str

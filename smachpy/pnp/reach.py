@@ -1,4 +1,4 @@
-"""What a net can do when its guards may be true or false at any time; no threads, time or I/O."""
+"""The markings that a net can reach if guards are ignored; no threads, time or I/O."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from smachpy.pnp.net import Marking, Net
 
 MOST_MARKINGS: Final = 20_000
-"""So many are looked at: the largest public plan has 3,555."""
+"""Limit of the search; the largest public plan has 3,555."""
 _TOKENS_EACH: Final = 20
-"""On the average; fewer markings are looked at when they hold more, as each takes longer then."""
+"""Average tokens of a marking; with more, the search ends earlier, as each marking takes longer."""
 
 
 @dataclass(frozen=True)
@@ -21,14 +21,14 @@ class Reachable:
 
     Attributes:
         net: The net.
-        came: Marking -> the marking and the transition it was first reached by; None for the
-            initial one. In the order of a breadth-first search: nearest first.
+        came: Marking -> the marking and the transition from which it was first reached; None for
+            the initial one. In the order of a breadth-first search: nearest first.
         fired: Transitions that can fire.
         dead: Markings in which nothing can fire, nearest first.
-        most: Place -> most tokens that it held; places that are never marked are not in it.
-        covering: A marking, and one with the same tokens and more that it leads to: the net is
-            unbounded. None when no such pair was found.
-        complete: All were looked at.
+        most: Place -> greatest number of its tokens; places that are never marked are not in it.
+        covering: A marking, and a reachable one with the same tokens and more, which proves that
+            the net is unbounded; None if no such pair was found.
+        complete: Whether all markings were visited.
     """
 
     net: Net
@@ -54,7 +54,7 @@ def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
 
     Args:
         net: The net.
-        limit: How many are looked at, at most; the search also ends at the first proof that
+        limit: Greatest number of markings to visit; the search also ends at the first proof that
             there are infinitely many.
     """
     came: dict[Marking, tuple[Marking, int] | None] = {net.initial: None}
@@ -85,7 +85,8 @@ def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
             for place, count in counts.items():
                 if count > most.get(place, 0):
                     most[place] = count
-            # A net that grows without end comes to a place with two tokens.
+            # Only markings with two tokens in one place: an unbounded net has such markings, and
+            # the comparison with all markings on the way is slow.
             before = _covered(after, counts, came)
             if before is not None:
                 covering = before, after
@@ -97,7 +98,7 @@ def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
 def _covered(
     marking: Marking, counts: Counter[int], came: dict[Marking, tuple[Marking, int] | None]
 ) -> Marking | None:
-    """Return a marking on the way to `marking` that has fewer tokens, all of them in it."""
+    """Return a marking on the way to `marking` whose tokens are a proper part of its tokens."""
     step = came[marking]
     while step is not None:
         before = step[0]

@@ -1,4 +1,4 @@
-"""Files that hold plans, by their endings."""
+"""Reads and finds plan files, by their endings."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
     """Read a plan in any form.
 
     Returns:
-        The net, and what is doubtful about the file.
+        The net, and the warnings about the file.
 
     Raises:
-        PlanError: the file cannot be read, or is no plan; all problems at once.
+        PlanError: the file cannot be read, or is not a plan; all problems at once.
     """
     path = Path(file)
     if path.suffix not in PLANS[1:]:
         return read_pnml(path)
+    # Execution rules only exist for text forms; a net has its interrupts as transitions.
     beside = path.with_suffix(".er")
     rules = parse_rules(_text(beside), file=str(beside)) if beside.is_file() else ()
     ignored = [
         PlanProblem(
             "comment",
             "warning",
-            f"{rule.ignored!r} means nothing, as in PNP's generators.",
+            f"{rule.ignored!r} is ignored, as in PNP's generators.",
             f"rule for {rule.action!r}",
             str(beside),
             rule.line,
@@ -48,7 +49,8 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
 
 
 def find_plan(folder: Path | str, name: str) -> Path | None:
-    """Return the file of the plan with this name in a folder; None when there is none."""
+    """Return the file of the plan with this name in a folder, or None."""
+    # The name comes from a label: it may be too long for a file, or have a null character.
     try:
         files = (Path(folder) / f"{name}{end}" for end in PLANS)
         return next((file for file in files if file.is_file()), None)
@@ -60,7 +62,7 @@ def plan_file(folder: Path | str, name: str) -> Path:
     """Return the file of the plan with this name in a folder.
 
     Raises:
-        PlanError: there is none.
+        PlanError: there is no such plan.
     """
     found = find_plan(folder, name)
     if found is None:

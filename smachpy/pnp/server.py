@@ -1,9 +1,10 @@
-"""Robots that run PNP's own `PNPActionServer`: they do a plan's actions, and answer its guards.
+"""Robots with PNP's own `PNPActionServer`, which executes actions and evaluates conditions.
 
-One action, "PNP", does all of them: a goal names the action, its parameters, and what is to happen
-to it, "start" or "interrupt". The service "pnp/conditionEval" says what a condition is worth, the
-topic "pnp/conditionEvent" when that may have changed. The robot is one of ROS 1, behind the bridge
-(docs/ros1_robot.md). Source: pnp_msgs and pnp_ros of PetriNetPlans 1.4.
+A single action, "PNP", executes all of them: its goal has the name of the action, its parameters
+and the function "start" or "interrupt". The service "pnp/conditionEval" returns the value of a
+condition; a message on the topic "pnp/conditionEvent" means that values may have changed. The robot
+uses ROS 1 and is reached over the bridge (docs/ros1_robot.md). Source: pnp_msgs and pnp_ros of
+PetriNetPlans 1.4.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ string cond
 ---
 int8 truth_value
 """
-_INTERRUPT_S: Final = 5.0
+_INTERRUPT_S: Final = 5.0  # longest wait for the robot's answer to an interrupt
+# An interrupt refers to its action by the id of the "start" goal. The first one is random, so that
+# two programs, or two runs of one, do not use the same ids.
 _ids = itertools.count(secrets.randbelow(2**31))
 
 
@@ -54,6 +57,7 @@ def _interface(kind: str, name: str, text: str) -> Any:
         "action": (interfaces.get_action, interfaces.define_action),
         "srv": (interfaces.get_service, interfaces.define_service),
     }[kind]
+    # `pnp_msgs` is not bundled; its users may have registered their own files.
     try:
         return get(f"pnp_msgs/{name}")
     except interfaces.InterfaceError:
@@ -61,27 +65,27 @@ def _interface(kind: str, name: str, text: str) -> Any:
 
 
 class PNPServer:
-    """A robot's `PNPActionServer`: does what nothing else is registered for.
+    """A robot's `PNPActionServer`, for actions and conditions that are not registered here.
 
-    A plan with one asks it for every condition that nobody else knows, each time something changes
-    and every so many seconds while a guard waits for it; its own events and variables ("@NAME" in
-    names) are its own. Actions end with 'succeeded', or with 'aborted' when the server aborts the
-    goal or is lost, and are interrupted by a second goal, as the server knows no cancel.
+    The plan calls its service for every unknown condition, at each change and periodically while a
+    guard waits for it. The robot keeps its events and variables ("@NAME" in names) itself. Actions
+    end with 'succeeded', or with 'aborted' if the server aborts the goal or is lost. They are
+    interrupted by a second goal, as the server does not support cancelling.
 
     Args:
         action: Name of its action; "{robot}" stands for the robot in the plan's names.
-        conditions: Name of its service for conditions; None: it is asked for none.
-        events: Name of the topic whose messages say that conditions may have changed; None: none.
+        conditions: Name of its service for conditions; None: it has none.
+        events: Name of the topic that announces changes of conditions; None: there is none.
         robot: Name of the robot for actions whose names have none.
-        every: Time between two questions while a guard waits [s].
-        timeout: A server or an answer that does not come within that is an error [s].
+        every: Time between two calls of the service while a guard waits [s].
+        timeout: Longest wait for a server or an answer [s]; then an error is raised.
 
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
     """
 
     LOCAL: ClassVar = frozenset({"wait", "waitfor", "restartcurrentplan", "stopcurrentplan"})
-    """Built-in actions that are the plan's own, though the robot has them, too."""
+    """Built-in actions that run here, although the robot has them, too."""
 
     def __init__(
         self,
@@ -104,24 +108,25 @@ class PNPServer:
             if value == 0.0:
                 problems.add(f"{name}: got 0; expected more.")
         problems.raise_all()
+        # One for each running plan with this server; all have the same name, the newest is used.
         self._services: list[Any] = []
-        self._seen: list[Any] = []  # they had a server once
+        self._seen: list[Any] = []  # the one that has had a server: no waiting for it again
 
     def state(self, call: Call) -> ServerAction:
-        """Return the state that lets the robot do an action."""
+        """Return the state in which the robot executes an action."""
         return ServerAction(call, self)
 
     def value(self, name: str) -> bool:
-        """Ask what a condition is worth.
+        """Ask the robot for the value of a condition.
 
         Raises:
-            ServiceError: nobody answers within `timeout`.
+            ServiceError: there is no answer within `timeout`.
 
         Blocks: until the answer.
         """
-        services = self._services[-1:]
+        services = self._services[-1:]  # a copy: another plan may end and remove its service
         if not services:
-            raise InvalidStateError(f"{name}: nobody listens to the robot: no plan runs.")
+            raise InvalidStateError(f"{name}: not connected to the robot: no plan is running.")
         (service,) = services
         if service not in self._seen:
             service.wait_for_service(self.timeout)
@@ -130,7 +135,7 @@ class PNPServer:
 
     @contextlib.contextmanager
     def listening(self, changed: Callable[[], object]) -> Iterator[None]:
-        """Be able to ask while this lasts; `changed` is called when answers may have changed."""
+        """Connect to the robot within the block; `changed` is called when values may change."""
         from actionlib_core.interfaces.std_msgs.msg import String
         from actionlib_core.pubsub.service_proxy import ServiceProxy
         from actionlib_core.pubsub.topic import NotingSubscriber
@@ -148,7 +153,7 @@ class PNPServer:
 
 
 class ServerAction(SimpleActionState):
-    """An action that a `PNPServer` does."""
+    """An action that a `PNPServer` executes."""
 
     def __init__(self, call: Call, server: PNPServer) -> None:
         self._call = call
@@ -171,12 +176,13 @@ class ServerAction(SimpleActionState):
         goal.params, goal.function = "_".join(self._call.parameters), function
 
     def execute(self, ud: Any) -> str:
-        """Let the robot do it.
+        """Let the robot execute the action.
 
-        Blocks: until the server says that it is done, or after a preempt until it has stopped.
+        Blocks: until the server reports its end, after a preempt until it has stopped.
         """
         from actionlib_core.node import get_node
 
+        # The callback runs in another thread, where this node may not be the current one.
         asked: list[bool] = []
         node, done = get_node(), clock_of_run().event(f"the interruption of {self._call.name}")
 
@@ -192,8 +198,10 @@ class ServerAction(SimpleActionState):
             outcome = super().execute(ud)
         finally:
             forget()
-            if asked:  # the program may end with the plan: the robot is to have been told
+            # The program may end with the plan: first the interrupt must have reached the robot.
+            if asked:
                 done.wait(_INTERRUPT_S)
+        # The server may report an interrupted action as succeeded.
         if asked and is_good(outcome):
             self.service_preempt()
             return "preempted"
@@ -202,7 +210,7 @@ class ServerAction(SimpleActionState):
     def _interrupt(self, node: Node) -> None:
         """Send the goal that interrupts the action.
 
-        Blocks: until the server has taken it, for some seconds at most.
+        Blocks: until the server has answered, at most 5 s.
         """
         from actionlib_core import ActionClient
 
@@ -212,6 +220,6 @@ class ServerAction(SimpleActionState):
         client = ActionClient(self._name, spec, node=node)
         try:
             if not client.send_goal(goal).wait(_INTERRUPT_S):
-                log.logwarn(f"{self._call.name}: {self._name!r} did not take its interruption.")
+                log.logwarn(f"{self._call.name}: {self._name!r} did not confirm the interrupt.")
         finally:
             client.stop()

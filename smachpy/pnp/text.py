@@ -29,10 +29,11 @@ _TOKEN = re.compile(
 )
 _GOTO = re.compile(r"GOTO[_\s]\s*(\S+)")
 _RULE = re.compile(r"\s*\*(\w+)\*\s*(.*?)\s*\*(\w+)\*\s*(.*?)\s*", re.DOTALL)
+# A line of an `.er` file; "*x* N" at its end has no effect.
 _ER = re.compile(
     r"\s*\*(\w+)\*\s*(.*?)\s*\*(\w+)\*\s*(\S+)\s*\*(\w+)\*\s*(.*?)\s*(?:\*x\*\s*(\d+)\s*)?"
 )
-_DEEPEST: Final = 50
+_DEEPEST: Final = 50  # brackets; the reader is recursive
 
 
 class ExecutionRule(NamedTuple):
@@ -40,9 +41,9 @@ class ExecutionRule(NamedTuple):
 
     Attributes:
         action: Name of the action, without parameters.
-        rule: What interrupts it.
-        line: Of the file.
-        ignored: What of the line means nothing, "" for nothing.
+        rule: The interrupt and its recovery.
+        line: The line in the file.
+        ignored: The part of the line that has no effect, or "".
     """
 
     action: str
@@ -65,11 +66,11 @@ def parse_plan(
     Args:
         text: The plan.
         rules: Execution rules, for each action of that name in the plan.
-        name: Of the plan.
-        file: For the problems.
+        name: The name of the plan.
+        file: The file, for the problems.
 
     Raises:
-        PlanError: it is none; with its line.
+        PlanError: it cannot be read; with the line.
     """
     reader = _Reader(text, rules, file)
     part = reader.plan(0)
@@ -84,7 +85,8 @@ def parse_plan(
 def parse_pddl(
     text: str, rules: tuple[ExecutionRule, ...] = (), *, name: str = "plan", file: str = ""
 ) -> Net:
-    """Read a list of PDDL actions, "(action p1 p2)" one a line; arguments as for `parse_plan`."""
+    """Read a list of PDDL actions, one "(action p1 p2)" a line; arguments as for `parse_plan`."""
+    # Planners put the time before the action and the duration behind it: "0.001: (a b) [1.000]".
     lines = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.partition("#")[0].strip()
@@ -99,7 +101,7 @@ def parse_rules(text: str, *, file: str = "") -> tuple[ExecutionRule, ...]:
     """Read execution rules, one a line: `*if* COND *during* ACTION *do* RECOVERY`.
 
     Raises:
-        PlanError: a line is none; all problems at once.
+        PlanError: a line cannot be read; all problems at once.
     """
     found: list[ExecutionRule] = []
     problems: list[PlanProblem] = []
@@ -113,7 +115,7 @@ def parse_rules(text: str, *, file: str = "") -> tuple[ExecutionRule, ...]:
             problems.append(PlanProblem("text", "error", message, "", file, number))
             continue
         try:
-            rule = _rule(match[2], match[6], file, number)
+            rule = rule_of(match[2], match[6], file, number)
         except PlanError as error:
             problems += error.found
             continue
@@ -124,16 +126,16 @@ def parse_rules(text: str, *, file: str = "") -> tuple[ExecutionRule, ...]:
     return tuple(found)
 
 
-def rule_of(condition: str, recovery: str) -> Rule:
-    """Read a rule from its two parts; errors as for `parse_rules`."""
-    return _rule(condition, recovery, "", 0)
-
-
 def _error(file: str, line: int, message: str) -> PlanError:
     return PlanError([PlanProblem("text", "error", message, "", file, line)])
 
 
-def _rule(condition: str, recovery: str, file: str, line: int) -> Rule:
+def rule_of(condition: str, recovery: str, file: str = "", line: int = 0) -> Rule:
+    """Read a rule from its two parts.
+
+    Raises:
+        PlanError: one of them cannot be read.
+    """
     condition = condition.strip()
     try:
         parse(condition)
@@ -168,6 +170,7 @@ class _Reader:
         self._at = 0
 
     def _scan(self, text: str) -> list[_Token]:
+        # Comments go, line ends stay: the line of a token is counted from them.
         lines = [line.partition("#")[0] for line in text.splitlines()]
         joined, found, at = "\n".join(lines), [], 0
         while at < len(joined):
@@ -214,11 +217,12 @@ class _Reader:
         if match is None or match.group(1, 3) != ("if", "do"):
             text = f"got {token.text!r}; expected '! *if* COND *do* RECOVERY !'."
             raise _error(self._file, token.line, text)
+        # A rule applies to the action before it.
         if not (parts and isinstance(parts[-1], Action)):
             raise _error(self._file, token.line, "got a rule; expected it behind an action.")
         before = parts.pop()
         assert isinstance(before, Action)
-        rule = _rule(match[2], match[4], self._file, token.line)
+        rule = rule_of(match[2], match[4], self._file, token.line)
         return replace(before, rules=(*before.rules, rule))
 
     def _item(self, depth: int) -> Part:
@@ -252,8 +256,10 @@ class _Reader:
         made = _act(token.text, self._file, token.line)
         if self._next().kind == "limit":
             made = replace(made, seconds=self._take().text[1:].strip())
+        # Stars behind an action are allowed, and have no effect.
         if self._next().text.startswith("*") and set(self._next().text) == {"*"}:
             self._take()
+        # Rules are for the action's name without robot and parameters.
         own = made.name.partition("#")[2] or made.name
         rules = [one.rule for one in self._rules if one.action == own.partition("_")[0]]
         return replace(made, rules=tuple(rules))

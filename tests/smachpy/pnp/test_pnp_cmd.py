@@ -54,7 +54,7 @@ def test_started_and_interrupted(cmd, clock):
     cmd.start_action("goto", "kitchen")
     assert cmd.action_status("goto", "kitchen") == "run"
     assert cmd.running_actions() == ["goto_kitchen"]
-    with pytest.raises(InvalidStateError, match="runs already"):
+    with pytest.raises(InvalidStateError, match="already running"):
         cmd.start_action("goto", "kitchen")
     clock.call_later(1.0, lambda: cmd.action_cmd("goto", "kitchen", "interrupt"))
     assert not cmd.wait_for_termination(0.5)
