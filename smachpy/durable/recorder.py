@@ -327,8 +327,8 @@ class Recorder:
         if path in self._chosen:
             self._chosen.discard(path)
             visit = self._journal.position.visits.get(path)
-            # The entry that chose it has begun its visit. Only a start or transition callback may
-            # have changed the userdata since.
+            # The entry that chose it has begun its visit. Only a transition callback may have
+            # changed the userdata since.
             if visit is not None and not visit.get("stopping"):
                 if not frame.data.transition_cbs:
                     return self.broken is None

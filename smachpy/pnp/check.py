@@ -85,9 +85,9 @@ def _ends(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
     # The nearest deadlock is shown, the others are counted.
     stuck = [m for m in reached.dead if not (plan.is_goal(m) or plan.is_fail(m))]
     if stuck and plan.goals:
-        more = f" So are {len(stuck) - 1} more markings." if len(stuck) > 1 else ""
+        more = f" The same holds for {len(stuck) - 1} more markings." if len(stuck) > 1 else ""
         words = net.words(stuck[0])
-        text = f"nothing can fire in {words}, which is no goal; expected a way on.{more}"
+        text = f"nothing can fire in {words}, which is not a goal; expected a transition.{more}"
         place = stuck[0][0] if stuck[0] else -1
         yield problem_of(
             net,

@@ -229,7 +229,7 @@ class PetriNetPlan(Container):
             values.on_write = data.knowledge.changed
         problems = Problems(type(self).__name__)
         subs = problems.mapping("sub_plans", sub_plans, "name -> plan")
-        given = problems.mapping("actions", actions, "name -> what does it")
+        given = problems.mapping("actions", actions, "name -> state or function")
         problems.raise_all()
         data.has_actions = bool(given)
         self.__bind(Binder({**subs, **given}, self.__built_in(), server))
@@ -324,7 +324,7 @@ class PetriNetPlan(Container):
         """Return the single problem of a plan for which no actions were registered at all."""
         plan = self._smachpy.net_plan
         names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
-        text = f"runs once it is said what does its actions: {', '.join(names)}."
+        text = f"has no actions registered; expected one for each of {', '.join(names)}."
         hint = "Try a file actions.yaml beside it, or actions={...}."
         return problem_of(plan.net, "unbound", "note", text, hint=hint)
 
@@ -352,7 +352,7 @@ class PetriNetPlan(Container):
         for name, number in asked.items():
             if knowledge.source_of(name) is None and not name.startswith(BUILT_IN):
                 text = (
-                    f"asks for {name!r}, which is no condition; expected one of "
+                    f"asks for {name!r}, which is not registered; expected one of "
                     f"{sorted(knowledge.sources)}, or an event that the program posts."
                     f"{did_you_mean(name, knowledge.sources)}"
                 )

@@ -537,7 +537,7 @@ class Execution:
         path = self._frame.path
         ended = ", ".join(f"{name} ended with {how!r}" for name, how in self._ended.items())
         text = f"{path}: nothing can fire any more in {self._net.words(moment.marking)}, "
-        text += "which is no goal." if self._table.plan.goals else "and there is no goal place."
+        text += "not a goal." if self._table.plan.goals else "and there is no goal place."
         log.logwarn(f"{text} {ended}".rstrip())
         return "fail"
 

@@ -14,7 +14,7 @@ from smachpy.pnp.problems import PlanProblem
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from smachpy.pnp.labels import PlaceLabel, Severity, TransitionLabel
+    from smachpy.pnp.labels import Fault, PlaceLabel, Severity, TransitionLabel
     from smachpy.pnp.net import Marking, Net
 
 
@@ -145,12 +145,7 @@ def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem
     places = [place_label(place.name) for place in net.places]
     labels = [transition_label(transition.name) for transition in net.transitions]
     for number, place in enumerate(places):
-        found += [
-            problem_of(
-                net, fault.rule, fault.severity, fault.message, place=number, hint=fault.hint
-            )
-            for fault in place.faults
-        ]
+        found += _problems_of_label(net, place.faults, place=number)
     # Exec places first, so that executables are in their order; transitions may name others.
     executables: dict[str, Executable] = {}
     for number, place in enumerate(places):
@@ -159,12 +154,7 @@ def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem
             known.places.append(number)
     calls: list[tuple[tuple[str, str], ...]] = []
     for number, label in enumerate(labels):
-        found += [
-            problem_of(
-                net, fault.rule, fault.severity, fault.message, transition=number, hint=fault.hint
-            )
-            for fault in label.faults
-        ]
+        found += _problems_of_label(net, label.faults, transition=number)
         calls.append(tuple(_resolved(net, places, number, label, found)))
         for name, function in calls[-1]:
             known = executables.setdefault(name, Executable(name))
@@ -187,6 +177,21 @@ def understand(net: Net, *, strict: bool = False, problems: Iterable[PlanProblem
     found += _label_problems(plan)
     object.__setattr__(plan, "problems", tuple(found))
     return plan
+
+
+def _problems_of_label(
+    net: Net, faults: Iterable[Fault], *, place: int = -1, transition: int = -1
+) -> Iterator[PlanProblem]:
+    for fault in faults:
+        yield problem_of(
+            net,
+            fault.rule,
+            fault.severity,
+            fault.message,
+            place=place,
+            transition=transition,
+            hint=fault.hint,
+        )
 
 
 def _resolved(
