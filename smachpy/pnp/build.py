@@ -320,6 +320,7 @@ class _NetBuilder:
 
     def _add(self, part: Part, entry: int) -> int | None:
         """Add a part from the place `entry`; return its last place, None if it ends in a jump."""
+        # An error with the plan's name rather than a RecursionError.
         self._depth += 1
         if self._depth > _DEEPEST:
             raise InvalidStateError(f"{self._name}: got more than {_DEEPEST} parts in each other.")

@@ -159,6 +159,7 @@ def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
                 if (name, "end") in plan.calls[t] and t in reached.fired
             ]
             for one, other in combinations(ends, 2):
+                # The conditions as written: the guards also have the tests of the actions.
                 if not _may_both_hold(plan.conditions[one], plan.conditions[other]):
                     continue
                 # They race only if both have their tokens at the same marking.

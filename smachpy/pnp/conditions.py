@@ -153,6 +153,7 @@ class _Reader:
             if self._next() in _KEYWORDS:
                 raise self._fail("a name or ( ) after not", " Try not (...).")
             return Condition("not", "", (self._operand(depth),))
+        # Two operands at least: "and a" is an error.
         parts = [self._operand(depth), self._operand(depth)]
         while self._next() not in {"", ")"}:
             parts.append(self._operand(depth))

@@ -200,6 +200,7 @@ class Table:
 
     def moment(self, marking: Marking) -> Moment:
         """Return the moment of a marking."""
+        # A moment is created when its marking is first reached: a net may have too many of them.
         found = self._moments.get(marking)
         if found is None:
             found = self._moments[marking] = Moment(self, marking)

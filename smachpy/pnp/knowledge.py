@@ -117,6 +117,7 @@ _OPERATORS: Final[dict[type[ast.AST], Callable[..., Any]]] = {
     ast.Not: operator.not_,
     ast.USub: operator.neg,
 }
+# Expressions come from files: they are interpreted here, node by node, and never given to `eval`.
 _ALLOWED = (
     ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Compare, ast.Constant, ast.Name, ast.Load, ast.Tuple,
     ast.List, ast.And, ast.Or, *_OPERATORS,
@@ -375,6 +376,7 @@ class Knowledge:
             except Exception as error:
                 text = f"{path}: condition {name!r} raised {type(error).__name__}: {error}"
                 raise InvalidUserCodeError(text, path=path) from error
+        # Built in, unless a condition of this name is registered.
         if name.startswith(("equal_", "equals_")):
             _, _, rest = name.partition("_")
             one, _, other = rest.partition("_")

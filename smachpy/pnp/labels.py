@@ -30,6 +30,7 @@ BEGINS = frozenset({"start", "resume"})
 
 
 _GOAL = re.compile(r"(goal|fail)(?:\((\d{1,6})\))?")
+# Likely mistakes for "NAME.exec", which PNP takes for a comment, so that the action never runs.
 _NEAR_EXEC = re.compile(r".+\.(exec\w+|\w?exec|execute|start|end|run)", re.IGNORECASE)
 
 
@@ -152,6 +153,7 @@ def transition_label(label: str) -> TransitionLabel:
             conditions.append(_condition(token, faults))
             continue
         name, dot, function = token.rpartition(".")
+        # "start" alone is for the exec places beside the transition.
         if not dot and token in FUNCTIONS:
             calls.append(("", FUNCTIONS[token]))
         elif dot and name and function in FUNCTIONS:

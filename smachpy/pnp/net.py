@@ -155,6 +155,7 @@ class Net:
         # Only transitions behind a marked place, rather than all of the net.
         marked = set(marking)
         candidates = {t for place in marked for t in self.consumers[place]}
+        # One token in each place is enough for most transitions; tokens are counted for the others.
         found = [t for t in candidates if self._needs[t] <= marked]
         if self._heavy:
             found = [t for t in found if t not in self._heavy or self.has_tokens(marking, t)]
@@ -180,6 +181,7 @@ class Net:
 
     def fire(self, marking: Marking, transition: int) -> Marking:
         """Return the marking after a transition that has its tokens."""
+        # The result stays sorted: equal markings must be equal tuples, as they are keys of dicts.
         tokens = list(marking)
         for place, weight in self.inputs[transition]:
             for _ in range(weight):

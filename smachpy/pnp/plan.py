@@ -206,6 +206,7 @@ def _resolved(
         if name:
             yield name, function
             continue
+        # A start fills the exec place behind it, an end empties the one in front of it.
         beside = net.outputs[number] if function in BEGINS else net.inputs[number]
         names = dict.fromkeys(places[place].action for place, _ in beside if places[place].action)
         if not names:

@@ -200,6 +200,7 @@ def _read_arc(element: Element, found: _Found) -> None:
         text = f"got source {source!r}, target {target!r}; expected the ids of two nodes."
         found.problem("error", "arc", element, text)
         return
+    # Inhibitor and reset arcs would be read as ordinary ones with another meaning: an error.
     kinds = [child for child in element if _tag(child) in {"type", "arctype"}]
     kind = "" if not kinds else (kinds[0].get("value") or "".join(kinds[0].itertext())).strip()
     if kind not in {"", "normal"}:
@@ -279,6 +280,7 @@ def _text_below(element: Element, tag: str | None, found: _Found) -> str:
         if not holders:
             return ""
         holder = holders[0]
+    # PNP writes <value>, PNML 2009 <text>.
     for child in holder:
         if _tag(child) in {"value", "text"}:
             text = "".join(child.itertext())

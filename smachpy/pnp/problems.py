@@ -60,6 +60,7 @@ class PlanError(InvalidStateError):
     """
 
     def __init__(self, found: Iterable[PlanProblem]) -> None:
+        # The text has the errors only; they alone keep the plan from running.
         order = ("error", "warning", "note")
         self.found = tuple(sorted(found, key=lambda problem: order.index(problem.severity)))
         errors = [str(problem) for problem in self.found if problem.severity == "error"]

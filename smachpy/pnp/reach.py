@@ -73,7 +73,7 @@ def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
         for transition in enabled:
             after = net.fire(marking, transition)
             fired.add(transition)
-            if after in came:
+            if after in came:  # reached before, by a run that is not longer
                 continue
             came[after] = (marking, transition)
             queue.append(after)

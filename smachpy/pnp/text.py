@@ -24,6 +24,7 @@ from smachpy.pnp.problems import PlanError, PlanProblem
 if TYPE_CHECKING:
     from smachpy.pnp.net import Net
 
+# The first alternative that matches counts: rules come before words, which also match "*if*".
 _TOKEN = re.compile(
     r"\s+|(?P<rule>![^!]*!|\*if\*[^;]*)|(?P<sign>\|\||[<>{}:;?])|(?P<limit>\|\s*\d+)|(?P<word>[^\s<>{}:;?|!]+)"
 )
