@@ -20,7 +20,7 @@ from actionlib_core.clock import RealClock, SerialExecutor
 from smachpy.events.run_state import RAISED
 from smachpy.exceptions import SmachError
 from viz.model.history import History
-from viz.model.labels import shorten
+from viz.model.labels import innermost, shorten
 from viz.pictures.drawing import PictureError, picture
 
 try:
@@ -153,9 +153,7 @@ class MachineWidget(anywidget.AnyWidget):
 
 def _status(history: History) -> str:
     """Return where a machine is, in words."""
-    active = history.active()
-    leaves = [path for path in active if not any(one.startswith(f"{path}/") for one in active)]
-    if leaves:
+    if leaves := innermost(history.active()):
         names = [shorten(path.rpartition("/")[2]) for path in leaves[:MOST_NAMES]]
         more = len(leaves) - len(names)
         return f"running: {', '.join(names)}{f' and {more} more' if more else ''}"

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from smachpy.outcome_classes import outcome_class
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from smachpy.outcome_classes import OutcomeClass
 
 LABEL_LENGTH = 40
@@ -35,6 +37,11 @@ def end_class(kind: str, outcome: str) -> OutcomeClass:
     if kind in WATCHING and outcome.lower() in FINDINGS:
         return "other"
     return outcome_class(outcome)
+
+
+def innermost(paths: Collection[str]) -> list[str]:
+    """Return the paths that contain no other one of `paths`."""
+    return [path for path in paths if not any(other.startswith(f"{path}/") for other in paths)]
 
 
 def one_line(text: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from smachpy.events import answered_text, asker_text
 from smachpy.events.run_state import RAISED
 from smachpy.outcome_classes import is_good, outcome_class
-from viz.model.labels import shorten
+from viz.model.labels import innermost, shorten
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -178,9 +178,8 @@ class _Reader:
                 active = {path: active.get(path, i) for path, _ in event["active"]}
             elif event["kind"] in ENDS:
                 active.pop(event["path"], None)
-        leaves = [p for p in active if not any(other.startswith(f"{p}/") for other in active)]
         found = []
-        for path in leaves:
+        for path in innermost(active):
             event = self._run[active[path]]
             cause = self._own_cause(path, active[path], len(self._run), "")
             reason = "" if cause is None else f"{cause.what}: {cause.reason}"

@@ -1,9 +1,12 @@
-"""Recorded runs: one file of events each, to be shown again, counted and compared.
+"""Recorded runs: lists, statistics, comparisons and exports. `smachpy.events.recording` reads them.
 
-recording    writes and reads the files
-statistics   what many runs add up to, and how two differ
-mcap, scene  the same run for other tools
+listing      one run as a row of a list
+statistics   counts and durations over many runs
+compare      two versions of a machine, or two sets of its runs, in one drawing
+html         one run as a page that opens without a server; `floor` reads its map
+mcap, scene  one run as a file for Foxglove
 simulate     many runs in virtual time
-report       what many runs add up to, as a page; its charts in `charts`
+report       many runs as a page; its charts are in `charts`
 cli          `smachpy runs`
+simulate_cli `smachpy simulate`
 """

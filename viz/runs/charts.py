@@ -1,4 +1,4 @@
-"""Charts of many runs as SVG: histogram, ways taken, time by state. Lengths are CSS pixels."""
+"""Charts of many runs as SVG: histogram, ways taken, time by state. Lengths in CSS pixels."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 WIDTH = 960
 BINS = 24
 STEPS = 10
-"""Columns of the ways taken; what comes after is one more."""
+"""Columns of states in the Sankey diagram; one more column stands for all later states."""
 FLAME_ROW = 22
 LETTER = 6.5
-"""Width of a letter of the charts' texts, roughly."""
+"""Approximate width of a character at the charts' font size."""
 
 
 def histogram(values: Sequence[float], low: float, high: float) -> str:
-    """Return how often values occur, between the ends of an axis that several charts share."""
+    """Return a histogram from `low` to `high`; values outside count in the first or last bar."""
     counts = [0] * BINS
     for value in values:
         share = (value - low) / (high - low) if high > low else 0.0
@@ -44,16 +44,18 @@ def histogram(values: Sequence[float], low: float, high: float) -> str:
 
 
 def ways(runs: Iterable[tuple[Sequence[str], str]]) -> str:
-    """Return a Sankey diagram of the ways that runs took.
+    """Return a Sankey diagram of the sequences of states in runs.
 
     Args:
-        runs: For each the names of the states in their order, and the outcome at the end.
+        runs: The names of the states in order, and the outcome, for each run.
     """
     links: Counter[tuple[int, str, str]] = Counter()
     number = 0
     for states, outcome in runs:
         number += 1
         shown = [*states[:STEPS], *(["\u2026"] if len(states) > STEPS else [])]
+        # The empty first name gives each run a link into its first state: a column's heights are
+        # then the sums of the links that arrive there.
         names = ["", *shown, f"\u25a0 {outcome}"]
         links.update((i, a, b) for i, (a, b) in enumerate(pairwise(names)))
     if not number:
@@ -66,6 +68,7 @@ def ways(runs: Iterable[tuple[Sequence[str], str]]) -> str:
     tall = max(320, gaps + 160)
     scale = (tall - gaps) / number
     apart = min(150.0, (WIDTH - 120) / max(1, len(columns)))
+    # The bars: each column's states from the most frequent down, as tall as their share of runs.
     places: dict[tuple[int, str], tuple[float, float]] = {}
     parts: list[str] = []
     for step, column in sorted(columns.items()):
@@ -81,11 +84,13 @@ def ways(runs: Iterable[tuple[Sequence[str], str]]) -> str:
                 f'<text x="{x + 11:.1f}" y="{y + 9:.1f}">{_label(name, apart - 14)} {n}</text>'
             )
             y += n * scale + gap
+    # The ribbons: at each bar they are stacked in the sorted order of the links, so `leaving` and
+    # `coming` count the runs whose ribbons are already placed there.
     leaving: Counter[tuple[int, str]] = Counter()
     coming: Counter[tuple[int, str]] = Counter()
     ribbons = []
     for (step, before, name), n in sorted(links.items()):
-        if not step:
+        if not step:  # from the empty name: not drawn
             continue
         (ax, ay), (bx, by) = places[step - 1, before], places[step, name]
         ay += leaving[step - 1, before] * scale
@@ -104,11 +109,11 @@ def ways(runs: Iterable[tuple[Sequence[str], str]]) -> str:
 
 
 def flame(record: StateRecord, seconds: Mapping[str, float]) -> str:
-    """Return the time spent in each state inside its container, all runs together.
+    """Return a flame graph of the time spent in each state, summed over all runs.
 
     Args:
         record: The machine.
-        seconds: By path; what runs side by side shares its container's width.
+        seconds: Time in each state, by path.
     """
     parts: list[str] = []
     deepest = 0
@@ -126,6 +131,7 @@ def flame(record: StateRecord, seconds: Mapping[str, float]) -> str:
             f'<text x="{x + 4:.1f}" y="{depth * FLAME_ROW + 14}">{name}</text></g>'
         )
         inside = sum(seconds.get(child.path, 0.0) for child in state.children)
+        # The children of a concurrence run at once: their times can exceed that of the container.
         per_second = wide / max(inside, spent) if max(inside, spent) > 0 else 0.0
         for child in state.children:
             share = seconds.get(child.path, 0.0) * per_second

@@ -1,4 +1,4 @@
-"""`smachpy runs`: what recorded runs say."""
+"""`smachpy runs`: lists, shows, compares and exports recorded runs."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ if TYPE_CHECKING:
 
 EXAMPLES = """examples:
   smachpy run patrol --record runs/1.jsonl    record a run
-  smachpy runs list runs/                     what there is
-  smachpy runs show runs/1.jsonl              what happened in it
-  smachpy runs show runs/                     what all of them add up to
-  smachpy runs why runs/1.jsonl               why it ended so, from the first cause on
+  smachpy runs list runs/                     list the runs in a folder
+  smachpy runs show runs/1.jsonl              states, times and transitions of a run
+  smachpy runs show runs/                     the same over all runs in a folder
+  smachpy runs why runs/1.jsonl               the causes of its end, from the first one on
   smachpy runs compare old.jsonl new.jsonl    two runs, or two versions of a machine
-  smachpy runs compare old.json my_robot.missions:deliver -o diff.svg    the same as a picture
+  smachpy runs compare old.json my_robot.missions:deliver -o diff.svg    draw the differences
   smachpy runs export runs/1.jsonl -o 1.html  a page that opens without a server
   smachpy runs export runs/1.jsonl -o 1.mcap  for Foxglove
   smachpy runs export runs/ -o report.html    one report of many runs
-  smachpy view runs/1.jsonl                   see it again in the browser
+  smachpy view runs/1.jsonl                   replay it in the browser
 """
-MOST_PROBLEMS = 20
+MOST_UNTAKEN = 20
+"""Transitions that no run has taken, in the output."""
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -51,19 +52,17 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     actions = parser.add_subparsers(metavar="ACTION", required=True)
     one = actions.add_parser("list", help="one line per run")
     one.add_argument("places", nargs="*", default=["."], metavar="FILE|DIR")
-    one.add_argument("--json", action="store_true", help="for programs: an object a line")
+    one.add_argument("--json", action="store_true", help="one JSON object per line, for programs")
     one.set_defaults(run=_list)
     show = actions.add_parser("show", help="states, times and transitions of one run or many")
     show.add_argument("places", nargs="+", metavar="FILE|DIR")
-    show.add_argument("--json", action="store_true", help="for programs: an object a line")
+    show.add_argument("--json", action="store_true", help="one JSON object per line, for programs")
     show.set_defaults(run=_show)
-    because = actions.add_parser(
-        "why", help="why the newest run in a file ended so, cause by cause"
-    )
+    because = actions.add_parser("why", help="the causes of the end of the newest run in a file")
     because.add_argument("file", metavar="FILE")
-    because.add_argument("--json", action="store_true", help="the same for programs")
+    because.add_argument("--json", action="store_true", help="as JSON, for programs")
     because.set_defaults(run=_why)
-    two = actions.add_parser("compare", help="how the second differs from the first")
+    two = actions.add_parser("compare", help="the differences between two runs or two machines")
     what = "recordings, or a machine: a mission's name, module:factory, path.py, a record .json"
     two.add_argument("first", metavar="FILE|DIR|TARGET", help=what)
     two.add_argument("second", metavar="FILE|DIR|TARGET", help="the same")
@@ -71,19 +70,23 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "-o",
         "--output",
         metavar="FILE",
-        help="draw both into one picture: svg, png, pdf or dot; - is svg",
+        help="draw both in one picture: svg, png, pdf or dot; - writes svg to standard output",
     )
     two.add_argument("--theme", choices=("light", "dark"), default="light")
     two.add_argument("--depth", type=int, metavar="N", help="container levels to open")
     two.set_defaults(run=_compare)
-    export = actions.add_parser("export", help="as a page (.html), for Foxglove (.mcap), a picture")
-    export.add_argument("file", metavar="FILE|DIR", help="a run, or many for one report (.html)")
+    export = actions.add_parser(
+        "export", help="write a page (.html), a Foxglove file (.mcap) or a picture"
+    )
+    export.add_argument(
+        "file", metavar="FILE|DIR", help="a run, or a folder of runs for one report (.html)"
+    )
     export.add_argument(
         "-o",
         "--output",
         required=True,
         metavar="FILE",
-        help="the ending names the format: html, mcap, or that of a picture",
+        help="its extension chooses the format: html, mcap, or that of a picture",
     )
     export.add_argument(
         "--runs", metavar="DIR", action="append", default=[], help="runs for the page's statistics"
@@ -92,7 +95,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "--map",
         type=Path,
         metavar="FILE",
-        help="the page's floor, a map_server YAML file, where the recording has none",
+        help="a map_server YAML file for the page, if the recording has no map",
     )
     export.set_defaults(run=_export)
 
@@ -117,7 +120,7 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _facts(recording: Recording) -> dict[str, Any]:
-    """What a list says of a run; `outcome` is null when none is recorded, `outages` are in ns."""
+    """The facts for `runs list`; `outcome` is None if none is recorded, `outages` are in ns."""
     from smachpy.events.run_state import RunState
 
     events = recording.events
@@ -156,7 +159,7 @@ def _line(recording: Recording) -> tuple[str, ...]:
 
 
 def _each(places: Iterable[str]) -> Iterator[Recording]:
-    """Yield the recordings of places, each of which must have some."""
+    """Yield the recordings in files and folders; each place must have at least one."""
     from smachpy.events.recording import each_recording
 
     for place in places:
@@ -174,7 +177,7 @@ def _show(args: argparse.Namespace) -> int:
     counted = count_by_machine(_each(args.places))
     if args.json:
         for label, (record, statistics, lost) in counted.items():
-            told = {
+            facts = {
                 "machine": label,
                 "runs": statistics.runs,
                 "outcomes": statistics.outcomes,
@@ -182,7 +185,7 @@ def _show(args: argparse.Namespace) -> int:
                 "states": {path: one.to_json() for path, one in statistics.states.items()},
                 "never_taken": never_taken(record, statistics),
             }
-            print(json.dumps(told))
+            print(json.dumps(facts))
         return 0
     out = console()
     for record, statistics, lost in counted.values():
@@ -191,7 +194,7 @@ def _show(args: argparse.Namespace) -> int:
 
 
 def print_statistics(out: Console, record: StateRecord, statistics: Statistics, lost: int) -> None:
-    """Print what the runs of a machine add up to; `lost` events are missing in them."""
+    """Print the statistics of a machine's runs, in which `lost` events are missing."""
     from rich.table import Table
     from rich.text import Text
 
@@ -203,7 +206,7 @@ def print_statistics(out: Console, record: StateRecord, statistics: Statistics, 
         markup=False,
     )
     if lost:
-        out.print(f"{lost} events are missing: visits and outcomes are at least these")
+        out.print(f"{lost} events are missing: the true numbers may be higher")
     table = Table(box=None, pad_edge=False)
     for title in ("state", "visits", "median", "95 %", "failed", "retried", "outcomes"):
         table.add_column(title, justify="left" if title in {"state", "outcomes"} else "right")
@@ -215,7 +218,7 @@ def print_statistics(out: Console, record: StateRecord, statistics: Statistics, 
     untaken = never_taken(record, statistics)
     if untaken:
         out.print(f"never taken: {len(untaken)} transition(s)")
-        for path, outcome in untaken[:MOST_PROBLEMS]:
+        for path, outcome in untaken[:MOST_UNTAKEN]:
             out.print(printable(f"  {path}  {outcome}"), markup=False)
 
 
@@ -244,13 +247,12 @@ def _why(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(found.to_json()))
         return 0
-    for line in found.text().splitlines():  # a line each, however wide the terminal is
+    for line in found.text().splitlines():  # `print`, because rich would wrap long lines
         print(printable(line))
     return 0
 
 
 def _compare(args: argparse.Namespace) -> int:
-
     old, new = _side(args.first), _side(args.second)
     if args.output:
         _draw_both(args, old, new)
@@ -271,7 +273,7 @@ def _print_union(old: Side, new: Side) -> None:
 
 
 def print_differences(before: Runs, now: Runs) -> None:
-    """Print how runs differ from earlier ones."""
+    """Print how runs differ from earlier runs."""
     from viz.runs.compare import Side
 
     print("compared with earlier runs:")
@@ -297,22 +299,15 @@ def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
 
 
 def _side(place: str) -> Side:
-    """What is to be compared: recordings, or a machine that has not run."""
+    """One side of a comparison: recordings, or a machine that has not run."""
     from viz.runs.compare import Side
-    from viz.runs.statistics import count_by_machine
 
     if not place.endswith(".jsonl") and not Path(place).is_dir():
         from viz.cli import read_record
 
         return Side(place, read_record(place))
-    counted = count_by_machine(_each([place]))
-    if len(counted) > 1:
-        raise UsageError(
-            f"smachpy runs compare: {place!r}: got runs of {sorted(counted)}; expected those of "
-            "one machine. Try naming the files."
-        )
-    [(record, statistics, _)] = counted.values()
-    return Side(place, record, statistics)
+    runs = collect_one(place, "compare")
+    return Side(place, runs.record, runs.statistics)
 
 
 def _export(args: argparse.Namespace) -> int:
@@ -333,13 +328,13 @@ def _export(args: argparse.Namespace) -> int:
 
 
 def _export_all(folder: str, output: Path) -> int:
-    """One report of all runs in a folder."""
+    """Write one report of all runs in a folder."""
     from viz.pictures.drawing import write
     from viz.runs.report import report
 
     if output.suffix != ".html":
         raise UsageError(
-            f"smachpy runs export: {str(output)!r}: got {output.suffix or 'no ending'} for a "
+            f"smachpy runs export: {str(output)!r}: got {output.suffix or 'no extension'} for a "
             f"folder of runs; expected .html, or one recording. Try -o {output.stem}.html"
         )
     print(write(report(collect_one(folder, "export")).encode("utf-8", "replace"), output))
@@ -347,10 +342,10 @@ def _export_all(folder: str, output: Path) -> int:
 
 
 def collect_one(place: str, command: str) -> Runs:
-    """Return the runs in a folder or file, of one machine.
+    """Return the runs in a folder or file, which must be of one machine.
 
     Raises:
-        UsageError: they are of several, or there are none.
+        UsageError: there are runs of several machines, or none.
     """
     from viz.runs.report import collect
 
@@ -358,7 +353,7 @@ def collect_one(place: str, command: str) -> Runs:
     if len(found) > 1:
         raise UsageError(
             f"smachpy runs {command}: {place!r}: got runs of {sorted(found)}; expected those of "
-            "one machine. Try a folder for each."
+            "one machine. Try one folder per machine, or a single file."
         )
     [runs] = found.values()
     return runs
@@ -386,7 +381,7 @@ def _write(recording: Recording, output: Path, runs: list[str], floor: Path | No
 
 
 def console() -> Console:
-    """Where to print: as wide as the terminal, 160 columns to a file."""
+    """Return a console as wide as the terminal; 160 columns wide if the output is a file."""
     import sys
 
     from rich.console import Console

@@ -1,8 +1,7 @@
 """Two versions of a machine, or two sets of its runs, in one drawing.
 
-The union has the states and transitions of both; each is marked as added, removed, changed or, "",
-the same. States are the same that have the same labels from the root down, whatever the root is
-called.
+The union has the states and transitions of both, each marked as added, removed, changed or "", the
+same. A state is identified by the labels below the root: the roots may have different names.
 """
 
 from __future__ import annotations
@@ -24,16 +23,17 @@ if TYPE_CHECKING:
 ADDED, REMOVED, CHANGED, SAME = "added", "removed", "changed", ""
 
 LISTED = 4
+"""Items of a list that are named in a difference."""
 
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One of the two that are compared.
+    """One side of a comparison.
 
     Attributes:
-        name: What to call it: a file, a machine.
+        name: Its name in texts, such as a file or a machine.
         record: The machine.
-        statistics: Of its runs; None compares the structure only.
+        statistics: Statistics of its runs; None to compare only the structure.
     """
 
     name: str
@@ -43,14 +43,14 @@ class Side:
 
 @dataclass(slots=True)
 class Union:
-    """What both have, under the paths of the second.
+    """The states and transitions of both sides, with the paths of the second.
 
     Attributes:
         record: The machine with the states and transitions of both.
-        states: Change of each state that is not the same, by path.
+        states: Change of each state that differs, by path.
         arrows: Change of each transition and rule, by (path of the state, outcome, target).
-        reasons: What makes a state a changed one, in words, by path.
-        notes: Numbers of runs that differ, by path.
+        reasons: Descriptions of what changed in a state, by path.
+        notes: Descriptions of differing statistics, by path.
         counts: The same for transitions, by (path of the state, outcome).
     """
 
@@ -62,17 +62,18 @@ class Union:
     counts: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def node(self, *, depth: int | None = None, show_implicit: bool = False) -> Node:
-        """Return the drawing, with the changes marked."""
+        """Return the diagram with the changes marked."""
         return self._marked(extract(self.record, depth=depth, show_implicit=show_implicit))
 
     def listed(self) -> list[dict[str, str]]:
-        """Return the differences one by one: path, change and text, in the order of the states."""
+        """Return the differences in the order of the states, each as path, change and text."""
         found = []
         for state in self.record.walk():
             change = self.states.get(state.path, SAME)
             words = "; ".join(self.reasons.get(state.path, ()))
             if change:
                 found.append({"path": state.path, "change": change, "text": words or change})
+            # An added or removed state says enough: its transitions are not listed as well.
             for (path, outcome, target), how in self.arrows.items():
                 if path == state.path and how and change not in {ADDED, REMOVED}:
                     text = f"{outcome} \u2192 {target}"
@@ -93,7 +94,7 @@ class Union:
         )
 
     def _parts(self, container: str, edge: Edge) -> Iterator[Edge]:
-        """An edge for each way in which its outcomes have changed."""
+        """Split an edge of several outcomes into one per kind of change."""
         path = f"{container}/{edge.source}"
         by: dict[tuple[str, str], list[str]] = {}
         for outcome in edge.outcomes:
@@ -111,7 +112,7 @@ class Union:
 
 
 def unite(old: Side, new: Side) -> Union:
-    """Return both in one, under the paths of `new`."""
+    """Return the union of both, with the paths of `new`."""
     union = Union(new.record)
     union.record = _merged(union, old.record, new.record, new.record.path)
     for before, after in moved_states(old.record, new.record):
@@ -126,7 +127,7 @@ def unite(old: Side, new: Side) -> Union:
 def _merged(
     union: Union, old: StateRecord | None, new: StateRecord | None, path: str
 ) -> StateRecord:
-    """A state of one side or of both, with all that is inside; `union` gets what has changed."""
+    """Merge a state of one side or both with all descendants; record the changes in `union`."""
     before, after = set(_triples(old)), set(_triples(new))
     for change, triples in ((ADDED, after - before), (REMOVED, before - after)):
         for source, outcome, target in sorted(triples):
@@ -141,6 +142,7 @@ def _merged(
         one, union.states[path] = (new, ADDED) if old is None else (old, REMOVED)
         assert one is not None
         return replace(one, path=path, children=children)
+    # In both: the new state, to which what only the old one had is added so that it is drawn.
     if reasons := list(_reasons(old, new)):
         union.states[path], union.reasons[path] = CHANGED, reasons
     gone = [t for t in old.transitions if (t.source, t.outcome, t.target) in before - after]
@@ -155,7 +157,7 @@ def _merged(
 
 
 def _triples(record: StateRecord | None) -> Iterator[tuple[str, str, str]]:
-    """What leads where inside a container: (label, outcome, target)."""
+    """The transitions and rules inside a container as (label, outcome, target)."""
     if record is None:
         return
     for edge in record.transitions:
@@ -166,7 +168,7 @@ def _triples(record: StateRecord | None) -> Iterator[tuple[str, str, str]]:
 
 
 def _ordered(old: list[str], new: list[str]) -> list[str]:
-    """The labels of both: those of `new`, each that is gone behind what it stood behind."""
+    """The labels of both, in the order of `new`; each removed one after its old predecessor."""
     found = list(new)
     for i, label in enumerate(old):
         if label not in found:
@@ -222,7 +224,7 @@ def _compare_numbers(union: Union, old: Side, before: Statistics, after: Statist
 def _number_words(
     old: Mapping[str, Any], new: Mapping[str, Any], runs: tuple[int, int]
 ) -> Iterator[str]:
-    """Visits per run, medians and failures, as far as they differ notably."""
+    """Describe visits per run, medians and failures where they differ notably."""
     visits = old.get("visits", 0) / runs[0], new.get("visits", 0) / runs[1]
     if visits[0] != visits[1]:
         yield _times(*visits)
@@ -241,7 +243,7 @@ def _times(old: float, new: float) -> str:
 
 
 def drawing(union: Union, old: Side, new: Side, *, depth: int | None = None) -> Diagram:
-    """Return the picture of a union, with what its signs mean."""
+    """Return the diagram of a union, with a legend."""
     legend = [("", f"{old.name} \u2192 {new.name}:")]
     legend += [(change, change) for change in (ADDED, REMOVED, CHANGED)]
     if old.statistics is not None and new.statistics is not None:

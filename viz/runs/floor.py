@@ -1,4 +1,4 @@
-"""A floor from a file, for runs whose robot tells of none."""
+"""Reads the map of a floor from a file, for robots that do not publish theirs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ if TYPE_CHECKING:
 
 
 def read_floor(path: Path) -> dict[str, Any]:
-    """Return a map_server's YAML file and its image as a record of `smachpy.network.observations`.
+    """Read a map_server YAML file and its image; return a record of `smachpy.network.observations`.
 
     Raises:
-        InputFileError: with every problem of the file.
+        InputFileError: names all problems of the file.
     """
     from smachpy.network.observations import grid_facts, map_record
     from smachpy.sim.occupancy import load_map

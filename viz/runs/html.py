@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from viz.live import assets as page
+from viz.live import assets
 from viz.live.machines import Machine
 from viz.model.why import why
 from viz.runs.floor import read_floor
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from smachpy.events.recording import Recording
+    from smachpy.introspection import StateRecord
 
 
 def standalone_page(
@@ -25,22 +26,26 @@ def standalone_page(
 
     Args:
         recording: The run.
-        runs: Recorded runs for the statistics on the graph.
-        floor: The map, where the recording has none: a map_server's YAML file.
+        runs: Recorded runs for the statistics in the diagram.
+        floor: A map_server YAML file, used if the recording has no map.
 
     Raises:
         RecordingError: a file of `runs` cannot be read.
-        InputFileError: `floor` is no map.
+        InputFileError: `floor` is not a valid map.
     """
     map_of_file = None if floor is None else read_floor(floor)
     machine = Machine(recording.path.name, lambda _machine: None, floor=map_of_file)
-    machine.recorded = True
-    machine.reset(recording.history(), limit=len(recording.events) + 1)
+    machine.load(recording)
+    return page_of(machine, recording.record, StatisticsOfFiles(runs).of(recording.record))
+
+
+def page_of(machine: Machine, record: StateRecord, statistics: dict[str, Any] | None = None) -> str:
+    """Return the page of a machine as it is now."""
     run = {
-        "model": page.model(recording.record),
+        "model": assets.model(record),
         "snap": json.loads(machine.snapshot()[1]),
         "observed": machine.observed(),
-        "statistics": StatisticsOfFiles(runs).of(recording.record),
-        "why": why(recording.record, recording.events).to_json(),
+        "statistics": statistics,
+        "why": why(record, machine.events()).to_json(),
     }
-    return page.standalone(run, recording.record.label)
+    return assets.standalone(run, record.label)

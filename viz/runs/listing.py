@@ -1,6 +1,6 @@
-"""One run as a row of a list: machine, robots, outcome, strip of its states, why it failed.
+"""One run as a row of a list: machine, robots, outcome, strip of states, cause of a failure.
 
-Pure: from the structure and the events alone.
+Pure functions of the machine's structure and the run's events.
 """
 
 from __future__ import annotations
@@ -18,23 +18,25 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
 
 MOST_ROWS: Final = 8
-"""So many regions of a concurrence have a row of the strip."""
+"""Rows of a concurrence's strip; further branches share the last one."""
 
 MOST_PIECES: Final = 80
 MOST_ROBOTS: Final = 4
 LONGEST: Final = 160
+"""Length of the reason [characters]."""
+
 _ENDS: Final = frozenset({"Left", "Failed", "Finished"})
 
 
 def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return what a list shows of the newest run among some events.
+    """Return the row for the newest run in `events`.
 
     Returns:
-        `machine`; `robots`, what stands in front of the names of its actions; `began` and `ended`
-        [ns since the epoch], null where they are unknown; `outcome`, null when it has no end;
-        `reason`, the first cause of an end that is no success, else where it is, or ""; `strip`:
-        row, name of the state, seconds from the beginning at its begin and end (null: it runs),
-        class of its outcome; `outages`, pairs [s from the beginning] in which no process ran it.
+        `machine`; `robots`: the namespaces of its actions; `began`, `ended` and `last`, the newest
+        event [ns since the epoch, None if unknown]; `outcome`: None if the run has not ended;
+        `reason`: the first cause of a failure, or the running state, or ""; `strip`: for each visit
+        the row, the state's name, begin and end [s since the run began; None: still running] and
+        the class of its outcome; `outages`: pairs [s since the run began] without a process.
     """
     found = why(record, events)
     kind = None if found.outcome is None else outcome_class(found.outcome)
@@ -46,6 +48,7 @@ def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, 
         reason = _name(steps[0].path, record)
     run = newest_run(events, record.path)
     began = found.began or 0
+    # Each Recovered event lists the outages so far.
     last = next((one for one in reversed(run) if one["kind"] == "Recovered"), None)
     return {
         "machine": record.label,
@@ -61,7 +64,7 @@ def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, 
 
 
 def spans_after(began: int, spans: Iterable[Sequence[int]]) -> list[tuple[float, float]]:
-    """Return pairs of instants [ns] as seconds after `began`."""
+    """Convert pairs of instants [ns] to seconds after `began`."""
     return [(round((a - began) / 1e9, 3), round((b - began) / 1e9, 3)) for a, b in spans]
 
 
@@ -71,7 +74,7 @@ def _cause(step: Any) -> str:
 
 
 def _name(path: str, record: StateRecord) -> str:
-    """The way to a state below the root."""
+    """The labels from the root down to a state."""
     return path.removeprefix(record.path).strip("/").replace("/", " \u203a ")
 
 
@@ -84,11 +87,11 @@ def _robots(run: Sequence[dict[str, Any]]) -> list[str]:
 def _strip(
     record: StateRecord, run: Sequence[dict[str, Any]], began: int
 ) -> list[tuple[int, str, float, float | None, str]]:
-    """The visits of the root's children; a concurrence has a row for each of them."""
+    """The visits of the root's children; each branch of a concurrence has its own row."""
     children = {child.path: number for number, child in enumerate(record.children)}
     kinds = {child.path: child.kind for child in record.children}
     rows = record.kind == "concurrence"
-    since: dict[str, float] = {}
+    since: dict[str, float] = {}  # start of each running visit, by path
     pieces: list[tuple[int, str, float, float | None, str]] = []
 
     def add(path: str, to: float | None, kind: str) -> None:
@@ -98,6 +101,7 @@ def _strip(
     for event in run:
         path, at = event["path"], round((event["stamp_ns"] - began) / 1e9, 3)
         if event["kind"] == "Recovered":
+            # The visits that the resumed mission runs; others that were cut off have no end.
             known = [(one, start) for one, start in event["active"] if one in children]
             since = {one: since.get(one, (start - began) / 1e9) for one, start in known}
         if path not in children:
@@ -115,7 +119,7 @@ def _strip(
 def _fewer(
     pieces: list[tuple[int, str, float, float | None, str]],
 ) -> list[tuple[int, str, float, float | None, str]]:
-    """Of too many pieces the longest, and those that run."""
+    """The longest pieces, if there are too many; a running piece counts as endless."""
     if len(pieces) <= MOST_PIECES:
         return pieces
     by_length = sorted(pieces, key=lambda p: float("inf") if p[3] is None else p[3] - p[2])

@@ -1,13 +1,18 @@
-"""A recorded run as MCAP with ROS 1 messages, which Foxglove and other tools open.
+"""Writes a recorded run as an MCAP file with ROS 1 messages, for Foxglove and other tools.
 
-Topics of the machine MACHINE: /MACHINE/smach/container_structure (of every container),
-/MACHINE/smach/container_status (whenever it changes) and /MACHINE/smach/events (std_msgs/String,
-every event as JSON); of its actions: /ACTION/goal, /feedback and /result with the types that ROS's
-actionlib has for them (`MoveBaseActionGoal`, ...), and /ACTION/status; of the robots what `scene`
-makes: /tf, /pose, /scan, /plan, /map and values; and for panels of states and plots,
-/CONTAINER/state (the name of the state that runs) and /MACHINE/userdata/KEY of numbers. A recording
-keeps at most 1,000 elements of a list, cuts long texts and does not tell of cancels, so neither
-does the file: messages that cannot be made from it are left out and counted.
+Topics of a machine MACHINE:
+    /MACHINE/smach/container_structure  of every container
+    /MACHINE/smach/container_status     whenever it changes
+    /MACHINE/smach/events               std_msgs/String, every event as JSON
+    /CONTAINER/state                    label of the running state, for state panels
+    /MACHINE/userdata/KEY               numbers in the userdata, for plots
+of its actions:
+    /ACTION/goal, /feedback, /result    with actionlib's types, such as `MoveBaseActionGoal`
+    /ACTION/status
+and of its robots the messages from `scene`: /tf, /pose, /scan, /plan, /map and values.
+
+A recording keeps at most 1,000 elements of a list, shortens long texts and has no cancels. Messages
+that cannot be restored from it are left out and counted.
 """
 
 from __future__ import annotations
@@ -42,17 +47,20 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
 
 GOAL_PARTS = {"GoalSent": "goal", "GoalFeedback": "feedback", "GoalDone": "result"}
-_NO_NUMBERS = {"nan", "inf", "-inf"}
+"""The part of an action that each kind of event carries."""
+_NON_FINITE = {"nan", "inf", "-inf"}
+"""Recorded as text: JSON has no such numbers."""
 _FLOATS = {"float32", "float64"}
 _OCTETS = {"uint8", "char"}
-_MISSHAPEN = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, zlib.error)
+_MALFORMED = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, zlib.error)
+"""Raised while a message is made from a malformed record."""
 
 
 def write_mcap(recording: Recording, path: Path) -> None:
-    """Write the file; messages that are left out are counted in the log.
+    """Write the file; log how many messages are left out.
 
     Raises:
-        ModuleNotFoundError: the package `mcap` is missing.
+        ModuleNotFoundError: the package `mcap` is not installed.
         OSError: the file cannot be written.
     """
     from mcap.writer import Writer
@@ -76,14 +84,15 @@ class _Export:
         self._containers = {s.path: s for s in recording.record.walk() if s.is_container}
         self._server = f"/{recording.record.label}"
         self._scene = Scene(recording.record, self._server)
-        self._ids: dict[str, Any] = {}
+        self._ids: dict[str, Any] = {}  # goal id -> GoalID
         self._statuses: dict[str, dict[str, Any]] = {}  # action -> goal id -> GoalStatus
         self._ended: set[tuple[str, str]] = set()  # action and goal id
         self.left_out: Counter[tuple[str, str]] = Counter()  # by topic and reason
 
     def run(self) -> None:
         define_types(self._recording.definitions)
-        began = datetime.fromtimestamp(self._recording.made_ns / 1e9, UTC)  # stamps may be virtual
+        # The date comes from the file's header: stamps of events may be of virtual time.
+        began = datetime.fromtimestamp(self._recording.made_ns / 1e9, UTC)
         facts = {"machine": self._recording.record.label, "began": began.isoformat()}
         self._writer.add_metadata("run", facts)
         for container in self._containers.values():
@@ -102,26 +111,27 @@ class _Export:
             self._write(f"{self._server}/smach/events", String(data=text), stamp)
             if event["kind"] in GOAL_PARTS:
                 self._write_goal(event, GOAL_PARTS[event["kind"]], len(text))
+            # An event changes the status of the container around its state; feedback never does,
+            # and it is by far the most frequent event.
             parent = self._containers.get(event["path"].rpartition("/")[0])
             if parent is not None and event["kind"] != "GoalFeedback":
                 message = self._status(parent, event)
                 self._write(f"{self._server}/smach/container_status", message, stamp)
-            for topic, message in self._scene.told(event, self._state):
+            for topic, message in self._scene.of_event(event, self._state):
                 self._write(topic, message, stamp)
 
     def _write_observed(self, record: dict[str, Any]) -> None:
         try:
-            messages = list(self._scene.observed(record))
-        except (*_MISSHAPEN, ActionlibError) as error:
-            why = f"of another shape ({error})"
-            self.left_out[f"what {record.get('what')!r} of a robot told", why] += 1
+            messages = list(self._scene.of_observation(record))
+        except (*_MALFORMED, ActionlibError) as error:
+            self.left_out[f"a robot's {record.get('what')!r}", f"malformed ({error})"] += 1
             return
         for topic, message in messages:
             self._write(topic, message, record["stamp_ns"])
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
         key = topic, message._type
-        if key not in self._channels:
+        if key not in self._channels:  # a topic that is used with two types gets two channels
             schema = self._writer.register_schema(
                 name=message._type, encoding="ros1msg", data=message._full_text.encode()
             )
@@ -140,6 +150,7 @@ class _Export:
         header = Header(stamp=Time(0, stamp))
         if part == "goal":
             self._ids[event["goal_id"]] = GoalID(stamp=Time(0, stamp), id=event["goal_id"])
+        # A recording that began during the goal has no GoalSent, so the stamp is unknown: zero.
         goal_id = self._ids.get(event["goal_id"], GoalID(id=event["goal_id"]))
         status = GoalStatus(goal_id=goal_id, status=GoalStatus.ACTIVE)
         if part == "result":
@@ -158,12 +169,12 @@ class _Export:
             self.left_out[f"{action}/{part}", "it was recorded as text"] += 1
         known = self._statuses.setdefault(action, {})
         if part == "feedback" and (action, event["goal_id"]) in self._ended:
-            return  # it was under way when the goal ended
+            return  # late feedback must not make an ended goal active again
         known[event["goal_id"]] = status
         if part != "feedback":
             statuses = list(known.values())
             self._write(f"{action}/status", GoalStatusArray(header, statuses), stamp)
-        if part == "result":
+        if part == "result":  # the status just written has shown the end once; drop the goal
             del known[event["goal_id"]]
             self._ended.add((action, event["goal_id"]))
 
@@ -185,7 +196,7 @@ class _Export:
 
 
 def define_types(definitions: Mapping[str, str]) -> None:
-    """Make actions known whose texts a recording has, unless this program knows them already."""
+    """Define the actions whose definitions are in a recording, unless they are already known."""
     for name, goal in definitions.items():
         action = name.removesuffix("Goal")
         parts = [goal, definitions.get(f"{action}Result"), definitions.get(f"{action}Feedback")]
@@ -199,9 +210,9 @@ def define_types(definitions: Mapping[str, str]) -> None:
 
 
 def _define_inner(full: str) -> str:
-    """Make known what a type's full text has after its own, innermost first; return its own."""
-    own, *inner = full.split(f"{'=' * 80}\nMSG: ")
-    for section in reversed(inner):
+    """Define the types that follow a type's own definition in its full text; return its own."""
+    own, *inner = full.split(f"{'=' * 80}\nMSG: ")  # the format of ROS's `gendeps --cat`
+    for section in reversed(inner):  # a type comes before those that it uses
         name, _, text = section.partition("\n")
         if not _is_known(name.strip()):
             define_message(name.strip(), text)
@@ -230,7 +241,7 @@ def _structure(container: StateRecord, stamp_ns: int) -> Any:
 
 
 def _action_type(name: str, part: str) -> type[Any]:
-    """The type in which actionlib sends a part: a/BGoal -> a/BActionGoal."""
+    """The type in which actionlib sends a part of an action: a/BGoal -> a/BActionGoal."""
     word = part.capitalize()
     if not name.endswith(word):
         raise ValueError(f"got type {name!r}; expected one that ends with {word!r}")
@@ -238,15 +249,15 @@ def _action_type(name: str, part: str) -> type[Any]:
 
 
 def _restored(value: Any, kind: str, size: int) -> Any:
-    """A recorded value as the plain data that `from_dict` takes.
+    """Convert a recorded value to the plain data that `from_dict` takes.
 
     Args:
-        value: What was recorded.
-        kind: Its field's type.
-        size: Characters of the whole record.
+        value: The recorded value.
+        kind: Type of its field.
+        size: Length of the whole record [characters].
 
     Raises:
-        ValueError: only a part of it was recorded.
+        ValueError: the value was shortened in the recording.
     """
     if isinstance(value, dict) and "$msg" in value:
         message, parts = get_message(value["$msg"]), value["fields"]
@@ -262,7 +273,7 @@ def _restored(value: Any, kind: str, size: int) -> Any:
 
 def _restored_text(text: str, kind: str, size: int) -> Any:
     element = kind.partition("[")[0]
-    if element in _FLOATS and text in _NO_NUMBERS:
+    if element in _FLOATS and text in _NON_FINITE:
         return float(text)
     if was_cut(text, size):
         raise ValueError(f"too long to be recorded: a {kind}")
@@ -270,7 +281,7 @@ def _restored_text(text: str, kind: str, size: int) -> Any:
         try:
             return list(ast.literal_eval(text))
         except SyntaxError as error:
-            raise ValueError(f"no bytes: {text[:40]}") from error
-    if "[" in kind:
+            raise ValueError(f"not bytes: {text[:40]}") from error
+    if "[" in kind:  # a list of which only the repr's beginning was recorded
         raise ValueError(f"too long to be recorded: {text[:40]}")
     return text

@@ -1,4 +1,4 @@
-"""Many runs of one machine as one page that opens without a server."""
+"""Reports many runs of one machine as one page that opens without a server."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ td.n, th.n {{ text-align: right; white-space: nowrap; font-variant-numeric: tabu
 
 @dataclass(slots=True)
 class Runs:
-    """What a report needs of the runs of one machine.
+    """The runs of one machine, as a report needs them.
 
     Attributes:
         record: The machine as it was in the last run.
-        statistics: Of all states.
-        ways: For each run the states of the outermost container in their order, and the outcome.
-        files: Of each run the file, the outcome, and the seconds it took if it has ended.
+        statistics: Statistics of all runs.
+        ways: For each run the visited children of the root in order, and the outcome.
+        files: For each run the file, the outcome and the duration [s], None if it has not ended.
     """
 
     record: StateRecord
@@ -55,7 +55,7 @@ class Runs:
 
 
 def collect(recordings: Iterable[Recording]) -> dict[str, Runs]:
-    """Return what the runs of each machine add up to, by its label."""
+    """Return the runs of each machine, by its label."""
     found: dict[str, Runs] = {}
     for recording in recordings:
         runs = found.setdefault(recording.record.label, Runs(recording.record))
@@ -89,8 +89,8 @@ def report(
 
     Args:
         runs: The runs.
-        before: Earlier ones to compare with.
-        values: By the file of a run, what was chosen for it.
+        before: Earlier runs to compare with.
+        values: The varied values of each run, by its file.
 
     Raises:
         EngineError, PictureError: the machine cannot be drawn.
@@ -115,6 +115,7 @@ def report(
     ]
     body = "".join(f"<h2>{title}</h2>{content}" for title, content in sections if content)
     name = escape(runs.record.label)
+    # Names in a recording are not trusted: besides escaping, the policy forbids every script.
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
@@ -130,25 +131,24 @@ def _outcomes(runs: Runs) -> str:
     rows = []
     for outcome, n in sorted(runs.statistics.outcomes.items(), key=lambda item: -item[1]):
         times = [s for _, end, s in runs.files if end == outcome and s is not None]
-        cells = [_coloured(outcome), str(n), f"{n / ended:.0%}", *_times(times)]
-        rows.append(cells)
+        rows.append([_coloured(outcome), str(n), f"{n / ended:.0%}", *_times(times)])
     return _table(["outcome", "runs", "share", "median", "95 %"], rows)
 
 
 def _varied(runs: Runs, values: Mapping[str, Mapping[str, object]]) -> str:
-    """How runs ended by each quarter of what varied."""
+    """The outcomes by quarters of each varied value."""
     rows = []
     for key in dict.fromkeys(key for one in values.values() for key in one):
         for words, ends in by_quarter(runs, values, key):
-            told = ", ".join(f"{_coloured(o)} \u00d7{n}" for o, n in ends.most_common())
-            rows.append([escape(key), escape(words), str(sum(ends.values())), told])
+            outcomes = ", ".join(f"{_coloured(o)} \u00d7{n}" for o, n in ends.most_common())
+            rows.append([escape(key), escape(words), str(sum(ends.values())), outcomes])
     return _table(["value", "range", "runs", "outcomes"], rows)
 
 
 def by_quarter(
     runs: Runs, values: Mapping[str, Mapping[str, object]], key: str
 ) -> list[tuple[str, Counter[str]]]:
-    """Return how runs ended, by quarters of a number that varied or by each other value."""
+    """Return the outcomes by quarters of a varied number, or by each value if it is no number."""
     pairs = [(values[file][key], end) for file, end, _ in runs.files if key in values.get(file, {})]
     numbers = sorted((v, end) for v, end in pairs if isinstance(v, int | float))
     if len(numbers) < len(pairs):
@@ -156,7 +156,7 @@ def by_quarter(
         for value, end in pairs:
             ends.setdefault(str(value), Counter())[end] += 1
         return list(ends.items())
-    size = -(-len(numbers) // 4)
+    size = -(-len(numbers) // 4)  # rounded up: at most four parts
     quarters = [numbers[i : i + size] for i in range(0, len(numbers), size or 1)]
     return [
         (f"{part[0][0]:.3g} to {part[-1][0]:.3g}", Counter(end for _, end in part))
@@ -175,9 +175,9 @@ def _states(runs: Runs) -> str:
             low, high = min(one.durations), max(one.durations)
             span = f"{low:.1f} to {high:.1f} s"
             bars = f'{charts.histogram(one.durations, low, high)} <span class="muted">{span}</span>'
-        told = ", ".join(f"{_coloured(o, one.kind)} \u00d7{n}" for o, n in one.outcomes.items())
+        ends = ", ".join(f"{_coloured(o, one.kind)} \u00d7{n}" for o, n in one.outcomes.items())
         cells = [escape(state.path), str(one.visits), *_times(one.durations)]
-        rows.append([*cells, f"{one.failures():.0%}", bars, told])
+        rows.append([*cells, f"{one.failures():.0%}", bars, ends])
     head = ["state", "visits", "median", "95 %", "failed", "durations", "outcomes"]
     return f'<div class="wide">{_table(head, rows)}</div>'
 
@@ -218,6 +218,7 @@ def _coloured(outcome: str, kind: str = "") -> str:
 
 
 NUMBERS = {"runs", "share", "median", "95 %", "visits", "failed", "time"}
+"""Columns that are aligned to the right."""
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

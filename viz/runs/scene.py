@@ -1,7 +1,7 @@
-"""What a recording tells of the robots, as the messages that 3D views of ROS know.
+"""Converts a recording's data about robots to the messages that 3D viewers for ROS display.
 
-Everything stands in the frame "map" [m, rad]; a robot is the frame "ROBOT/base_link", its scanner
-"ROBOT/scanner" ("base_link" and "scanner" for a mission's own robot).
+Coordinates are in the frame "map" [m, rad]. A robot's frame is "ROBOT/base_link" and its scanner's
+"ROBOT/scanner"; those of the mission's own robot have no prefix.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from actionlib_core.interfaces.std_msgs.msg import ColorRGBA, Float64, Header, S
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.interfaces.visualization_msgs.msg import Marker, MarkerArray
 from actionlib_core.time import Time
+from viz.model.labels import innermost
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -35,9 +36,9 @@ if TYPE_CHECKING:
 
 MAP = "map"
 FARTHEST_M = 100.0
-"""Range of a scanner, which recordings do not tell."""
+"""Range of every scanner; recordings do not contain it."""
 OCCUPANCY = bytes.maketrans(b"\x00\x01\x02", bytes([0, 100, 255]))
-"""A recording's classes of cells as those of an occupancy grid: free, occupied, unknown (-1)."""
+"""Maps a recording's cells to an occupancy grid's: free 0, occupied 100, unknown -1 as a byte."""
 NAME_HEIGHT_M = 0.3
 
 Message = tuple[str, Any]
@@ -45,69 +46,72 @@ Message = tuple[str, Any]
 
 
 class Scene:
-    """Turns the records of a run into messages, one record after another.
+    """Converts the records of a run to messages, in their order.
 
     Args:
         machine: The mission.
-        server: In front of its topics' names, "/PATROL".
+        server: Prefix of the mission's topics, such as "/PATROL".
     """
 
     def __init__(self, machine: StateRecord, server: str) -> None:
         self._server = server
-        self._lines = [
+        # Several children of a concurrence or plan can run at once: they have no single "state".
+        self._sequential = [
             state
             for state in machine.walk()
             if state.is_container and state.kind not in {"concurrence", "plan"}
         ]
-        self._labels: dict[str, str] = {}  # by container
+        self._labels: dict[str, str] = {}  # label of the running child, by path of the container
 
-    def observed(self, record: Mapping[str, Any]) -> Iterator[Message]:
-        """Yield what a robot's topic told.
+    def of_observation(self, record: Mapping[str, Any]) -> Iterator[Message]:
+        """Yield the messages for a record of a robot's topic.
 
         Raises:
-            ArithmeticError, LookupError, TypeError, ValueError, zlib.error: the record is of
-                another shape.
+            ArithmeticError, LookupError, TypeError, ValueError, zlib.error: the record is
+                malformed.
         """
         header = Header(stamp=Time(0, record["stamp_ns"]), frame_id=MAP)
         robot = record["robot"]
-        space = f"/{robot}" if robot else ""
+        namespace = f"/{robot}" if robot else ""
         match record["what"]:
             case "pose":
                 at = record["at"]
                 yield "/tf", _frame(header, _name(robot, "base_link"), at)
-                yield f"{space}/pose", PoseStamped(header=header, pose=_pose(*at))
+                yield f"{namespace}/pose", PoseStamped(header=header, pose=_pose(*at))
             case "scan":
                 frame = _name(robot, "scanner")
                 yield "/tf", _frame(header, frame, record["at"])
-                yield f"{space}/scan", _scan(record, frame)
+                yield f"{namespace}/scan", _scan(record, frame)
             case "plan":
                 poses = [
                     PoseStamped(header=header, pose=_pose(x, y, 0.0)) for x, y in record["points"]
                 ]
-                yield f"{space}/plan", Path(header=header, poses=poses)
+                yield f"{namespace}/plan", Path(header=header, poses=poses)
             case "map":
-                yield f"{space}/map", _grid(record, header)
+                yield f"{namespace}/map", _grid(record, header)
             case "value":
-                yield f"{space}/{record['name']}", Float64(data=float(record["value"]))
+                yield f"{namespace}/{record['name']}", Float64(data=float(record["value"]))
             case "values":
                 for path, value in record["values"].items():
                     name = f"/{record['topic']}/{path.replace('.', '/')}"
                     yield name, Float64(data=float(value))
 
-    def told(self, event: Mapping[str, Any], state: RunState) -> Iterator[Message]:
-        """Yield what an event of the mission changes.
+    def of_event(self, event: Mapping[str, Any], state: RunState) -> Iterator[Message]:
+        """Yield the messages for an event of the mission.
 
         Args:
-            event: The record.
-            state: The run after it.
+            event: The event's record.
+            state: The run after this event.
         """
         if event["kind"] == "GoalSent":
             yield from _goal(event)
         if event["kind"] == "UserdataWritten":
-            yield from self._userdata(event)
+            value = event.get("value")
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                yield f"{self._server}/userdata/{event['key']}", Float64(data=float(value))
         active = set(state.active())
         changed = False
-        for container in self._lines:
+        for container in self._sequential:
             labels = [child.label for child in container.children if child.path in active]
             label = labels[0] if labels else ""
             if self._labels.get(container.path, "") != label:
@@ -115,13 +119,7 @@ class Scene:
                 changed = True
                 yield f"{container.path}/state", String(data=label)
         if changed:
-            leaves = [p for p in active if not any(q.startswith(p + "/") for q in active)]
-            yield f"{self._server}/markers", _names(event["stamp_ns"], leaves)
-
-    def _userdata(self, event: Mapping[str, Any]) -> Iterator[Message]:
-        value = event.get("value")
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            yield f"{self._server}/userdata/{event['key']}", Float64(data=float(value))
+            yield f"{self._server}/markers", _names(event["stamp_ns"], innermost(active))
 
 
 def _name(robot: str, frame: str) -> str:
@@ -144,6 +142,7 @@ def _frame(header: Header, child: str, at: Any) -> TFMessage:
 
 
 def _scan(record: Mapping[str, Any], frame: str) -> LaserScan:
+    # Recorded in cm, -1 without an echo. As in REP 117, +inf means nothing within range.
     ranges = [r / 100 if r >= 0 else math.inf for r in record["ranges"]]
     return LaserScan(
         header=Header(stamp=Time(0, record["stamp_ns"]), frame_id=frame),
@@ -157,6 +156,8 @@ def _scan(record: Mapping[str, Any], frame: str) -> LaserScan:
 
 def _grid(record: Mapping[str, Any], header: Header) -> OccupancyGrid:
     size = record["width"] * record["height"]
+    # One byte more than expected is enough to see that a record is wrong: a small one could
+    # expand to gigabytes.
     expand = zlib.decompressobj()
     cells = expand.decompress(base64.b64decode(record["cells"], validate=True), size + 1)
     if len(cells) != size:
@@ -172,7 +173,7 @@ def _grid(record: Mapping[str, Any], header: Header) -> OccupancyGrid:
 
 
 def _goal(event: Mapping[str, Any]) -> Iterator[Message]:
-    """The pose of a goal that has one, as an arrow."""
+    """The goal's pose, which viewers show as an arrow, if it has one."""
     goal = event.get("goal")
     fields = goal.get("fields") if isinstance(goal, dict) else None
     for stamped in fields.values() if isinstance(fields, dict) else ():
@@ -186,13 +187,13 @@ def _goal(event: Mapping[str, Any]) -> Iterator[Message]:
                 frame_id=stamped["fields"]["header"]["fields"]["frame_id"] or MAP,
             )
             placed = Pose(position=Point(**position), orientation=Quaternion(**turn))
-        except (LookupError, TypeError):  # cut, or written by hand
+        except (LookupError, TypeError):  # shortened in the recording, or edited by hand
             continue
         yield f"/{event['action'].strip('/')}/goal_pose", PoseStamped(header=header, pose=placed)
 
 
 def _names(stamp_ns: int, leaves: list[str]) -> MarkerArray:
-    """What runs, written above the mission's robot."""
+    """The names of the running leaves, as text above the mission's robot."""
     marker = Marker(
         header=Header(stamp=Time(0, stamp_ns), frame_id="base_link"),
         ns="states",

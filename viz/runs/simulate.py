@@ -1,4 +1,4 @@
-"""Many simulated runs of one mission, with values that vary from run to run."""
+"""Simulates many runs of one mission, with values that vary from run to run."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from smachpy.mission_info import mission_info
 from smachpy.run.grace import asking
 from smachpy.sim.config import load_config
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from viz.model.labels import innermost
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -43,11 +44,12 @@ if TYPE_CHECKING:
 SHORT = {"battery": "battery.charge"}
 """Short names of the simulated robot's parameters."""
 SERVER_TIMEOUT_S = 10.0
+"""Longest wait for the mission's servers before its start [s]."""
 LIMIT_S = 4 * 3600.0
-"""Virtual time that a run may take, unless something else is said [s]."""
+"""Default limit for the virtual time of a run [s]."""
 
 MOST_AT_ONCE = 100_000
-"""So many events at one instant of virtual time: a mission that goes round without waiting."""
+"""More events than this at one instant of virtual time mean a loop that never waits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +58,10 @@ class Vary:
 
     Attributes:
         key: A parameter of the mission's function, one of its userdata keys, or a parameter of the
-            simulated robot: "battery.charge", in short "battery".
-        low, high: Its range, when it is a number.
-        choices: Or what to choose from, in turn.
+            simulated robot such as "battery.charge", in short "battery".
+        low, high: The range of a number.
+        choices: Instead of a range: the values, used in turn.
+        whole: Whether the values in the range are integers.
     """
 
     key: str
@@ -72,7 +75,7 @@ class Vary:
         """Read "battery=0.2..1.0" or "place=lab,office".
 
         Raises:
-            ValueError: it is neither.
+            ValueError: the text has neither form.
         """
         key, equals, values = text.partition("=")
         low, dots, high = values.partition("..")
@@ -92,17 +95,19 @@ class Vary:
         return cls(key.strip(), first, last, whole=whole)
 
     def value(self, run: int, runs: int, seed: int) -> Value:
-        """Return its value in a run: one from each of as many equal parts of the range as runs.
+        """Return the value for a run, by Latin hypercube sampling.
 
-        Each key takes its parts in an order of its own, which makes a Latin hypercube of several.
+        The range is divided into as many equal parts as there are runs, and each run gets a random
+        value from another part. Each key has its own random order of the parts.
 
         Args:
             run: Number of the run, from 0.
-            runs: How many there are.
-            seed: Of the order, and of the place inside each part.
+            runs: Number of runs.
+            seed: Determines the order and the value within each part.
         """
         if self.choices:
             return self.choices[run % len(self.choices)]
+        # Seeded by run and key, so that a value depends on no other call: runs are done anywhere.
         order = list(range(runs))
         random.Random(f"{seed} {self.key}").shuffle(order)  # noqa: S311  no secret
         inside = random.Random(f"{seed} {self.key} {run}").random()  # noqa: S311
@@ -114,15 +119,15 @@ class Vary:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run, as it is sent to who does it.
+    """One run, as it is sent to a worker.
 
     Attributes:
-        mission: What `smachpy run` takes: a name, a file, module:factory.
-        number: Of the run, from 1.
-        seed: Of the order of events at the same instant, and of Python's `random`.
-        values: By key.
-        file: Where it is recorded.
-        limit: Virtual time that it may take [s]; it is preempted then.
+        mission: As for `smachpy run`: a name, a file or module:factory.
+        number: Number of the run, from 1.
+        seed: Determines the order of events at the same instant, and seeds Python's `random`.
+        values: The varied values by key.
+        file: File for the recording.
+        limit: Virtual time after which the run is preempted [s].
     """
 
     mission: str
@@ -130,18 +135,18 @@ class Task:
     seed: int
     values: Mapping[str, Value]
     file: Path
-    limit: float = LIMIT_S
+    limit: float
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """How a run ended.
+    """The end of a run.
 
     Attributes:
         task: The run.
-        outcome: None when it raised, could not be done or did not end.
-        error: Why not.
-        recording: What belongs into the file, when whoever did the run has no such folder.
+        outcome: None if it raised an exception, could not begin or did not end.
+        error: The reason for no outcome.
+        recording: Content of the recording, if the worker does not have the task's folder.
     """
 
     task: Task
@@ -152,13 +157,13 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What to simulate.
+    """The runs to simulate.
 
     Attributes:
-        mission: As `smachpy run` takes it.
-        runs: How many.
-        folder: Where recordings go; must exist.
-        vary: What varies.
+        mission: As for `smachpy run`.
+        runs: Number of runs.
+        folder: Folder for the recordings; must exist.
+        vary: The values that vary.
         seed: The same seed makes the same runs.
         limit: Virtual time that a run may take [s].
     """
@@ -174,7 +179,7 @@ class Plan:
         """Return the runs.
 
         Raises:
-            SmachError: there is no such mission, it needs real time, or it has no such key.
+            SmachError: the mission does not exist, needs real time, or lacks a key of `vary`.
         """
         target = load_target(self.mission)
         self._check(target)
@@ -182,7 +187,7 @@ class Plan:
             Task(
                 self.mission,
                 run + 1,
-                self.seed * 1_000_003 + run,
+                self.seed * 1_000_003 + run,  # no two plans with other seeds share a run's
                 {vary.key: vary.value(run, self.runs, self.seed) for vary in self.vary},
                 self.folder / f"{run + 1:04}.jsonl",
                 self.limit,
@@ -199,20 +204,22 @@ class Plan:
             )
         parameters = {*parameters_of(target.thing)}
         robot = _robot_parameters()
-        known = {*parameters, *describe(target.build()).input_keys} if not parameters else None
+        # A mission without parameters takes its userdata keys as arguments, as in `smachpy run`.
+        keys = set() if parameters else {*describe(target.build()).input_keys}
+        known = parameters | keys
         for vary in self.vary:
             key = SHORT.get(vary.key, vary.key)
-            if vary.key in parameters or (known and vary.key in known):
+            if vary.key in known:
                 continue
             if key not in robot:
-                names = ", ".join(sorted({*(known or parameters), *SHORT, *robot}))
+                names = ", ".join(sorted({*known, *SHORT, *robot}))
                 raise MissionError(
                     f"--vary {vary.key}: mission {target.name!r} has no such argument or key, and "
                     f"the simulated robot no such parameter; expected one of {names}."
                 )
             if info.world is not None:
                 raise MissionError(
-                    f"--vary {vary.key}: mission {target.name!r} plays in a world of its own "
+                    f"--vary {vary.key}: mission {target.name!r} runs in its own world "
                     f"({info.world.name}); expected one of {sorted(parameters)}."
                 )
 
@@ -233,14 +240,15 @@ def simulate(
     *,
     jobs: int | None = None,
 ) -> list[Result]:
-    """Do the runs of a plan, in virtual time; each leaves a recording.
+    """Do the runs of a plan in virtual time and record each of them.
 
     Args:
-        plan: What to do.
-        executor: Where; a pool of one process per core when None. Its workers need this package
-            and the mission; recordings are sent back from computers that do not have the folder.
-        on_result: Called for each as it ends, in the caller's thread.
-        jobs: Processes of that pool; None: one per core.
+        plan: The runs.
+        executor: Does the runs; by default a pool of processes. Its workers need this package and
+            the mission; those on other computers, without the plan's folder, send their recordings
+            back.
+        on_result: Called in the caller's thread after each run.
+        jobs: Number of processes in the default pool; by default one per core.
 
     Returns:
         The results in the order of the tasks.
@@ -248,7 +256,7 @@ def simulate(
     Raises:
         SmachError: as `Plan.tasks`.
 
-    Blocks: until all are done.
+    Blocks: until all runs have ended.
     """
     tasks = plan.tasks()
     with contextlib.ExitStack() as stack:
@@ -261,6 +269,7 @@ def simulate(
             error = future.exception()
             result = future.result() if error is None else Result(task, None, _words(error))
             if result.recording:
+                # Written at once and dropped: thousands of recordings would fill the memory.
                 task.file.write_bytes(result.recording)
                 result = replace(result, task=task, recording=b"")
             results[task.number] = result
@@ -270,18 +279,18 @@ def simulate(
 
 @contextlib.contextmanager
 def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
-    """Make processes for runs; those that have not begun when the context ends never do.
+    """A pool of processes for the runs; runs that have not begun at the end are cancelled.
 
-    An exception, Ctrl-C among them, ends the processes at once: what they run may never end.
+    An exception such as Ctrl-C kills the processes at once, because a run may never end.
 
     Args:
-        jobs: How many; None: one per core.
-        runs: No more are made than there are runs.
+        jobs: Number of processes; None: one per core.
+        runs: Number of runs, the upper limit for the number of processes.
     """
     others = active_children()
     executor = _Pool(
         min(jobs or os.cpu_count() or 1, runs),
-        mp_context=get_context("spawn"),
+        mp_context=get_context("spawn"),  # a fork would copy locks that other threads hold
         initializer=_end_with_parent,
     )
     try:
@@ -297,11 +306,12 @@ def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Its processes never see Ctrl-C, which is for the one that shares the work out."""
+    """A pool whose processes ignore Ctrl-C: the terminal sends it to them too."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
         """As `Executor.submit`."""
-        # A new process inherits what is blocked; an initializer comes after imports, too late.
+        # `submit` starts the processes, and they inherit the blocked signals. An initializer would
+        # block them too late, after the imports.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             return super().submit(fn, *args, **kwargs)
@@ -310,13 +320,13 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that shares the work out is killed: nobody else would."""
+    """End this process if the parent process is killed, which could not end it."""
 
     def wait() -> None:
         parent = parent_process()
         assert parent is not None
         parent.join()
-        os._exit(1)
+        os._exit(1)  # from this thread, `sys.exit` would end only the thread
 
     threading.Thread(target=wait, name="lifeline", daemon=True).start()
 
@@ -326,20 +336,23 @@ def _words(error: BaseException) -> str:
 
 
 def run_one(task: Task) -> Result:
-    """Do one run, in virtual time, with the simulated robot in this process.
+    """Do one run in virtual time, with the simulated robot in this process.
 
-    Blocks: until it has ended.
+    Blocks: until the run has ended.
     """
+    # Missions may print, and the command prints results to standard output. Redirecting it affects
+    # all threads, so it is not done where an executor runs this in several.
     quiet: Any = contextlib.nullcontext()
     if threading.current_thread() is threading.main_thread():
         quiet = contextlib.redirect_stdout(io.StringIO())
     try:
         with quiet, contextlib.ExitStack() as stack:
             here = task
-            if not task.file.parent.is_dir():  # another computer
+            if not task.file.parent.is_dir():  # on another computer
                 folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="smachpy-run-"))
                 here = replace(task, file=Path(folder) / task.file.name)
-            stack.callback(random.setstate, random.getstate())  # of a program that runs it here
+            # An executor of threads runs this in the caller's process: restore its `random`.
+            stack.callback(random.setstate, random.getstate())
             random.seed(task.seed)
             outcome, error = _execute(here)
             recording = b"" if here is task else here.file.read_bytes()
@@ -349,10 +362,12 @@ def run_one(task: Task) -> Result:
 
 
 def _execute(task: Task) -> tuple[str | None, str]:
-    """Do a run; return its outcome, or None and why it was ended."""
+    """Do a run; return its outcome and "", or None and the reason for ending it."""
     target = load_target(task.mission)
+    # Sort the values into parameters of the robot and arguments of the mission. A key that both
+    # have is the mission's; the mission is built for its keys only if there is such a doubt.
     own = {*parameters_of(target.thing)}
-    if not own and task.values.keys() & SHORT.keys():  # the mission's key comes before the robot's
+    if not own and task.values.keys() & SHORT.keys():
         own = {*describe(target.build()).input_keys}
     robot = _robot_parameters()
     robot_values = {
@@ -377,11 +392,12 @@ def _execute(task: Task) -> tuple[str | None, str]:
             open_surroundings(Pace(virtual=True, seed=task.seed), options, NO_NAMES, "")
         )
         machine = build(target, inputs)
+        # Servers that the mission itself starts are not there yet: wait only for the others.
         needed = needed_servers(describe(machine))
         others = {name: needed[name] for name in needed.keys() - set(info.serves)}
         surroundings.start(machine, others)
         if not surroundings.wait(SERVER_TIMEOUT_S):
-            raise MissionError("the program is to end")
+            raise MissionError("the program was asked to end")
         with Recorder(task.file, machine), _limited(machine, task.limit) as limit:
             outcome = machine.execute()
         surroundings.over()
@@ -389,14 +405,14 @@ def _execute(task: Task) -> tuple[str | None, str]:
 
 
 class _Limit:
-    """Preempts a machine that does not end.
+    """Preempts a machine that does not end by itself.
 
     Args:
         machine: The machine.
         seconds: Virtual time that it may take [s].
 
     Attributes:
-        reached: Why it was preempted, in words; None: it was not.
+        reached: The reason for the preempt; None without one.
     """
 
     def __init__(self, machine: Container, seconds: float) -> None:
@@ -408,11 +424,11 @@ class _Limit:
         self._newest = "no state"
 
     def on_time(self) -> None:
-        """Take the end of its time."""
+        """End the run: its virtual time is over."""
         self._end(f"had not ended after {self._seconds:g} s of virtual time")
 
     def on_event(self, event: Event) -> None:
-        """Count events of one instant, and note what runs."""
+        """Count events at one instant, and keep track of the running states."""
         if isinstance(event, (Left, Failed)):
             self._active.pop(event.path, None)
             self._newest = event.path
@@ -425,10 +441,7 @@ class _Limit:
 
     def _end(self, why: str) -> None:
         if self.reached is None:
-            leaves = [
-                p for p in self._active if not any(q.startswith(f"{p}/") for q in self._active)
-            ]
-            self.reached = f"{why}; it was in {', '.join(leaves) or self._newest}"
+            self.reached = f"{why}; it was in {', '.join(innermost(self._active)) or self._newest}"
             with asking("program", "smachpy simulate", "its time is over"):
                 self._machine.request_preempt()
 

@@ -1,4 +1,4 @@
-"""`smachpy simulate`: many runs of a mission in virtual time."""
+"""`smachpy simulate`: does many runs of a mission in virtual time."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ EXAMPLES = """examples:
   smachpy simulate patrol --runs 10000 --executor my_cluster:executor
 """
 MOST_RUNS = 100_000
-LIMIT_S = 4 * 3600.0
 MOST_FAILURES = 5
+"""Failed runs that are described in the output."""
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -40,14 +40,14 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "simulate",
         help="do many runs of a mission in virtual time",
         description="Do many runs of a mission with the simulated robot, in virtual time and in "
-        "parallel, with values that vary. Exit codes: 0 all runs ended, 1 some raised or did not "
-        "end, 2 bad input.",
+        "parallel, with varying values. Exit codes: 0 all runs ended, 1 some raised an exception "
+        "or did not end, 2 bad input.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("mission", metavar="MISSION", help="as `smachpy run` takes it")
+    parser.add_argument("mission", metavar="MISSION", help="as for `smachpy run`")
     parser.add_argument(
-        "--runs", type=_count, default=20, metavar="N", help="how many (default: %(default)s)"
+        "--runs", type=_count, default=20, metavar="N", help="number of runs (default: %(default)s)"
     )
     parser.add_argument(
         "--vary",
@@ -59,38 +59,41 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "KEY=ONE,OTHER; may be repeated",
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="the same seed, the same runs (default: %(default)s)"
+        "--seed",
+        type=int,
+        default=1,
+        help="the same seed makes the same runs (default: %(default)s)",
     )
     parser.add_argument(
-        "--jobs", type=_count, metavar="N", help="runs at the same time (default: one a core)"
+        "--jobs", type=_count, metavar="N", help="runs at the same time (default: one per core)"
     )
     parser.add_argument(
         "--limit",
         type=time_span,
-        default=LIMIT_S,
+        default="4h",
         metavar="TIME",
-        help="virtual time that a run may take: 30s, 10m, 2h; it is preempted then, and named "
-        "(default: 4h)",
+        help="virtual time after which a run is preempted and reported, such as 30s, 10m or 2h "
+        "(default: %(default)s)",
     )
     parser.add_argument(
         "--executor",
         metavar="MODULE:FUNCTION",
-        help="what returns the concurrent.futures.Executor that does the runs, of a cluster, say "
-        "(default: processes of this computer)",
+        help="a function that returns the concurrent.futures.Executor for the runs, such as that "
+        "of a cluster (default: processes on this computer)",
     )
-    parser.add_argument("--json", action="store_true", help="for programs: an object a run")
+    parser.add_argument("--json", action="store_true", help="one JSON object per run, for programs")
     parser.add_argument(
         "--record", type=Path, metavar="DIR", help="keep the recordings in this new folder"
     )
     parser.add_argument(
-        "--compare", metavar="DIR", help="recordings of earlier runs: what differs from them"
+        "--compare", metavar="DIR", help="recordings of earlier runs, to list what differs"
     )
     parser.add_argument(
         "-o",
         "--output",
         type=Path,
         metavar="FILE",
-        help="a report (.html), or the machine with all runs as a picture (svg, png, pdf)",
+        help="a report (.html), or a picture of the machine with the statistics (svg, png, pdf)",
     )
     parser.set_defaults(run=_run)
 
@@ -123,7 +126,7 @@ def _run(args: argparse.Namespace) -> int:
         if any(args.record.iterdir()):
             raise UsageError(
                 f"smachpy simulate: --record {str(args.record)!r}: got a folder that is not empty; "
-                "expected a new one, runs are never overwritten."
+                "expected a new one: runs are never overwritten."
             )
     except OSError as error:
         raise UsageError(
@@ -133,7 +136,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _end(number: int, _frame: object) -> None:
-    """End as Ctrl-C does: processes are ended, and files that nobody asked for are removed."""
+    """Raise an exception, as Ctrl-C does, so that processes end and temporary files are removed."""
     raise SystemExit(128 + number)
 
 
@@ -158,7 +161,7 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
         print_statistics(console(), runs.record, runs.statistics, 0)
         _print_varied(runs, values)
         for result in failed[:MOST_FAILURES]:
-            print(printable(f"run {result.task.number}: {_told(result)}"))
+            print(printable(f"run {result.task.number}: {_error_text(result)}"))
         if len(failed) > MOST_FAILURES:
             print(f"and {len(failed) - MOST_FAILURES} more")
         if before is not None:
@@ -169,20 +172,20 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
     return 1 if failed else 0
 
 
-def _told(result: Result) -> str:
+def _error_text(result: Result) -> str:
     chosen = ", ".join(f"{key}={value}" for key, value in result.task.values.items())
     return f"{result.error} ({chosen})" if chosen else result.error
 
 
 def _print_varied(runs: Runs, values: Any) -> None:
-    """Print how runs ended by what varied."""
+    """Print the outcomes by each varied value."""
     from viz.runs.report import by_quarter
 
     for key in dict.fromkeys(key for one in values.values() for key in one):
         print(printable(f"{key}:"))
         for words, ends in by_quarter(runs, values, key):
-            told = ", ".join(f"{outcome} x{n}" for outcome, n in ends.most_common())
-            print(printable(f"  {words:20} {told}"))
+            outcomes = ", ".join(f"{outcome} x{n}" for outcome, n in ends.most_common())
+            print(printable(f"  {words:20} {outcomes}"))
 
 
 def _write(output: Path, runs: Runs, before: Runs | None, values: Any) -> Path:
@@ -198,7 +201,7 @@ def _write(output: Path, runs: Runs, before: Runs | None, values: Any) -> Path:
 
 @contextlib.contextmanager
 def _executor(name: str | None) -> Iterator[Executor | None]:
-    """Make what does the runs; None: a pool of processes."""
+    """Call the user's function for an executor; None without one: the default pool."""
     if name is None:
         yield None
         return
@@ -223,7 +226,7 @@ def _executor(name: str | None) -> Iterator[Executor | None]:
 
 
 class _Progress:
-    """A line that counts the runs that have ended, in a terminal, or one for each as JSON."""
+    """Shows in a terminal how many runs have ended, or prints one line of JSON per run."""
 
     def __init__(self, runs: int, *, as_json: bool) -> None:
         self._runs = runs
@@ -232,19 +235,24 @@ class _Progress:
         self._shown = sys.stderr.isatty() and not as_json
 
     def on_result(self, result: Result) -> None:
-        """Count one."""
+        """Count an ended run."""
         self._done += 1
         if self._json:
             task = result.task
-            facts = {"run": task.number, "outcome": result.outcome, "error": result.error}
-            told = {**facts, "values": dict(task.values), "seed": task.seed}
-            print(json.dumps(told), flush=True)
+            facts: dict[str, Any] = {
+                "run": task.number,
+                "outcome": result.outcome,
+                "error": result.error,
+                "values": dict(task.values),
+                "seed": task.seed,
+            }
+            print(json.dumps(facts), flush=True)
         if self._shown:
             sys.stderr.write(f"\r{self._done} of {self._runs} runs")
             sys.stderr.flush()
 
     def end(self) -> None:
-        """Wipe the line."""
+        """Remove the line from the terminal."""
         if self._shown:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()

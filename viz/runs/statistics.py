@@ -1,4 +1,4 @@
-"""What recorded runs add up to, and how two sets of them differ."""
+"""Counts visits, outcomes and durations over recorded runs."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class StateStatistics:
     """One state over all runs.
 
     Attributes:
-        durations: Of finished visits [s].
-        outcomes: Times each outcome ended it.
-        visits: Times it was entered.
-        retries: Times it was tried again.
-        kind: "monitor", ...: what a monitor finds, 'invalid' too, is no failure.
+        visits: Number of visits.
+        durations: Durations of the ended visits [s].
+        outcomes: Number of visits that ended with each outcome.
+        retries: Number of repeated attempts.
+        kind: Kind of a state that only observes, such as "monitor": its 'invalid' is not a failure.
     """
 
     visits: int = 0
@@ -39,13 +39,13 @@ class StateStatistics:
     kind: str = ""
 
     def failures(self) -> float:
-        """Return the share of visits that failed or raised, 0 to 1."""
+        """Return the share of ended visits that failed or raised, 0 to 1."""
         ended = sum(self.outcomes.values())
         bad = sum(n for out, n in self.outcomes.items() if end_class(self.kind, out) == "failure")
         return bad / ended if ended else 0.0
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return this as plain data."""
         return {
             "visits": self.visits,
             "outcomes": self.outcomes,
@@ -63,9 +63,9 @@ class Statistics:
 
     Attributes:
         runs: Number of runs.
-        outcomes: How they ended.
-        durations: How long they took [s].
-        states: By path.
+        outcomes: Number of runs that ended with each outcome.
+        durations: Durations of the ended runs [s].
+        states: Statistics of each state, by path.
     """
 
     runs: int = 0
@@ -74,7 +74,7 @@ class Statistics:
     states: dict[str, StateStatistics] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return this as plain data."""
         return {
             "runs": self.runs,
             "outcomes": self.outcomes,
@@ -84,11 +84,11 @@ class Statistics:
         }
 
     def add(self, events: Iterable[dict[str, Any]], record: StateRecord | None = None) -> None:
-        """Count the events of one file; `record` is its machine, which says what only watches."""
+        """Add the events of one file; `record`, its machine, tells which states only observe."""
         for one in () if record is None else record.walk():
             if one.kind in WATCHING:
                 self._state(one.path).kind = one.kind
-        since: dict[str, int] = {}
+        since: dict[str, int] = {}  # start of each running visit [ns], by path
         newest: dict[str, tuple[int, str]] = {}  # end and outcome of each state's newest visit
         for event in events:
             kind, path, stamp = event["kind"], event["path"], event["stamp_ns"]
@@ -114,8 +114,13 @@ class Statistics:
     def _recover(
         self, event: dict[str, Any], since: dict[str, int], newest: dict[str, tuple[int, str]]
     ) -> None:
-        """Another process goes on with the run, and with what the end of the first one ended."""
+        """Continue the counting after another process has resumed the run.
+
+        The process that went away may have recorded ends of visits that its shutdown caused; they
+        are taken back if the resumed mission is still in those visits.
+        """
         root, active = event["path"], dict(event["active"])
+        # A file that begins with the resumption has no Started event for this run.
         self.runs += root not in since and root not in newest
         for path in [path for path in since if path not in active]:
             del since[path]
@@ -125,13 +130,13 @@ class Statistics:
             since[path] = began
             stamp, outcome = newest.pop(path, (-1, ""))
             state = self._state(path)
-            if stamp < began:
+            if stamp < began:  # the beginning of this visit is not in the file
                 state.visits += 1
                 continue
-            _take_back(state.outcomes, outcome)
+            _decrement(state.outcomes, outcome)
             del state.durations[-1:]
             if path == root:
-                _take_back(self.outcomes, outcome)
+                _decrement(self.outcomes, outcome)
                 del self.durations[-1:]
 
     def _state(self, path: str) -> StateStatistics:
@@ -140,21 +145,19 @@ class Statistics:
         return self.states[path]
 
 
-def _take_back(outcomes: dict[str, int], outcome: str) -> None:
+def _decrement(outcomes: dict[str, int], outcome: str) -> None:
     outcomes[outcome] -= 1
     if not outcomes[outcome]:
         del outcomes[outcome]
 
 
-ROUNDING = 1e-9  # 0.95 * 20 is a little more than 19
-
-
 def quantile(values: Sequence[float], share: float) -> float | None:
-    """Return the smallest value that `share` of the values do not exceed; None of none."""
+    """Return the smallest value that `share` of the values do not exceed; None without values."""
     if not values:
         return None
     ordered = sorted(values)
-    rank = math.ceil(share * len(ordered) - ROUNDING)
+    # Products such as 0.55 * 20 are slightly above the whole number, and ceil would add one.
+    rank = math.ceil(share * len(ordered) - 1e-9)
     return ordered[max(rank, 1) - 1]
 
 
@@ -163,8 +166,8 @@ class Counted(NamedTuple):
 
     Attributes:
         record: The machine as it was in its last recording.
-        statistics: What all of them add up to.
-        dropped: Events that are missing in them.
+        statistics: The statistics of all runs.
+        dropped: Number of events missing in the recordings.
     """
 
     record: StateRecord
@@ -173,7 +176,7 @@ class Counted(NamedTuple):
 
 
 def count_by_machine(recordings: Iterable[Recording]) -> dict[str, Counted]:
-    """Count recordings by the machine's label; none is kept longer than until the next comes."""
+    """Return the statistics by machine label; recordings are not kept in memory."""
     found: dict[str, Counted] = {}
     for recording in recordings:
         label = recording.record.label
@@ -186,7 +189,7 @@ def count_by_machine(recordings: Iterable[Recording]) -> dict[str, Counted]:
 
 
 def never_taken(record: StateRecord, statistics: Statistics) -> list[tuple[str, str]]:
-    """Return the written transitions that no run has taken, as pairs (path, outcome)."""
+    """Return the explicit transitions that no run has taken, as pairs (path, outcome)."""
     return [
         (f"{container.path}/{edge.source}", edge.outcome)
         for container in record.walk()
@@ -201,13 +204,13 @@ def _taken(statistics: Statistics, path: str, edge: Any) -> bool:
 
 
 def marks_of(statistics: Statistics, record: StateRecord, *, heat: str = "time") -> Marks:
-    """Return what recorded runs leave on a picture of their machine.
+    """Return the marks for drawing statistics on a picture of the machine.
 
     Args:
-        statistics: Of the runs.
-        record: The machine; states of other names are left out.
-        heat: What makes a state hot: `time`, its share of all time spent in states that have no
-            states inside, against the greatest; or `failures`, the share of its visits that failed.
+        statistics: The statistics of the runs.
+        record: The machine; states that it does not have are left out.
+        heat: How warm leaves are drawn: `time`, by the time spent in them relative to the leaf
+            with the most; `failures`, by the share of their visits that failed.
     """
     there = {state.path: state for state in record.walk()}
     states = {path: s for path, s in statistics.states.items() if path in there}
@@ -235,14 +238,15 @@ def _note(state: StateStatistics) -> str:
 
 
 LEAST_SHARE = 0.005
+"""Smaller shares of failures would be shown as 0 % and are left out."""
 SLOWER = 1.2
-"""Medians that differ by less than this factor are no change."""
-
+"""Medians that differ by less than this factor count as equal."""
 LEAST_S = 0.005
+"""Medians that differ by less than this count as equal [s]."""
 
 
 def moved_states(old: StateRecord, new: StateRecord) -> list[tuple[str, str]]:
-    """Return pairs (old path, new path), from the root, of states that are elsewhere now."""
+    """Return pairs (old path, new path), relative to the root, of states that have moved."""
     before = {state.path.removeprefix(old.path): state for state in old.walk()}
     after = {state.path.removeprefix(new.path): state for state in new.walk()}
     fresh = [path for path in after if path not in before]
@@ -262,33 +266,33 @@ def moved_states(old: StateRecord, new: StateRecord) -> list[tuple[str, str]]:
 
 
 def _states_below(record: StateRecord) -> set[tuple[str, str]]:
-    """Path from the root and kind of all states."""
+    """The path relative to the root, and the kind, of each state."""
     return {(state.path.removeprefix(record.path), state.kind) for state in record.walk()}
 
 
 class StatisticsOfFiles:
-    """Counts recorded runs by machine, when they are asked for.
+    """Statistics of recorded runs by machine; the files are read on first use.
 
     Args:
         places: Files and folders.
 
     Raises:
-        RecordingError: there is no such file or folder.
+        RecordingError: a file or folder does not exist.
 
     Threads: every method may be called from any thread.
     """
 
     def __init__(self, places: Iterable[str | Path]) -> None:
         self._places = list(places)
-        find_recordings(self._places)
+        find_recordings(self._places)  # a wrong path is reported at once, not on first use
         self._lock = threading.Lock()
         self._found: dict[str, Counted] | None = None
 
     def of(self, record: StateRecord) -> dict[str, Any] | None:
-        """Return the statistics of a machine; None when there are no runs of it.
+        """Return the statistics of a machine; None if it has no runs.
 
-        Its runs are those of its name, else those of a machine with the same states, which may
-        be shown under another name ("/SM_ROOT"); paths are those of `record`.
+        Runs are found by the machine's name, otherwise by the same states: SMACH's introspection
+        can show a machine under another name ("/SM_ROOT"). Paths are those of `record`.
 
         Raises:
             RecordingError: a file cannot be read.
@@ -299,16 +303,16 @@ class StatisticsOfFiles:
         states = _states_below(record)
         for recorded, statistics, _ in found.values():
             if _states_below(recorded) == states:
-                told = statistics.to_json()
-                told["states"] = {
+                renamed = statistics.to_json()
+                renamed["states"] = {
                     record.path + path.removeprefix(recorded.path): numbers
-                    for path, numbers in told["states"].items()
+                    for path, numbers in renamed["states"].items()
                 }
-                return told
+                return renamed
         return None
 
     def counted(self) -> dict[str, Statistics]:
-        """Return the statistics by machine; raises as `of`."""
+        """Return the statistics by machine label; raises as `of`."""
         return {label: counted.statistics for label, counted in self._read().items()}
 
     def _read(self) -> dict[str, Counted]:

@@ -34,7 +34,7 @@ from rich.text import Text
 
 from actionlib_core.clock import current_clock
 from viz.model.history import History
-from viz.model.labels import GLYPHS, shorten
+from viz.model.labels import GLYPHS, innermost, shorten
 from viz.model.progress import progress_of, seconds_left, written_progress
 from viz.terminal.lines import NARROW, RUNNING, STYLES, EventLines
 
@@ -232,11 +232,7 @@ class TerminalView:
     def _running(self) -> list[tuple[str, float]]:
         """Return the running states that contain no other running state."""
         active = self.history.active()
-        return [
-            (path, since)
-            for path, since in active.items()
-            if not any(other.startswith(path + "/") for other in active)
-        ]
+        return [(path, active[path]) for path in innermost(active)]
 
     def _active(self, path: str, seconds: float) -> Text:
         names = [shorten(name) for name in path.strip("/").split("/")]

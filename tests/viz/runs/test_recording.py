@@ -510,7 +510,7 @@ def test_mcap_leaves_out_what_was_cut(record, tmp_path, caplog):
         caplog.text
     )
     assert "left out: too long to be recorded: a string." in caplog.text
-    assert "left out: no bytes: b'" in caplog.text
+    assert "left out: not bytes: b'" in caplog.text
     assert "left out: too long to be recorded: mcap_test_msgs/PhotoGoal." in caplog.text
 
 

@@ -188,7 +188,7 @@ def test_an_unknown_key_names_the_known_ones(job, tmp_path, key):
 
 
 def test_the_robot_of_a_world_is_the_worlds(tmp_path):
-    with pytest.raises(SmachError, match="plays in a world"):
+    with pytest.raises(SmachError, match="runs in its own world"):
         Plan("delivery", 2, tmp_path, [Vary.read("battery=0..1")]).tasks()
 
 
