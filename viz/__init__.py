@@ -1,6 +1,6 @@
 """Pictures of state machines: files, notebooks, the terminal.
 
-Reads nothing but introspection records (`smachpy.introspection`) and events (`smachpy.events`).
+Uses only introspection records (`smachpy.introspection`) and events (`smachpy.events`).
 
     import viz
 
@@ -8,10 +8,10 @@ Reads nothing but introspection records (`smachpy.introspection`) and events (`s
     history = viz.History()
     machine.subscribe(history.on_event)
     machine.execute()
-    viz.render(machine, "run.svg", run=history)  # with what the run visited and took
+    viz.render(machine, "run.svg", run=history)  # with the visits and transitions of the run
 
-`render` and `picture` draw one picture, `atlas` one page per container, `svg` the text a notebook
-shows. `TerminalView` shows a run while it happens, `MachineWidget` does so in a notebook.
+`render` and `picture` draw one picture, `atlas` one page per container, and `svg` returns the text
+for a notebook. `TerminalView` shows a run while it happens, `MachineWidget` does so in a notebook.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ _HOMES = {
 }
 
 
+# Imported on first use: `import viz` must not need the packages of every extra.
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'viz' has no attribute {name!r}")

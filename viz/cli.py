@@ -1,4 +1,4 @@
-"""`smachpy render`: a machine as a picture."""
+"""`smachpy render`: draws a machine as a picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EXAMPLES = """examples:
   smachpy render my_robot.missions:deliver -o deliver.png --theme dark --depth 2
   smachpy render mission.py -o - --active /MISSION/DRIVE > mission.svg
   smachpy render mission.py --atlas pages/
-  smachpy render patrol -o patrol.svg --runs runs/    with the numbers of recorded runs
+  smachpy render patrol -o patrol.svg --runs runs/    with the statistics of recorded runs
 """
 
 
@@ -40,7 +40,10 @@ def register_render(
         help="a mission's name, module:factory, path.py[:factory], plan.pnml, or a record as .json",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", help=f"the ending names the format: {FORMATS}; - is svg"
+        "-o",
+        "--output",
+        metavar="FILE",
+        help=f"its extension chooses the format: {FORMATS}; - writes svg to standard output",
     )
     parser.add_argument("--depth", type=_depth, metavar="N", help="container levels to open")
     parser.add_argument("--path", metavar="/A/B", help="draw only this container")
@@ -53,11 +56,11 @@ def register_render(
         help="mark these states as running",
     )
     parser.add_argument(
-        "--show-implicit", action="store_true", help="draw transitions nobody wrote down as well"
+        "--show-implicit", action="store_true", help="also draw implicit transitions"
     )
     parser.add_argument("--theme", choices=("light", "dark"), default="light")
     parser.add_argument(
-        "--atlas", metavar="DIR", help="one linked SVG page per container, from index.svg"
+        "--atlas", metavar="DIR", help="write linked SVG pages, one per container, and index.svg"
     )
     parser.add_argument(
         "--runs",
@@ -70,7 +73,7 @@ def register_render(
         "--heat",
         choices=("time", "failures"),
         default="time",
-        help="what colours the states of --runs (default: %(default)s)",
+        help="the statistic of --runs by which states are coloured (default: %(default)s)",
     )
     add_ros1_options(parser, loads=True)
     parser.set_defaults(run=_run)
@@ -88,7 +91,7 @@ def _run(args: argparse.Namespace) -> int:
 
     if not args.output and not args.atlas:
         raise UsageError(
-            "smachpy render: got neither -o nor --atlas; expected where to draw. "
+            "smachpy render: got neither -o nor --atlas; expected one of them. "
             f"Try -o {Path(args.target).stem or 'machine'}.svg"
         )
     record = read_record(args.target, args)
@@ -118,16 +121,16 @@ def _statistics(args: argparse.Namespace, record: StateRecord) -> Statistics:
 
     counted = StatisticsOfFiles(args.runs).counted()
     if record.label not in counted:
-        there = ", ".join(map(repr, counted)) or "no recordings"
+        found = ", ".join(map(repr, counted)) or "no machine"
         raise UsageError(
-            f"smachpy render: --runs: got runs of {there}; expected some of {record.label!r}. "
+            f"smachpy render: --runs: got runs of {found}; expected some of {record.label!r}. "
             f"Try: smachpy run {args.target} --record {args.runs[0]}/1.jsonl"
         )
     return counted[record.label]
 
 
 def _legend(statistics: Statistics, heat: str) -> tuple[tuple[str, str], ...]:
-    """What the numbers and colours of recorded runs mean, for the picture."""
+    """The legend for the statistics in the picture."""
     ends = ", ".join(f"{outcome} \u00d7{n}" for outcome, n in statistics.outcomes.items())
     words = {"time": "the longer in all", "failures": "the more failed"}[heat]
     return (
@@ -138,15 +141,15 @@ def _legend(statistics: Statistics, heat: str) -> tuple[tuple[str, str], ...]:
 
 
 def read_record(text: str, args: argparse.Namespace | None = None) -> StateRecord:
-    """Return the record of a machine that can be loaded, or one that was written down.
+    """Return the record of a machine, or read one from a .json file.
 
     Args:
-        text: What the user named.
-        args: The command line, which may say that it is a script for ROS 1.
+        text: The machine or file, as given by the user.
+        args: The command line, if it has the options for ROS 1 scripts.
 
     Raises:
-        UsageError: there is no such file, or it is no record.
-        SmachError: the target cannot be loaded.
+        UsageError: the file does not exist, or is not a record.
+        SmachError: the machine cannot be loaded.
     """
     from smachpy.command.ros1_options import load_any
     from smachpy.command.targets import load_target

@@ -1,13 +1,13 @@
-"""A running machine in a notebook: a picture that follows it.
+"""Shows a running machine in a notebook.
 
     import viz
 
     viz.MachineWidget(machine)      # as the last line of a cell
 
-    machine.execute()               # in the next one: the picture above follows
+    machine.execute()               # in the next cell: the picture above is updated
 
-It is an anywidget, for Jupyter, VS Code, Colab and marimo; `viz.svg` is a picture that stays as it
-is.
+The widget is an anywidget, for Jupyter, VS Code, Colab and marimo. `viz.svg` is a picture that is
+not updated.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 MOST_NAMES: Final = 6
 CLOSE_S: Final = 2.0
 
-# As an image an SVG runs no script and loads nothing, whatever names are in it.
+# In an <img> an SVG runs no scripts and loads no files, whatever names are in it.
 ESM: Final = """
 function render({ model, el }) {
   const picture = document.createElement("img");
@@ -67,24 +67,24 @@ export default { render };
 
 
 class MachineWidget(anywidget.AnyWidget):
-    """Shows a machine of this process, and where it is while it runs.
+    """Shows a machine of this process and its running states.
 
     Args:
-        machine: The machine; its next runs are shown, until `close`.
+        machine: The machine; its runs are shown until `close`.
         theme: "light" or "dark".
-        depth: So many levels are open; None: all.
+        depth: Number of open levels; None for all.
         interval: Shortest time between two pictures [s].
 
     Attributes:
         picture: The newest picture, as SVG.
-        status: Where the machine is, in words; or why there is no newer picture.
+        status: The running states or the outcome; or why there is no newer picture.
 
     Raises:
-        PictureError: `interval` is no time, or there is no such theme.
-        EngineError: there is no `dot`.
+        PictureError: `interval` is not a positive time, or there is no such theme.
+        EngineError: `dot` is not available.
 
-    Threads: pictures are drawn in a thread of their own, which is there only while something
-        happens; the machine only notes its events.
+    Threads: pictures are drawn in another thread, which exists only while there are events; the
+        machine's threads only add their events to the history.
     """
 
     _esm = ESM
@@ -108,19 +108,19 @@ class MachineWidget(anywidget.AnyWidget):
         self._looks: dict[str, Any] = {"theme": theme, "depth": depth}
         self._interval = interval
         self._history = History()
-        self._clock = RealClock()  # people look in real time
+        self._clock = RealClock()  # `interval` is for people, also if the machine's time is virtual
         self._executor = SerialExecutor(self._clock, "pictures of a notebook")
         self._lock = threading.Lock()
-        self._is_due = False
+        self._is_due = False  # whether a drawing is submitted that has not begun
         self._draw()
         self._forget = machine.subscribe(self._on_event)
 
     def close(self) -> None:
-        """Follow the machine no more; a second call does nothing.
+        """Stop showing the machine; a second call does nothing.
 
-        Blocks: until the picture that is being drawn is done, 2 s at most.
+        Blocks: until the picture that is being drawn is finished, at most 2 s.
         """
-        if self._forget is not None:  # ipywidgets closes one too whose making raised
+        if self._forget is not None:  # ipywidgets also closes a widget whose __init__ raised
             self._forget()
         if self._executor is not None:
             self._executor.join(CLOSE_S)
@@ -136,12 +136,12 @@ class MachineWidget(anywidget.AnyWidget):
             self._executor.submit(self._follow)
 
     def _follow(self) -> None:
-        """Draw what has happened, and leave the machine alone for a while."""
-        with self._lock:
+        """Draw the newest state, then wait: events meanwhile make one further drawing."""
+        with self._lock:  # cleared before drawing: an event during it is not in the picture
             self._is_due = False
         try:
             self._draw()
-        except SmachError as error:  # shown: there is nobody else to tell
+        except SmachError as error:  # shown, because nobody calls this thread's function
             self.status = str(error)
         self._clock.sleep(self._interval)
 
@@ -152,7 +152,7 @@ class MachineWidget(anywidget.AnyWidget):
 
 
 def _status(history: History) -> str:
-    """Return where a machine is, in words."""
+    """Return the running states, or the outcome, as text."""
     if leaves := innermost(history.active()):
         names = [shorten(path.rpartition("/")[2]) for path in leaves[:MOST_NAMES]]
         more = len(leaves) - len(names)

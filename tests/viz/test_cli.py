@@ -73,7 +73,7 @@ def test_the_atlas_is_written_and_its_index_named(mission, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "expected where to draw. Try -o drawn_mission.svg"),
+        ([], "expected one of them. Try -o drawn_mission.svg"),
         (["-o", "m.bmp"], "format: got 'bmp'"),
         (["-o", "m.svg", "--path", "/TOP/C"], "no state '/TOP/C'"),
         (["-o", "m.svg", "--active", "X"], "no state 'X'"),

@@ -1,8 +1,13 @@
-"""The live page: every running machine on the network, in a browser.
+"""The live viewer: shows every running machine on the network in a browser or a terminal.
 
-machines    what is known of each machine, and who wants to hear of it
-network     finds machines and keeps their links
-app         what a browser may ask for
-security    who may ask for it
-page        the files and models that a page is made of
+network      finds machines and receives their events
+machines     the events and structure of each machine, and listeners for changes
+runs         the list of live and recorded runs; `journals` adds durable missions
+actions      the actions on the network, and goals sent from the page; `forms` describes goals
+simulations  batches of simulated runs, started from the page
+app          the HTTP interface; `server` serves it, `security` protects it
+assets       the files and data of the page
+process      `smachpy view` as a child process
+tui          the same in a terminal
+cli          `smachpy view`
 """

@@ -1,6 +1,6 @@
-"""Actions on the network for the page: which there are, what their goals hold, and goals from here.
+"""Lists the actions on the network for the page, describes their goals and sends goals to them.
 
-The page's counterpart of ROS's axclient. Only goals that were sent from here are followed.
+The page's counterpart of ROS's axclient. Only goals that were sent from here are shown.
 """
 
 from __future__ import annotations
@@ -33,25 +33,28 @@ if TYPE_CHECKING:
 logger = logging.getLogger("viz.live")
 
 KEPT_GOALS = 30
-"""So many goals are remembered; those that have ended go first."""
+"""Goals that are kept; the oldest ended ones are dropped first."""
 
 MOST_RUNNING = 20
-"""So many goals may run at the same time; a page that sends more has gone astray."""
+"""Goals that may run at the same time; more can only be a mistake."""
 
 SERVER_S = 2.0
+"""Longest wait for the connection to a server [s]."""
 LONGEST_TEXT = 200_000
+"""Length of a goal as YAML [characters]."""
 SHOWN = 20_000
-"""Characters of feedback and result that are sent to the page."""
+"""Length of feedback and result on the page [characters]."""
 
 INTERFACES = "smachpy.interfaces"
-"""Entry points of modules that make interface definitions known when they are imported."""
+"""Group of entry points: modules that define interfaces when they are imported."""
 
 
 class GoalRefusedError(SmachError):
-    """A goal that was not sent, or cannot be cancelled.
+    """A goal was not sent, or cannot be cancelled.
 
     Attributes:
-        problems: By field: `path` ("$.target_pose.header", "" for the whole) and `text`.
+        problems: For each: `path` of the field ("$.target_pose.header", "" for the whole goal) and
+            `text`.
     """
 
     def __init__(self, text: str, problems: list[dict[str, str]] | None = None) -> None:
@@ -61,7 +64,7 @@ class GoalRefusedError(SmachError):
 
 @dataclass(slots=True)
 class SentAction:
-    """One goal that was sent from here."""
+    """A goal that was sent from here."""
 
     id: str
     action: str
@@ -73,15 +76,15 @@ class SentAction:
     status: str = "PENDING"
     text: str = ""
     ended_ns: int | None = None
-    heard: int = 0
-    first: Any = None
+    heard: int = 0  # number of feedback messages
+    first: Any = None  # first feedback: progress of a distance is measured from it
     feedback: Any = None
     result: Any = None
     cancelled: bool = False
-    texts: dict[str, str] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)  # feedback and result for the page
 
     def to_json(self) -> dict[str, Any]:
-        """Return what the page shows."""
+        """Return the goal for the page."""
         progress = progress_of(self.goal, self.feedback, self.first)
         return {
             "id": self.id,
@@ -101,13 +104,13 @@ class SentAction:
 
 
 class Actions:
-    """Knows the actions on the network, or on several, and sends goals to them.
+    """Finds the actions on one or several networks and sends goals to them.
 
-    An action that is called as one of another network has a number after its name.
+    An action whose name is taken by an action of another network gets a number after its name.
 
     Args:
-        node: Where; `join` adds others.
-        on_change: Called when there is something new to show.
+        node: The node on the first network; `join` adds others.
+        on_change: Called after every change.
 
     Threads: every method may be called from any thread; `on_change` is called from any.
     """
@@ -116,8 +119,10 @@ class Actions:
         self._node = node
         self._on_change = on_change
         self._lock = threading.Lock()
+        # By displayed name; the servers of an action by the key of their token. An action whose
+        # servers are all gone stays with an empty dict, so that the page can name it.
         self._servers: dict[str, dict[str, Endpoint]] = {}
-        self._nodes: dict[str, Node] = {}  # by the name that is shown
+        self._nodes: dict[str, Node] = {}
         self._goals: dict[str, SentAction] = {}
         self._clients: dict[tuple[Node, str, str], ActionClient[Any]] = {}
         self._searched = False
@@ -126,7 +131,7 @@ class Actions:
         self.join(node)
 
     def join(self, node: Node) -> None:
-        """Look where `node` is too, and at the ROS 2 robots of its configuration.
+        """Also find the actions on a node's network, and of the ROS 2 robots in its configuration.
 
         Raises:
             TransportError: a robot's router cannot be reached.
@@ -141,7 +146,7 @@ class Actions:
             self._watches[node] += watch_ends(node, partial(self._on_end, node))
 
     def leave(self, node: Node) -> None:
-        """Look where `node` is no more."""
+        """Forget the actions on a node's network."""
         for watch in self._watches.pop(node):
             watch.close()
         with self._lock:
@@ -153,11 +158,11 @@ class Actions:
         self._changed()
 
     def listen(self, on_change: Callable[[], object]) -> None:
-        """Call `on_change` from now on."""
+        """Set the function that is called after every change."""
         self._on_change = on_change
 
     def close(self) -> None:
-        """Leave the network; goals that run go on. A second call does nothing."""
+        """Leave the networks; running goals continue. A second call does nothing."""
         for watch in itertools.chain(*self._watches.values()):
             watch.close()
         with self._lock:
@@ -166,10 +171,10 @@ class Actions:
         for client in clients:
             client.stop()
 
-    # -- what there is ---------------------------------------------------------------------------
+    # -- actions ---------------------------------------------------------------------------------
 
     def summary(self) -> dict[str, Any]:
-        """Return the actions by name, names of those that are gone, the goals, newest first."""
+        """Return the actions by name, the names of those without servers, and the newest goals."""
         with self._lock:
             servers = {name: list(ends.values()) for name, ends in sorted(self._servers.items())}
             goals = [goal.to_json() for goal in reversed(self._goals.values())]
@@ -189,10 +194,10 @@ class Actions:
         }
 
     def definition(self, name: str) -> dict[str, Any]:
-        """Return what a form for a goal needs: fields, values, the same as YAML.
+        """Return the data for a goal's form: fields, default values, and the values as YAML.
 
         Raises:
-            GoalRefusedError: no server, or its type is not known here.
+            GoalRefusedError: there is no server, or its type is unknown here.
         """
         end = self._server(name)
         cls = self._goal_class(name, end)
@@ -207,10 +212,11 @@ class Actions:
         }
 
     def check(self, name: str, text: str) -> dict[str, Any]:
-        """Return a goal given as YAML as a form's values and as YAML with comments.
+        """Parse a goal from YAML; return it as values of a form and as YAML with comments.
 
         Raises:
-            GoalRefusedError: with the problems of every bad field; as `definition`.
+            GoalRefusedError: the goal is invalid, with the problems of each field; or as
+                `definition`.
         """
         goal = self._read(self._goal_class(name, self._server(name)), text)
         return {"values": values_of(goal), "yaml": yaml_of(goal)}
@@ -221,9 +227,9 @@ class Actions:
         """Send a goal given as YAML and return its id.
 
         Raises:
-            GoalRefusedError: as `check`; or the network refused it.
+            GoalRefusedError: as `check`; or it could not be sent.
 
-        Blocks: until the server has been found, 2 s at most.
+        Blocks: until the server has been found, at most 2 s.
         """
         end = self._server(name)
         goal = self._read(self._goal_class(name, end), text)
@@ -231,12 +237,13 @@ class Actions:
             running = sum(one.ended_ns is None for one in self._goals.values())
         if running >= MOST_RUNNING:
             raise GoalRefusedError(
-                f"{running} goals run already; expected fewer than {MOST_RUNNING}. Cancel some."
+                f"goals: got {running} running; expected fewer than {MOST_RUNNING}. Cancel some."
             )
         try:
             client = self._client(name, end)
             if not client.wait_for_server(SERVER_S):
                 raise GoalRefusedError(_gone(name))
+            # Made before the goal is sent: callbacks may come before `send_goal` returns its id.
             sent = SentAction("", name, end.type.removesuffix("Action"), goal, self._now())
             handle = client.send_goal(
                 goal,
@@ -253,10 +260,10 @@ class Actions:
         return sent.id
 
     def cancel(self, goal_id: str) -> None:
-        """Ask for the end of a goal; the answer comes as its status.
+        """Request the cancellation of a goal; its status shows the answer.
 
         Raises:
-            GoalRefusedError: no such goal, or it has ended.
+            GoalRefusedError: there is no such goal, or it has ended.
         """
         with self._lock:
             goal = self._goals.get(goal_id)
@@ -309,6 +316,7 @@ class Actions:
         if end.kind is not Kind.ACTION_SERVER:
             return
         with self._lock:
+            # The first of "name", "name (2)", ... that is free or belongs to this network.
             names = (f"{end.name} ({i})" if i > 1 else end.name for i in itertools.count(1))
             shown = next(name for name in names if self._nodes.setdefault(name, node) is node)
             servers = self._servers.setdefault(shown, {})
@@ -337,8 +345,8 @@ class Actions:
         return type(spec().action_goal.goal)
 
     def _action_class(self, name: str, end: Endpoint) -> Any:
-        """The class of an action, found here; servers do not send their definitions."""
-        if end.type.count("/") > 1:
+        """Find an action's class in this process; servers do not send their definitions."""
+        if end.type.count("/") > 1:  # package/action/Name of ROS 2
             return self._ros2_class(name, end)
         try:
             spec = get_action(end.type)
@@ -353,9 +361,8 @@ class Actions:
                 ) from error
         if spec._md5sum != end.md5:
             raise GoalRefusedError(
-                f"{end.type}: the definition here (md5 {spec._md5sum}) is not that of the server "
-                f"(md5 {end.md5}); expected the same. Try its version of the definition, in "
-                "SMACHPY_INTERFACE_PATH."
+                f"{end.type}: got md5 {spec._md5sum} of the definition here; expected that of the "
+                f"server, {end.md5}. Try its version of the definition, in SMACHPY_INTERFACE_PATH."
             )
         return spec
 
@@ -369,7 +376,7 @@ class Actions:
             raise GoalRefusedError(str(error)) from error
 
     def _search(self) -> None:
-        """Import what installed packages have registered, once."""
+        """Import the interfaces that installed packages have registered, once."""
         with self._lock:
             searched, self._searched = self._searched, True
         if searched:
@@ -377,7 +384,7 @@ class Actions:
         for point in entry_points(group=INTERFACES):
             try:
                 point.load()
-            except Exception:  # a package that is broken hides only its own definitions
+            except Exception:  # a broken package hides only its own definitions
                 logger.exception("interfaces of %s cannot be loaded", point.value)
 
     def _client(self, name: str, end: Endpoint) -> ActionClient[Any]:
@@ -410,5 +417,5 @@ def _gone(name: str) -> str:
 def _shown(message: Any) -> str:
     text = str(message)
     return (
-        text if len(text) <= SHOWN else f"{text[:SHOWN]}\n... {len(text) - SHOWN} characters more"
+        text if len(text) <= SHOWN else f"{text[:SHOWN]}\n... {len(text) - SHOWN} more characters"
     )

@@ -1,30 +1,31 @@
-"""What a browser may ask for: the page, the machines, their events, and to command them.
+"""The viewer's HTTP interface: the page, the machines, their events and commands.
 
     GET  /                    the page
-    GET  /api/events          everything about one machine as server-sent events:
-                              snap, gap, facts, machines, actions, observed (what the robot's
-                              topics told), beat (the time here [ms]), and unnamed batches of events
+    GET  /api/events          everything about one machine as server-sent events: settings, snap,
+                              gap, facts, machines, actions, observed (records of robot topics),
+                              beat (the server's time [ms]), and unnamed batches of events
+    GET  /api/machines        the machines
     GET  /api/model           structure of a machine
-    GET  /api/picture         svg, png, pdf or dot; `theme` and the paths that are `active`
+    GET  /api/picture         svg, png, pdf or dot, with `theme` and the `active` paths
     GET  /api/export          the run as .html or .jsonl
-    GET  /api/statistics      of recorded runs
+    GET  /api/statistics      statistics of recorded runs
     GET  /api/runs            live and past runs, for the home page
-    GET  /api/open            the name of the machine that shows one of them
-    GET  /api/why             why the newest run of a machine ended so
+    GET  /api/fleet           the live runs, with the data for a common map
+    GET  /api/open            the name of the machine that shows a run
+    GET  /api/why             the causes of the end of a machine's newest run
     GET  /api/compare         a machine and another one in one drawing
-    GET  /api/value           a value of userdata as it is now, whole
-    GET  /api/question        the picture of a question that a state asks
-    GET  /api/action          what a form for a goal of an action needs
+    GET  /api/value           the present value of a userdata key, unabridged
+    GET  /api/question        the picture of a question
+    GET  /api/action          the data for a goal's form
+    GET  /api/simulations     the missions that may be simulated, and the batches
+    GET  /api/report          the report of a batch, a page
     POST /api/control         a command, or the answer to a question
-    GET  /api/fleet           the live runs together, with what a map of all needs
-    GET  /api/simulations     what may be simulated, and the batches of runs that were started
-    GET  /api/report          the report of one, a page
-    POST /api/simulate        start a batch, or stop one
+    POST /api/action          check, send or cancel a goal
+    POST /api/simulate        start or stop a batch
     POST /api/mission         resume or cancel a durable mission
-    POST /api/action          check or send a goal, or cancel one
 
-Nothing here holds up a machine: a page is sent what it has not seen yet when it can take it, and
-one that is too far behind gets a snapshot instead.
+A slow page never delays a machine: each page gets the events that it has not seen when it can take
+them, and a page that is too far behind gets a snapshot instead.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 
 from smachpy.exceptions import SmachError
-from viz.live import assets as page
+from viz.live import assets
 from viz.live.actions import GoalRefusedError
 from viz.live.machines import KEPT_EVENTS
 from viz.live.runs import Runs
@@ -61,30 +62,32 @@ if TYPE_CHECKING:
     from viz.live.simulations import Simulations
 
 COALESCE_S = 0.004
-"""Events wait so long for others, besides what their link has gathered already."""
+"""Time to wait for further events before a message, besides that of the link [s]."""
 
 LIST_S = 0.5
+"""Shortest time between two lists of machines [s]."""
+
 ACTIONS_S = 0.15
-"""Between two messages about goals that were sent from here."""
+"""Shortest time between two messages about goals sent from here [s]."""
 
 OBSERVED_S = 0.1
-"""Between two messages about the robot."""
+"""Shortest time between two messages about the robot [s]."""
 
 BEAT_S = 2.0
-"""A page hears so often at least; it takes the server for lost when it does not."""
+"""Longest time between two beats; without them the page considers the server lost [s]."""
 
 FARTHEST = 3_000
-"""A page that is more events behind gets a snapshot."""
+"""A page that is more events behind than this gets a snapshot."""
 
 MOST_PAGES = 64
 REPORT_POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; "
     "form-action 'none'; sandbox"
 )
-"""Of a report, a page of its own without any script."""
+"""Content security policy of a report, a page without scripts."""
 
 LONGEST_COMMAND = 1_000_000
-"""Bytes of a command."""
+"""Longest command [bytes]."""
 
 _LAST_EVENT = re.compile(r"(.*:[0-9]{1,18})?", re.DOTALL)
 
@@ -99,30 +102,30 @@ PICTURES = {
 
 
 class Json(JSONResponse):
-    """JSON in ASCII: names may hold half of a pair of UTF-16, which has no UTF-8."""
+    """JSON in ASCII: names may contain lone UTF-16 surrogates, which UTF-8 cannot encode."""
 
     def render(self, content: Any) -> bytes:
-        """Return the text."""
+        """Return the content as JSON."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
 class Viewer:
-    """The page's server side.
+    """The server side of the page.
 
     Args:
-        machines: What there is to see.
-        token: What commands must carry; None obeys none.
+        machines: The machines to show.
+        token: The token that commands must carry; None refuses all commands.
         send: Sends a command to a machine and returns the answer; blocks.
         follow: Whether pages follow the active states from the start.
-        statistics: Of recorded runs of a machine; blocks.
-        hosts: Names that the server goes by, besides addresses.
-        actions: On the network, for the page that sends goals; None shows none.
-        runs: Lists runs for the home page; None lists those of `machines`.
-        home: Pages begin with the list of runs, unless a machine is asked for.
-        simulations: Starts simulated runs; None offers none.
-        value: Asks a machine for a value of its userdata, by name, container and key; blocks.
-        picture: Asks a machine for the picture of a question, by name and path: media type and
-            bytes; blocks.
+        statistics: Returns the statistics of a machine's recorded runs; blocks.
+        hosts: Host names of the server, besides addresses.
+        actions: The actions on the network; None for none.
+        runs: The runs for the home page; by default those of `machines`.
+        home: Whether pages begin with the list of runs, unless they name a machine.
+        simulations: The batches of simulated runs; None for none.
+        value: Reads the value of a userdata key, by machine, container and key; blocks.
+        picture: Reads the picture of a question, by machine and path; returns media type and bytes,
+            or None; blocks.
     """
 
     def __init__(
@@ -153,7 +156,7 @@ class Viewer:
         self._follow = follow
         self._statistics = statistics
         self._pages: set[_Page] = set()
-        self._drawing = asyncio.Semaphore(1)
+        self._drawing = asyncio.Semaphore(1)  # one `dot` at a time, whatever pages ask for
         self._loop: asyncio.AbstractEventLoop | None = None
         self._woken = False
         machines.listen(lambda _machine: self._on_change())
@@ -196,10 +199,10 @@ class Viewer:
         self._loop = None
 
     def close(self) -> None:
-        """End the streams of all pages, which otherwise have no end; from any thread."""
+        """End the event streams of all pages, which are endless; may be called from any thread."""
         loop = self._loop
         if loop is not None:
-            with contextlib.suppress(RuntimeError):  # the loop has just ended
+            with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
                 loop.call_soon_threadsafe(self._end_pages)
 
     def _end_pages(self) -> None:
@@ -208,15 +211,16 @@ class Viewer:
             one.news.set()
 
     def _on_change(self) -> None:
-        """Wake the pages; from any thread, and once until they have woken."""
+        """Wake the pages, from any thread; no-op while a wake-up is pending."""
         loop = self._loop
         if loop is None or self._woken:
             return
         self._woken = True
-        with contextlib.suppress(RuntimeError):  # the loop has just ended
+        with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
             loop.call_soon_threadsafe(self._wake)
 
     def _wake(self) -> None:
+        # Cleared before the pages look: a change during their look wakes them again.
         self._woken = False
         for one in self._pages:
             one.news.set()
@@ -224,21 +228,22 @@ class Viewer:
     # -- answers -------------------------------------------------------------------------------
 
     async def _index(self, _request: Request) -> Response:
-        return Response(page.index(), media_type=page.TYPES[".html"])
+        return Response(assets.index(), media_type=assets.TYPES[".html"])
 
     async def _theme(self, _request: Request) -> Response:
-        return Response(page.theme_css(), media_type=page.TYPES[".css"])
+        return Response(assets.theme_css(), media_type=assets.TYPES[".css"])
 
     async def _file(self, request: Request) -> Response:
         name = request.path_params["name"]
-        content = page.read(name)
+        content = assets.read(name)
         if content is None:
             return PlainTextResponse(f"no such file: {name}", status_code=404)
-        etag = f'"{page.version()}"'
+        # "no-cache" lets a browser keep the file but ask each time whether it has changed.
+        etag = f'"{assets.version()}"'
         headers = {"etag": etag, "cache-control": "no-cache"}
         if request.headers.get("if-none-match") == etag:
             return Response(status_code=304, headers=headers)
-        media = page.TYPES["." + name.rpartition(".")[2]]
+        media = assets.TYPES["." + name.rpartition(".")[2]]
         return Response(content, media_type=media, headers=headers)
 
     async def _list(self, _request: Request) -> Response:
@@ -248,8 +253,7 @@ class Viewer:
         machine = self._asked(request)
         if machine is None or machine.record is None:
             return _unknown(request)
-        shown = {"revision": machine.revision, **page.model(machine.record)}
-        return Json(shown)
+        return Json({"revision": machine.revision, **assets.model(machine.record)})
 
     async def _runs(self, request: Request) -> Response:
         machine = self._asked(request)
@@ -271,7 +275,7 @@ class Viewer:
         try:
             name = await run_in_threadpool(self._listed.open, asked)
         except SmachError as error:
-            return Json({"ok": False, "text": str(error)}, status_code=404)
+            return _failed(error, status=404)
         return Json({"ok": True, "name": name})
 
     async def _why(self, request: Request) -> Response:
@@ -298,15 +302,14 @@ class Viewer:
         if machine is None or self._value is None:
             return _unknown(request)
         if machine.recorded or machine.stale is not None:
-            text = "The mission is gone; only what it told of the value is left."
-            return Json({"ok": False, "text": text}, status_code=409)
+            return _failed("The mission is gone; only its last message about this value is left.")
         query = request.query_params
         try:
             text = await run_in_threadpool(
                 self._value, machine.name, query.get("container", ""), query.get("key", "")
             )
         except SmachError as error:
-            return Json({"ok": False, "text": str(error)}, status_code=409)
+            return _failed(error)
         return Json({"ok": True, "text": text})
 
     async def _question_picture(self, request: Request) -> Response:
@@ -327,6 +330,7 @@ class Viewer:
             return _unknown(request)
         from viz.pictures.drawing import picture
 
+        # Paths of an outdated page are left out; drawing would refuse an unknown path.
         asked = set(request.query_params.getlist("active"))
         paths = {state.path for state in machine.record.walk()}
         looks: dict[str, Any] = {
@@ -359,11 +363,11 @@ class Viewer:
         if command is None:
             return _no_command()
         client = request.client.host if request.client else "?"
-        command = {"by": f"page at {client}", **command}
+        command = {"by": f"page at {client}", **command}  # the page may name its user
         try:
             return Json(await run_in_threadpool(self._send, name, command))
         except SmachError as error:
-            return Json({"ok": False, "text": str(error)}, status_code=409)
+            return _failed(error)
 
     async def _list_simulations(self, _request: Request) -> Response:
         if self._simulations is None:
@@ -377,11 +381,11 @@ class Viewer:
             return _unknown(request)
         try:
             name = request.query_params.get("batch", "")
-            page_of = await run_in_threadpool(self._simulations.report, name)
+            report = await run_in_threadpool(self._simulations.report, name)
         except SmachError as error:
             return PlainTextResponse(str(error), status_code=404)
         headers = {"content-security-policy": REPORT_POLICY}
-        return Response(page_of, media_type=page.TYPES[".html"], headers=headers)
+        return Response(report, media_type=assets.TYPES[".html"], headers=headers)
 
     async def _simulate(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
@@ -397,7 +401,7 @@ class Viewer:
                     await run_in_threadpool(self._simulations.stop, name)
                     return Json({"ok": True})
         except SmachError as error:
-            return Json({"ok": False, "text": str(error)}, status_code=409)
+            return _failed(error)
         return _no_command()
 
     async def _command_mission(self, request: Request) -> Response:
@@ -410,7 +414,7 @@ class Viewer:
         try:
             text = await run_in_threadpool(self._listed.command, command)
         except SmachError as error:
-            return Json({"ok": False, "text": str(error)}, status_code=409)
+            return _failed(error)
         return Json({"ok": True, "text": text})
 
     async def _action(self, request: Request) -> Response:
@@ -420,7 +424,7 @@ class Viewer:
         try:
             return Json(await run_in_threadpool(self._actions.definition, name))
         except GoalRefusedError as error:
-            return Json({"ok": False, "text": str(error)}, status_code=409)
+            return _failed(error)
 
     async def _command_action(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
@@ -432,13 +436,14 @@ class Viewer:
         try:
             answer = await run_in_threadpool(_do, self._actions, command)
         except GoalRefusedError as error:
-            told = {"ok": False, "text": str(error), "problems": error.problems}
-            return Json(told, status_code=409)
+            return _failed(error, problems=error.problems)
         return Json({"ok": True, **answer})
 
     async def _events(self, request: Request) -> Response:
         if len(self._pages) >= MOST_PAGES:
-            return PlainTextResponse(f"{MOST_PAGES} pages are open already", status_code=503)
+            text = f"pages: got {MOST_PAGES} open ones; expected fewer. Close one."
+            return PlainTextResponse(text, status_code=503)
+        # A browser that reconnects sends the id of the last event: the stream goes on after it.
         last = request.headers.get("last-event-id") or request.query_params.get("last", "")
         if not _LAST_EVENT.fullmatch(last):
             text = f"last: got {last!r}; expected EPOCH:NUMBER, the id of an event, or nothing."
@@ -471,7 +476,7 @@ class Viewer:
 
 
 class _Page:
-    """One open page: what it has been sent, and what it has not."""
+    """One open page, and how far it has been sent the events of its machine."""
 
     def __init__(
         self,
@@ -486,6 +491,7 @@ class _Page:
         self._machines = machines
         self._name = name
         self._settings = settings
+        # The last event that the page has: epoch of its machine, and number.
         epoch, _, seq = last_id.rpartition(":")
         self._epoch = epoch
         self._seq = int(seq or 0)
@@ -493,22 +499,24 @@ class _Page:
         self._list = ""
         self._listed = 0.0
         self._beaten = 0.0
-        self._observed = -1  # number of the newest record of the robot's topics that was sent
+        self._observed = -1  # number of the newest sent record of robot topics
         self._observed_sent = 0.0
         self._actions = actions
-        self._actions_revision = -1  # revision of the actions
+        self._actions_revision = -1  # the revision that was sent
         self._actions_sent = 0.0
 
     async def messages(self) -> AsyncIterator[str]:
-        """Yield what to send, for ever."""
+        """Yield the messages for the page, until it is closed."""
         loop = asyncio.get_running_loop()
         yield f"retry: 500\nevent: settings\ndata: {json.dumps(self._settings)}\n\n"
         while not self.closed:
+            # Cleared before looking: a change from now on ends the wait below at once.
             self.news.clear()
             machine = self._choose()
             if machine is not None:
-                for text in (*self._update(machine), *self._tell_of_robot(machine, loop.time())):
+                for text in (*self._update(machine), *self._robot_texts(machine, loop.time())):
                     yield text
+            # `due` becomes the longest time until something must be sent without a change.
             due = self._listed + LIST_S - loop.time()
             if due <= 0:
                 self._listed = loop.time()
@@ -534,8 +542,8 @@ class _Page:
                 continue
             await asyncio.sleep(COALESCE_S)
 
-    def _tell_of_robot(self, machine: Machine, now: float) -> list[str]:
-        """What the robot's topics have told since the last time, unless that was just now."""
+    def _robot_texts(self, machine: Machine, now: float) -> list[str]:
+        """A message with the new records of robot topics, unless one was sent just now."""
         if self._observed == machine.observed_seq or now < self._observed_sent + OBSERVED_S:
             return []
         texts = machine.observed_since(self._observed)
@@ -543,7 +551,7 @@ class _Page:
         return [f"event: observed\ndata: [{','.join(texts)}]\n\n"]
 
     def _robot_due(self, machine: Machine | None) -> float:
-        """How long until more can be told of the robot [s]."""
+        """Time until the next message about the robot [s]."""
         waits = machine is not None and self._observed != machine.observed_seq
         return OBSERVED_S if waits else math.inf
 
@@ -552,7 +560,7 @@ class _Page:
         return f"event: actions\ndata: {json.dumps(actions.summary())}\n\n"
 
     def _choose(self) -> Machine | None:
-        """The machine that the page shows: the one it names, else the first there is."""
+        """The machine that the page names, otherwise the first one, to which it then stays."""
         machine = self._machines.get(self._name) if self._name else self._machines.first()
         if machine is not None:
             self._name = machine.name
@@ -560,6 +568,7 @@ class _Page:
 
     def _update(self, machine: Machine) -> list[str]:
         texts: list[str] = []
+        # A snapshot for a new page, another program or a page too far behind; else the new events.
         behind = machine.since(self._seq) if machine.epoch == self._epoch else None
         if behind is None or len(behind) > FARTHEST:
             missed, before = behind is not None, self._seq
@@ -575,14 +584,16 @@ class _Page:
             self._facts = facts
             texts.append(f"event: facts\ndata: {json.dumps(facts)}\n\n")
         if behind:
-            self._seq = json.loads(behind[-1])["seq"]  # there may be gaps
+            # Not `+= len(behind)`: numbers of dropped events are missing.
+            self._seq = json.loads(behind[-1])["seq"]
             data = f"[{','.join(behind)}]"
             texts.append(f"id: {self._epoch}:{self._seq}\ndata: {data}\n\n")
         return texts
 
 
 async def _read_command(request: Request) -> dict[str, Any] | None:
-    """The JSON object that came with a request; None when it is none, or too long."""
+    """The JSON object in a request; None if it is too long or something else."""
+    # Read in parts, so that a long body is refused before it fills the memory.
     body = b""
     async for chunk in request.stream():
         body += chunk
@@ -597,24 +608,22 @@ async def _read_command(request: Request) -> dict[str, Any] | None:
 
 def _no_command() -> Response:
     text = f"command: got no JSON object of at most {LONGEST_COMMAND} bytes; expected one."
-    return Json({"ok": False, "text": text}, status_code=400)
+    return _failed(text, status=400)
+
+
+def _failed(reason: object, *, status: int = 409, **more: object) -> Response:
+    return Json({"ok": False, "text": str(reason), **more}, status_code=status)
 
 
 def _export_page(machine: Machine, record: StateRecord) -> bytes:
     """The run as one file that opens without a server."""
-    from viz.model.why import why
+    from viz.runs.html import page_of
 
-    run = {
-        "model": page.model(record),
-        "snap": json.loads(machine.snapshot()[1]),
-        "observed": machine.observed(),
-        "why": why(record, machine.events()).to_json(),
-    }
-    return page.standalone(run, record.label).encode("utf-8", "replace")
+    return page_of(machine, record).encode("utf-8", "replace")
 
 
 def _export_recording(machine: Machine, record: StateRecord) -> bytes:
-    """The run as `Recorder` writes it."""
+    """The run as a recording, in the format of `Recorder`."""
     from smachpy.events.recording import recording_lines
 
     base, events = machine.history()
@@ -622,13 +631,13 @@ def _export_recording(machine: Machine, record: StateRecord) -> bytes:
 
 
 _EXPORTS = {
-    "html": (_export_page, page.TYPES[".html"]),
+    "html": (_export_page, assets.TYPES[".html"]),
     "jsonl": (_export_recording, "application/jsonl"),
 }
 
 
 def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str, Any]:
-    """Two machines, each with name, record and events, in one drawing."""
+    """The union of two machines, each given as name, record and events."""
     from viz.runs.compare import Side, unite
     from viz.runs.statistics import Statistics
 
@@ -640,14 +649,14 @@ def _compared(old: tuple[str, Any, Any], new: tuple[str, Any, Any]) -> dict[str,
     union = unite(*sides)
     return {
         "with": old[0],
-        "model": page.model(union.record, union.node),
+        "model": assets.model(union.record, union.node),
         "listed": union.listed(),
         "runs": [side.statistics.runs for side in sides if side.statistics is not None],
     }
 
 
 def _do(actions: Actions, command: dict[str, Any]) -> dict[str, Any]:
-    """Carry out what the page asks of an action."""
+    """Carry out a command about an action."""
     match command:
         case {"command": "check", "name": str(name), "yaml": str(text)}:
             return actions.check(name, text)
@@ -663,9 +672,8 @@ def _do(actions: Actions, command: dict[str, Any]) -> dict[str, Any]:
 
 
 def _refused(reason: str | None) -> Response:
-    """Refuse a command; a page whose token is of a viewer before this one asks for the new one."""
-    told = {"ok": False, "text": reason, "wants_token": reason == WRONG_TOKEN}
-    return Json(told, status_code=403)
+    """Refuse a command; after a wrong token, such as an earlier viewer's, the page asks for one."""
+    return _failed(reason, status=403, wants_token=reason == WRONG_TOKEN)
 
 
 def _unknown(request: Request) -> Response:

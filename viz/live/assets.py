@@ -1,4 +1,4 @@
-"""The files and models that a page is made of, served or folded into one file."""
+"""The files and data of the page, for the server or for a page in one file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WEB = Path(__file__).resolve().parent.parent / "web"
 ALL_LEVELS = 1_000_000
 
 ROOMS = ("core", "drawing", "panels")
-"""Folders of the page's modules; each imports only of those before it."""
+"""Folders of the page's modules; each imports only from itself and those before it."""
 
 
 def _files(folder: str) -> list[str]:
@@ -35,7 +35,7 @@ def _files(folder: str) -> list[str]:
 SCRIPTS = [*(name for room in ROOMS for name in _files(f"js/{room}")), "js/app.js"]
 VENDOR = _files("vendor")
 FILES = frozenset(["app.css", *SCRIPTS, *VENDOR])
-"""What is served; other files beside them are for development."""
+"""The files that are served; the others in the folder are for development."""
 
 MODULES = {
     "preact": "vendor/preact.js",
@@ -47,7 +47,7 @@ MODULES = {
     "gifenc": "vendor/gifenc.js",
     **{f"#{name.removeprefix('js/')}": name for name in SCRIPTS},
 }
-"""What modules import each other by: the same names in the served page, in a file and in Node."""
+"""Import map: the same module names in the served page, in a page in one file and in Node."""
 
 TYPES = {
     ".js": "text/javascript; charset=utf-8",
@@ -65,7 +65,7 @@ def read(name: str) -> bytes | None:
 
 @cache
 def version() -> str:
-    """Return a word that changes with any file of the page."""
+    """Return a hash over all files of the page."""
     digest = hashlib.sha256()
     for name in sorted({"index.html", *FILES}):
         digest.update((WEB / name).read_bytes())
@@ -90,7 +90,7 @@ def index() -> str:
 
 
 def script_hash() -> str:
-    """Return the content security policy's word for the only inline script, the import map."""
+    """Return the hash by which the content security policy allows the import map, inline."""
     digest = hashlib.sha256(import_map().encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode()}'"
 
@@ -102,11 +102,11 @@ ON_THE_MAP = {
     "dark": "#1a2531 #0b1118 #93a1b0 #ffc94d #27333f"
     " #8f9bff #f07fc0 #3fc7d3 #d9a24a #a9c33a #c39bff #ff9076 #a9bacb",
 }
-"""Colours of the map, and of the tracks on it (s1 to s8), by theme: pictures have no map."""
+"""Colours of the map and the tracks on it (s1 to s8), which pictures and their themes lack."""
 
 
 def theme_css() -> str:
-    """Return the colours of the themes as CSS variables, by the system's taste or by choice."""
+    """Return the themes' colours as CSS variables, chosen by the system's setting or the user."""
     light, dark = (_variables(THEMES[name]) for name in ("light", "dark"))
     return (
         f":root{{color-scheme:light;{light}}}\n"
@@ -134,12 +134,12 @@ def _variables(theme: Theme) -> str:
 
 
 def model(record: StateRecord, draw: Callable[..., Node] | None = None) -> dict[str, Any]:
-    """Return all that the page draws a machine from, with and without implicit transitions.
+    """Return the data from which the page draws a machine, with and without implicit transitions.
 
     Args:
         record: The machine.
-        draw: Makes the drawing, with `depth` and `show_implicit` as `extract` takes them; None
-            draws the machine as it is.
+        draw: Makes the diagram, with the arguments `depth` and `show_implicit` of `extract`; by
+            default that of the machine.
     """
     draw = draw or partial(extract, record)
     return {
@@ -158,11 +158,11 @@ def model(record: StateRecord, draw: Callable[..., Node] | None = None) -> dict[
 
 
 def standalone(run: dict[str, Any], title: str) -> str:
-    """Return one HTML file that shows a run without a server or a network.
+    """Return one HTML file that shows a run without a server or network.
 
     Args:
-        run: `model` of the machine, and a snapshot as the server sends it.
-        title: Of the page.
+        run: The data of the run, as the server would send it.
+        title: Title of the page.
     """
     style = theme_css() + "".join(
         (WEB / name).read_text(encoding="utf-8") for name in ("vendor/uplot.css", "app.css")
@@ -170,6 +170,7 @@ def standalone(run: dict[str, Any], title: str) -> str:
     for font in ("inter", "jetbrains-mono"):
         data = base64.b64encode((WEB / "vendor" / f"{font}.woff2").read_bytes()).decode()
         style = style.replace(f"/vendor/{font}.woff2", f"data:font/woff2;base64,{data}")
+    # Modules cannot be imported from file: URLs, but from data: URLs in an import map.
     modules = {name: _data_url((WEB / path).read_bytes()) for name, path in MODULES.items()}
     layouter = (WEB / "vendor" / "elk-worker.min.js").read_bytes()
     parts = [
@@ -189,6 +190,6 @@ def _data_url(content: bytes) -> str:
 
 
 def _packed(name: str, content: bytes) -> str:
-    """A block of data in a page: base64 of gzip, so that no text in it can end the block."""
-    data = base64.b64encode(gzip.compress(content, mtime=0)).decode()
+    """A block of data in a page: gzip as base64, which cannot contain `</script>`."""
+    data = base64.b64encode(gzip.compress(content, mtime=0)).decode()  # the same bytes each time
     return f'<script type="application/octet-stream" id="{name}-data">{data}</script>'

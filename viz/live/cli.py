@@ -1,4 +1,4 @@
-"""`smachpy view`: every running machine, in a browser."""
+"""`smachpy view`: shows every running machine in a browser."""
 
 from __future__ import annotations
 
@@ -29,14 +29,15 @@ EXAMPLES = """examples:
   smachpy view                         every machine on this network, and your private runs
   smachpy view --control               with pause, step, jump, preempt, and goals to actions
   smachpy view run.jsonl               a recorded run
-  smachpy view --map office.yaml       with this floor, where no topic tells it
+  smachpy view --map office.yaml       with this map, if the robot publishes none
   smachpy view --host 0.0.0.0 --qr     for others on this network; a phone reads the address
-  smachpy view --runs runs/            with the statistics of recorded runs on the graph
+  smachpy view --runs runs/            with the statistics of recorded runs in the diagram
   smachpy view --durable postgresql://db/missions    with the missions of this database
 """
 PORT = 8080
 HIGHEST_PORT = 65_535
-LEAVE_S: Final = 2.0  # longest wait at the end until all networks are left
+LEAVE_S: Final = 2.0
+"""Longest wait at the end for leaving all networks [s]."""
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -52,13 +53,13 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     parser.add_argument("files", metavar="FILE", nargs="*", help="recorded runs to show as well")
     parser.add_argument(
-        "--host", default="127.0.0.1", help="where to listen (default: %(default)s)"
+        "--host", default="127.0.0.1", help="address to listen on (default: %(default)s)"
     )
     parser.add_argument(
-        "--port", type=_port, default=PORT, help="0 takes any free port (default: %(default)s)"
+        "--port", type=_port, default=PORT, help="0 for any free port (default: %(default)s)"
     )
     parser.add_argument(
-        "--qr", action="store_true", help="print the address as a QR code, too: for a phone"
+        "--qr", action="store_true", help="also print the address as a QR code, for a phone"
     )
     parser.add_argument(
         "--auto-focus", action="store_true", help="pages follow the active states from the start"
@@ -75,20 +76,20 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         action="append",
         default=[],
         help="durable missions to list: a file, or postgresql://HOST/DATABASE; "
-        f"{JOURNAL} is listed when it is there",
+        f"{JOURNAL} is listed if it exists",
     )
     parser.add_argument(
         "--map",
         type=Path,
         metavar="FILE",
-        help="the floor, a map_server YAML file, where no topic tells it",
+        help="a map_server YAML file, used if the robot publishes no map",
     )
     parser.add_argument(
         "--mission",
         metavar="MISSION",
         action="append",
         default=[],
-        help="what the page may simulate besides the installed missions: a .py file, "
+        help="a mission that the page may simulate besides the installed ones: a .py file or "
         "module:factory",
     )
     add_ros2_options(parser)
@@ -115,8 +116,8 @@ def _is_loopback(host: str) -> bool:
 def _run(args: argparse.Namespace) -> int:
     if args.qr and _is_loopback(args.host):
         raise UsageError(
-            f"smachpy view: --qr: got it beside --host {args.host}, which nobody but this computer "
-            "can open; expected an address of its network. Try --host 0.0.0.0"
+            f"smachpy view: --qr: got --host {args.host}, which only this computer can open; "
+            "expected an address on the network. Try --host 0.0.0.0"
         )
     from actionlib_core.node import get_node
     from viz.live.actions import Actions
@@ -177,6 +178,7 @@ def _serve(
         simulations=simulations,
     )
     server = PageServer(viewer, args.host, args.port)
+    # Behind "#", a browser keeps the token to itself: it is in no request and no server's log.
     address = server.address + (f"#token={token}" if token else "")
     print(address, flush=True)
     if args.qr:
@@ -189,7 +191,7 @@ def _serve(
 
 
 def print_qr(address: str) -> None:
-    """Print an address as a QR code, light on dark as most terminals are, with a light border."""
+    """Print an address as a QR code for terminals with a dark background."""
     import segno
 
     segno.make(address, error="l", micro=False).terminal(sys.stdout, compact=True)
@@ -198,9 +200,9 @@ def print_qr(address: str) -> None:
 
 @contextlib.contextmanager
 def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[None]:
-    """Let `parts` look at this user's private networks too, unless the environment names one.
+    """Let `parts` join this user's private networks too, unless the environment names a network.
 
-    Threads: they are joined and left on a thread of their own, one after the other.
+    Threads: they join and leave in a thread of their own, one network after the other.
     """
     from actionlib_core.config import Config
     from actionlib_core.node import Node
@@ -212,7 +214,7 @@ def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[Non
     joined: dict[int, Node] = {}
     executor = SerialExecutor(node.clock, "private networks")
 
-    def follow(domain: int, alive: bool) -> None:
+    def on_network(domain: int, alive: bool) -> None:
         if alive and domain not in joined:
             joined[domain] = Node(f"view_{os.getpid()}", config=Config(domain=domain))
             for part in parts:
@@ -223,14 +225,14 @@ def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[Non
             joined.pop(domain).close()
 
     watch = watch_private_networks(
-        node.transport, lambda domain, alive: executor.submit(lambda: follow(domain, alive))
+        node.transport, lambda domain, alive: executor.submit(lambda: on_network(domain, alive))
     )
     try:
         yield
     finally:
         watch.close()
         for domain in list(joined):
-            executor.submit(partial(follow, domain, alive=False))
+            executor.submit(partial(on_network, domain, alive=False))
         executor.join(LEAVE_S)
 
 
@@ -240,15 +242,12 @@ def _load(machines: Machines, files: list[str]) -> None:
     paths = list(dict.fromkeys(find_recordings(files)))
     names = [path.name for path in paths]
     for path in paths:
-        recording = read_recording(path)
         machine = machines.obtain(path.name if names.count(path.name) == 1 else str(path))
-        machine.recorded, machine.file = True, str(path)
-        machine.date_shift = recording.made_ns - recording.stamp_ns
-        machine.reset(recording.history(), limit=len(recording.events) + 1)
+        machine.load(read_recording(path))
 
 
 def _end_with_parent(server: Any) -> None:
-    """Stop when standard input ends, which it does however the parent ends."""
+    """Stop when standard input ends: the system closes it however the parent ends."""
     from actionlib_core.clock import current_clock
 
     def wait() -> None:

@@ -1,6 +1,7 @@
-"""What a form for a goal is made of: the fields of a message, their comments, their defaults.
+"""Describes messages for the page's goal forms: fields, comments and default values.
 
-Numbers are texts in everything that goes to the page: JavaScript cannot hold each of them.
+Numbers are sent to the page as text: a JavaScript number is a float64, which cannot hold every
+64-bit integer.
 """
 
 from __future__ import annotations
@@ -21,18 +22,20 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces import Message
 
 WIDE = 96
-"""Columns of the YAML: a longer comment goes above its field."""
+"""Width of the YAML; a comment that would exceed it goes above its field [columns]."""
 
-LEAST_COLUMN = 30  # where comments begin, if there is room
+LEAST_COLUMN = 30
+"""Comments begin here, or after a longer field [columns]."""
 QUATERNION = "geometry_msgs/Quaternion"
 
 
 def fields_of(cls: type[Message]) -> list[dict[str, Any]]:
-    """Return what a form has to know of each field, nested ones included.
+    """Return the description of each field, including nested ones.
 
-    Each has: name, type as it is spelt, base type, comment; `array` (None, or its `length`, None
-    for any); `kind` (bool, integer, float, string, time, message); for integers `least` and `most`;
-    for constants of its definition that it can take `choices`; for messages `fields`.
+    Each has `name`, `type` as written, `base` type and `comment`; `array`: None, or its `length`,
+    which is None for any length; `choices`: the constants of the definition that are meant for it;
+    `kind`: bool, integer, float, string, time or message; `least` and `most` of an integer;
+    `fields`, `about` and `default` of a message.
     """
     definition = cls._definition
     return [
@@ -50,7 +53,7 @@ def fields_of(cls: type[Message]) -> list[dict[str, Any]]:
 
 
 def _class_of(base: str) -> type[Message]:
-    """Return the class of a nested type; ROS 2's have their kind in the name."""
+    """Return the class of a nested type; a name such as package/msg/Name is one of ROS 2."""
     return (ros2.get_message if base.count("/") > 1 else get_message)(base)
 
 
@@ -74,12 +77,14 @@ def _kind(base: str) -> dict[str, Any]:
 
 
 def _choices(cls: type[Message], field: Any) -> list[dict[str, str]]:
-    """The constants meant for a field: those that begin with its name, or all of its type.
+    """The constants meant for a field, guessed: definitions do not say.
 
-    All of its type only where no other field could be meant.
+    They are those whose names begin with the field's name; without any, all of its type, if no
+    other field has that type.
     """
     definition = cls._definition
     same = [c for c in definition.constants if c.type == field.type.base and c.type != "bool"]
+    # `status_code` with constants STATUS_..., `error_type` with ERROR_...
     begins = re.sub(r"_?(code|id|type|mode|status)$", "", field.name, flags=re.IGNORECASE).upper()
     named = [c for c in same if begins and c.name.startswith(begins)]
     rivals = [f for f in definition.fields if f.type.base == field.type.base]
@@ -88,13 +93,13 @@ def _choices(cls: type[Message], field: Any) -> list[dict[str, str]]:
 
 
 def sensible(cls: type[Message]) -> Message:
-    """Return a message with its default values, and rotations that rotate by nothing.
+    """Return a message with its default values, but with valid quaternions.
 
-    The ROS default of a quaternion, all zeros, is no rotation, and servers refuse it.
+    A quaternion's default in ROS, all zeros, is not a rotation, and servers reject it.
     """
     message = cls()
     if cls._type == QUATERNION:
-        message.w = 1.0  # type: ignore[attr-defined]  # what the type has
+        message.w = 1.0  # type: ignore[attr-defined]  # Quaternion has it
         return message
     for one in cls._definition.fields:
         if not one.type.is_builtin and not one.type.is_array:
@@ -103,10 +108,10 @@ def sensible(cls: type[Message]) -> Message:
 
 
 def values_of(message: Message) -> dict[str, Any]:
-    """Return the values of a message as a form holds them, numbers and times as text.
+    """Return the values of a message for a form, numbers and times as text.
 
     Raises:
-        FieldError: values that do not fit their fields.
+        FieldError: values do not fit their fields.
     """
     plain = message.to_dict()
     return {one.name: _texts(plain[one.name], one.type.base) for one in message._definition.fields}
@@ -126,7 +131,7 @@ def _texts(value: Any, base: str) -> Any:
 
 
 def _seconds(value: Mapping[str, int]) -> str:
-    """A time as seconds, without the rounding of a float."""
+    """A time in seconds, exactly: a float has too few digits for nanoseconds since the epoch."""
     total = value["secs"] * 10**9 + value["nsecs"]
     sign, total = ("-", -total) if total < 0 else ("", total)
     whole, part = divmod(total, 10**9)
@@ -134,13 +139,13 @@ def _seconds(value: Mapping[str, int]) -> str:
 
 
 def _number(value: float) -> str:
-    if isinstance(value, float) and not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):  # as YAML spells them
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
     return repr(value)
 
 
 def yaml_of(message: Message) -> str:
-    """Return a message as YAML that `from_yaml` reads back, with the comments of its definition."""
+    """Return a message as YAML for `from_yaml`, with the comments of its definition."""
     definition = message._definition
     head = [f"# {line}" for line in textwrap.wrap(definition.comment, WIDE - 2)]
     lines = [*head, *_lines(type(message), values_of(message), "")]
@@ -181,7 +186,7 @@ def _entry(head: str, value: Any, base: str, indent: str, words: str) -> Iterato
 
 
 def _commented(line: str, words: str, indent: str) -> list[str]:
-    """A line with its comment behind it, or above it where that would be too wide."""
+    """A line followed by its comment, or with the comment above it if it would be too wide."""
     padded = f"{line:<{LEAST_COLUMN}}  # {words}"
     if len(padded) <= WIDE:
         return [padded]
@@ -198,7 +203,7 @@ def _flow(value: Any, base: str) -> str:
 
 
 def problems_of(error: FieldError, type_name: str) -> list[dict[str, str]]:
-    """Return the problems of a goal by the path of their field, "" for those of the whole text."""
+    """Return the problems of a goal with the paths of their fields, "" for the whole text."""
     found = []
     for problem in error.problems:
         text = problem.removeprefix(f"{type_name}: ")

@@ -1,4 +1,4 @@
-"""Durable missions for the home page: what their journals say, and to resume and cancel them."""
+"""Lists the durable missions of journals for the home page, and resumes and cancels them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import RealClock
+from smachpy.command import EXIT_ERROR
 from smachpy.durable.overview import overview
 from smachpy.durable.store import (
     CANCELLED,
@@ -32,38 +33,38 @@ if TYPE_CHECKING:
     from smachpy.durable.store import MissionRow
 
 PATIENCE_S: Final = 2.0
-"""How long a database that does not answer is waited for; then the page says so."""
+"""Longest wait for an answer of a database; then the page shows the problem [s]."""
 
-AGAIN_S: Final = 10.0
-"""How long after that it is asked again."""
+RETRY_S: Final = 10.0
+"""Time until a database that did not answer is asked again [s]."""
 
 MOST_MISSIONS: Final = 300
-"""So many of the newest missions of a journal are listed."""
+"""Listed missions of a journal: the newest ones."""
 
 COMMANDS: Final = ("resume", "cancel")
 
 
 @dataclass(slots=True)
 class _Journal:
-    """One store, while it can be reached."""
+    """One store; `store` is None while it cannot be reached."""
 
     where: str
-    optional: bool  # a file that may not be there
+    optional: bool  # the default file, which need not exist
     store: Store | None = None
     problem: str = ""
-    asked: float = float("-inf")
+    asked: float = float("-inf")  # time of the last failure [s]
 
 
 class Journals:
     """Lists missions of stores, and resumes and cancels them.
 
     Args:
-        places: Files, and URLs of PostgreSQL.
-        default: A file that is listed when it is there.
-        logs: The folder to which missions that are resumed here write what they say.
+        places: Files and PostgreSQL URLs.
+        default: A file that is listed if it exists.
+        logs: Folder for the output of missions that are resumed from here.
 
-    Threads: every method may be called from any thread; one at a time, and all block for the
-        stores, `PATIENCE_S` at most for each that does not answer.
+    Threads: every method may be called from any thread. They run one at a time and block for the
+        stores, at most `PATIENCE_S` for each one that does not answer.
     """
 
     def __init__(
@@ -76,11 +77,12 @@ class Journals:
         self._logs = logs
         self._clock = RealClock()
         self._lock = threading.RLock()
+        # By store and mission: its row, and the columns by which a change is noticed.
         self._known: dict[tuple[str, str], tuple[Any, dict[str, Any]]] = {}
-        self._said: dict[tuple[str, str], str] = {}  # why missions could not be resumed
+        self._failures: dict[tuple[str, str], str] = {}  # why missions could not be resumed
 
     def places(self) -> list[dict[str, str]]:
-        """Return `name` of each store that was found, without a password, and its `problem`."""
+        """Return the `name`, without a password, and the `problem` of each store."""
         return [
             {"name": _name(one.where), "problem": one.problem}
             for one in self._journals.values()
@@ -88,26 +90,26 @@ class Journals:
         ]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return all missions that are no schedules, as rows of the list of runs (`run_row`).
+        """Return all missions except schedules, as rows of the list of runs (`run_row`).
 
-        Each has `run` beside that, which names it as its recordings do, and `mission`: `id`,
-        `journal`, `status`, `active`, `problem`, and `can`, what it may be told here.
+        Each row also has `run`, the id that its recordings have too, and `mission`: `id`,
+        `journal`, `status`, `active`, `problem` and `can`, the commands that it accepts now.
         """
         with self._lock:
             return [row for one in self._journals.values() for row in self._rows_of(one)]
 
     def command(self, journal: str, mission: str, command: str, record: str = "") -> str:
-        """Resume or cancel a mission; return what happens now, in words.
+        """Resume or cancel a mission; return a text that says what happens now.
 
         Args:
-            journal: As `mission["journal"]` has it.
-            mission: Its id.
-            command: One of `COMMANDS`. To resume starts a process that outlives this one, in this
-                computer, as `smachpy missions resume` does.
-            record: The file to which its run goes on to be written; "" for none.
+            journal: The name of the journal, `mission["journal"]` of a row.
+            mission: The mission's id.
+            command: One of `COMMANDS`. "resume" starts a process on this computer, as
+                `smachpy missions resume` does; it outlives the viewer.
+            record: The recording that is continued; "" for none.
 
         Raises:
-            SmachError: no such journal, mission or command, or it is over.
+            SmachError: there is no such journal, mission or command, or the mission is over.
         """
         if command not in COMMANDS:
             raise MissionError(f"command: got {command!r}; expected one of {list(COMMANDS)}.")
@@ -119,12 +121,12 @@ class Journals:
             if store is None:
                 raise MissionError(found.problem or f"{journal}: there is no such journal.")
             row = store.mission(mission)
-            self._said.pop((found.where, mission), None)
+            self._failures.pop((found.where, mission), None)
             self._known.pop((found.where, mission), None)
             if command == "cancel":
                 store.request_cancel(mission)
                 running = row.status not in {INTERRUPTED, *OVER} and row.status != QUEUED
-                return "it is preempted" if running else "it is preempted when it goes on"
+                return "it is preempted" if running else "it is preempted when it is resumed"
             if row.status in OVER:
                 raise MissionOverError(journal, mission, row.status)
             if "resume" not in _can(overview(store, row)):
@@ -136,7 +138,7 @@ class Journals:
         """Close the stores; a second call does nothing."""
         with self._lock:
             for one in self._journals.values():
-                self._give_up(one, "")
+                self._disconnect(one, "")
 
     # -- the stores ------------------------------------------------------------------------------
 
@@ -145,7 +147,9 @@ class Journals:
             return one.store
         if one.optional and not Path(one.where).exists():
             return None
-        if one.problem and self._clock.now() < one.asked + AGAIN_S:
+        # Each attempt blocks for PATIENCE_S: the page, which asks every few seconds, must not wait
+        # for a dead database each time.
+        if one.problem and self._clock.now() < one.asked + RETRY_S:
             return None
         one.asked = self._clock.now()
         try:
@@ -155,7 +159,7 @@ class Journals:
             one.problem = str(error)
         return one.store
 
-    def _give_up(self, one: _Journal, problem: str) -> None:
+    def _disconnect(self, one: _Journal, problem: str) -> None:
         store, one.store, one.problem = one.store, None, problem
         if store is not None:
             with contextlib.suppress(SmachError):
@@ -170,23 +174,24 @@ class Journals:
             return [self._row(one.where, store, row) for row in found]
         except SmachError as error:
             one.asked = self._clock.now()
-            self._give_up(one, str(error))
+            self._disconnect(one, str(error))
             return []
 
     def _row(self, where: str, store: Store, row: MissionRow) -> dict[str, Any]:
         key = where, row.id
+        # The row of a mission that is over stays the same: its journal is not read again.
         stamp = row.changed, row.status, row.owner, row.cancel
         known = self._known.get(key)
         if known is None or known[0] != stamp or row.status not in OVER:
             known = self._known[key] = stamp, mission_row(overview(store, row), _name(where))
         listed = known[1]
-        said = self._said.get(key)
-        return listed if said is None else {**listed, "reason": f"not resumed: {said}"}
+        failure = self._failures.get(key)
+        return listed if failure is None else {**listed, "reason": f"not resumed: {failure}"}
 
     # -- processes -------------------------------------------------------------------------------
 
     def _resume(self, where: str, mission: str, record: str) -> None:
-        """Start the process; what it says at its end is told when it failed."""
+        """Start the process; a thread waits for its end and keeps its error message."""
         words = ["missions", "resume", mission, "--durable", where, "--plain"]
         words += ["--record", record] if record else []
         log = subprocess.DEVNULL if self._logs is None else self._log_file(mission)
@@ -195,7 +200,7 @@ class Journals:
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C for the viewer is none for the mission
+            start_new_session=True,  # the terminal's Ctrl-C for the viewer must not reach it
         )
         if not isinstance(log, int):
             log.close()
@@ -211,32 +216,29 @@ class Journals:
             return subprocess.DEVNULL
 
     def _follow(self, process: subprocess.Popen[bytes], where: str, mission: str) -> None:
-        """Read what a mission says until it ends."""
+        """Read a mission's error output until it ends; a full pipe would block the mission."""
         assert process.stderr is not None
         last = ""
         with process.stderr:
             for line in process.stderr:
                 last = line.decode("utf-8", "replace").strip() or last
-        if process.wait() == EXIT_BAD_INPUT:
+        # Other exit codes are the outcome of a mission that was resumed.
+        if process.wait() == EXIT_ERROR:
             with self._lock:
-                self._said[where, mission] = last.removeprefix("smachpy: ")
-
-
-EXIT_BAD_INPUT: Final = 2
+                self._failures[where, mission] = last.removeprefix("smachpy: ")
 
 
 def mission_row(facts: dict[str, Any], journal: str) -> dict[str, Any]:
-    """Return a mission as a row of the list of runs; pure.
+    """Return a mission as a row of the list of runs. A pure function.
 
     Args:
-        facts: `smachpy.durable.overview.overview`.
-        journal: What to call its store.
+        facts: The mission's `smachpy.durable.overview.overview`.
+        journal: Name of its store.
     """
     began, last, status = facts["began_ns"], facts["last_ns"], facts["status"]
     ended = round(facts["changed"] * 1e9) if status in OVER else None
     outcome = facts["outcome"] or ("cancelled" if status == CANCELLED else None)
-    stands = ", ".join(_inside(path) for path in facts["active"])
-    reason = "" if status == ENDED else stands
+    reason = "" if status == ENDED else ", ".join(_inside(path) for path in facts["active"])
     if facts["problem"]:
         reason = f"its journal cannot be read: {facts['problem']}"
     first = began or round(facts["created"] * 1e9)
@@ -264,14 +266,14 @@ def mission_row(facts: dict[str, Any], journal: str) -> dict[str, Any]:
 
 
 def _can(facts: dict[str, Any]) -> list[str]:
-    """What a mission may be told."""
+    """The commands that a mission accepts now."""
     if facts["status"] in OVER or facts["problem"]:
         return []
     return ["cancel"] if facts["status"] != INTERRUPTED else ["resume", "cancel"]
 
 
 def _strip(facts: dict[str, Any], began: int) -> list[tuple[int, str, float, float | None, str]]:
-    """The ends of the root's children, and what is active of them, as `run_row` has it."""
+    """The ended and running visits of the root's children, in the form of `run_row`."""
     places = {path: min(i, MOST_ROWS - 1) for i, path in enumerate(facts["rows"] or ())}
     pieces: list[tuple[int, str, float, float | None, str]] = []
     for path, begin, end, outcome in facts["ends"]:
@@ -289,11 +291,11 @@ def _label(path: str) -> str:
 
 
 def _inside(path: str) -> str:
-    """The way to a state below the root."""
+    """The labels from the root down to a state."""
     return path.strip("/").partition("/")[2].replace("/", " \u203a ") or path
 
 
 def _name(where: str) -> str:
-    """What to call a store, without the password of its URL."""
+    """The name of a store: its file, or its URL without user and password."""
     scheme, mark, rest = where.partition("://")
     return f"{scheme}{mark}{rest.rpartition('@')[2]}" if mark else where

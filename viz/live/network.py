@@ -1,7 +1,7 @@
-"""Finds running machines on the network and follows them, across restarts of either side.
+"""Finds running machines on the network and follows them, across restarts on both sides.
 
-Two machines of one name are two machines: what they send is told apart by their network sessions.
-The first is shown under its name, the others as "name (2)" and so on.
+Machines of the same name are distinguished by their network sessions. The first one is shown under
+its name, further ones as "name (2)" and so on.
 """
 
 from __future__ import annotations
@@ -38,23 +38,30 @@ if TYPE_CHECKING:
 logger = logging.getLogger("viz.live")
 
 HISTORY_S = 3.0
+"""Longest wait for a machine's history [s]."""
+
 VALUE_S = 10.0
-"""A whole value may have megabytes; of a server that has gone one hears at once."""
+"""Longest wait for a value, which may have megabytes [s]; if the server goes, it ends at once."""
 
 RETRY_S = 0.5
+"""Time until a history that did not come is requested again [s]."""
+
 GATHER_S = 0.014
-"""Events are worked off together that come so close to each other."""
+"""Time in which received events are gathered and then added together [s]."""
 
 SETTLE_S = 0.3
-"""An event may slip through until a server has seen its new listener: the history is read again."""
+"""Time after which the history is read a second time [s].
+
+Until the server knows its new subscriber, events can be lost between the first reading and the
+first event that is received."""
 
 
 class Network:
-    """Keeps `machines` up to date with what runs on the network, or on several.
+    """Keeps `machines` up to date with the machines on one or several networks.
 
     Args:
-        node: Where to look; `join` adds others.
-        machines: What to keep.
+        node: The node on the first network; `join` adds others.
+        machines: The machines to update.
         control: Whether commands may be sent.
 
     Threads: every method may be called from any thread.
@@ -70,13 +77,13 @@ class Network:
         self.join(node)
 
     def join(self, node: Node) -> None:
-        """Look where `node` is too."""
+        """Also follow the machines on a node's network."""
         pattern = token_pattern(Kind.PUBLISHER, f"**{EVENTS_TOPIC}")
         on_presence = partial(self._on_presence, node)
         self._watches[node] = node.transport.watch_alive(pattern, on_presence)
 
     def leave(self, node: Node) -> None:
-        """Look where `node` is no more: its machines have gone."""
+        """Stop following the machines on a node's network, which become stale."""
         self._watches.pop(node).close()
         with self._lock:
             subscriptions = [
@@ -85,6 +92,7 @@ class Network:
             links = {name: link for name, link in self._links.items() if link.on(node)}
             for name in links:
                 del self._links[name]
+        # Outside the lock, which every received sample needs: closing waits for the links' threads.
         for link in links.values():
             link.lose()
         parts: list[Link | _Subscription] = [*subscriptions, *links.values()]
@@ -92,7 +100,7 @@ class Network:
             part.close()
 
     def close(self) -> None:
-        """Follow nothing any more; a second call does nothing."""
+        """Stop following all machines; a second call does nothing."""
         for watch in self._watches.values():
             watch.close()
         with self._lock:
@@ -109,40 +117,42 @@ class Network:
         """Send a command to a machine and return the answer.
 
         Raises:
-            CommandError: no such machine, two of one name, a wrong command, or no answer.
+            CommandError: there is no such machine, or there are two; the command is wrong; or there
+                is no answer.
 
-        Blocks: until the answer, some seconds at most.
+        Blocks: until the answer, a few seconds at most.
         """
         link = self._link(name)
-        if command.get("command") == "answer":  # a service of the question: it reaches no twin
+        if command.get("command") == "answer":  # each question has a service of its own
             return link.answer(command)
+        # Commands go to a service named after the machine, which its namesake has too.
         with self._lock:
             links = list(self._links.values())
         twins = [one for one in links if one.alive and one.is_twin(link)]
         if len(twins) > 1:
             raise CommandError(
-                f"{name}: {len(twins)} machines are called {link.server!r}, and a command would "
-                "reach all; expected one. Give each a name or a namespace of its own."
+                f"{name}: got {len(twins)} machines with the name {link.server!r}, which would all "
+                "get the command; expected one. Give each its own name or namespace."
             )
         return link.send(command)
 
     def value(self, name: str, container: str, key: str) -> str:
-        """Return a value of a machine's userdata as it is now, whole.
+        """Return the present value of a userdata key, unabridged.
 
         Raises:
-            CommandError: no such machine or value, or no answer.
+            CommandError: there is no such machine or value, or no answer.
 
-        Blocks: until the answer, some seconds at most.
+        Blocks: until the answer, a few seconds at most.
         """
         return self._link(name).value(container, key)
 
     def picture(self, name: str, path: str) -> tuple[str, bytes] | None:
-        """Return media type and bytes of the picture of a question; None when there is none.
+        """Return media type and bytes of a question's picture; None if it has none.
 
         Raises:
-            CommandError: no such machine.
+            CommandError: there is no such machine.
 
-        Blocks: until it has come, some seconds at most.
+        Blocks: until the picture has arrived, a few seconds at most.
         """
         return self._link(name).picture(path)
 
@@ -161,19 +171,19 @@ class Network:
         with self._lock:
             if presence.alive and (node, server) not in self._subscriptions:
                 self._subscriptions[node, server] = _Subscription(server, node, self._on_sample)
-            link = self._of(server, endpoint.session)
+            link = self._find(server, endpoint.session)
             if link is None and presence.alive:
-                link = self._take_in(server, endpoint, node)
+                link = self._assign(server, endpoint, node)
         if link is not None:
             link.on_presence(presence.key, alive=presence.alive)
 
-    def _of(self, server: str, session: str) -> Link | None:
+    def _find(self, server: str, session: str) -> Link | None:
         """The link to the server of that name in that session."""
         links = self._links.values()
         return next((o for o in links if (o.server, o.session) == (server, session)), None)
 
-    def _take_in(self, server: str, endpoint: Endpoint, node: Node) -> Link:
-        """The link for a server that is new: that of one that has gone, else another one."""
+    def _assign(self, server: str, endpoint: Endpoint, node: Node) -> Link:
+        """Give a new server the link of one of its name that has gone, otherwise a new link."""
         for number in itertools.count(1):
             name = server if number == 1 else f"{server} ({number})"
             link = self._links.get(name)
@@ -184,17 +194,20 @@ class Network:
             if not link.alive and link.on(node):
                 link.adopt(endpoint)
                 return link
-        raise AssertionError  # numbers do not end
+        raise AssertionError  # unreachable: `count` is endless
 
     def _on_sample(self, server: str, sample: Sample) -> None:
         with self._lock:
-            link = self._of(server, sample.source)
+            link = self._find(server, sample.source)
         if link is not None:
             link.on_sample(sample)
 
 
 class _Subscription:
-    """Receives from all servers of one name, and from which of them; a `Subscriber` does not."""
+    """Receives from all servers of one name, with the session of each sample.
+
+    `Subscriber` passes on only messages, not their source, so this subscribes to the transport.
+    """
 
     def __init__(self, server: str, node: Node, on_sample: Callable[[str, Sample], None]) -> None:
         transport = node.transport
@@ -208,16 +221,16 @@ class _Subscription:
             ]
 
     def close(self) -> None:
-        """Receive nothing any more."""
+        """Stop receiving."""
         for part in self._parts:
             part.close()
 
 
 class Link:
-    """Follows one server at a time: when it has gone, the next one of its name.
+    """Follows one server at a time; when it has gone, the next one of its name.
 
-    What it receives is worked off in order, one at a time, so that nothing is between the history
-    and the events after it.
+    A single thread handles everything that is received, in order: an event cannot be added while
+    the history is being replaced.
     """
 
     def __init__(self, server: str, machine: Machine, node: Node, *, control: bool) -> None:
@@ -226,7 +239,7 @@ class Link:
         self._machine = machine
         self._node = node
         self._executor = SerialExecutor(node.clock, f"link to {server}")
-        self._alive: set[str] = set()
+        self._alive: set[str] = set()  # keys of the server's tokens
         self._closed = False
         self._received: deque[str] = deque()
         self._client = ControlClient(f"/{server}", node) if control else None
@@ -236,15 +249,15 @@ class Link:
 
     @property
     def alive(self) -> bool:
-        """Whether its server is there."""
+        """Whether its server is connected."""
         return bool(self._alive)
 
     def on(self, node: Node) -> bool:
-        """Tell whether its servers are where `node` is."""
+        """Return whether it follows servers on the network of `node`."""
         return self._node is node
 
     def is_twin(self, other: Link) -> bool:
-        """Tell whether a command to one of the two would reach both."""
+        """Return whether a command to one of the two would reach both."""
         return self.server == other.server and self._node is other._node
 
     def adopt(self, endpoint: Endpoint) -> None:
@@ -261,17 +274,17 @@ class Link:
         self._executor.join(HISTORY_S)
 
     def send(self, command: dict[str, Any]) -> dict[str, Any]:
-        """Send a command and return the answer; the machine tells what has become of it."""
+        """Send a command and return the machine's answer."""
         if self._client is None:
-            raise CommandError(f"{self.server}: this viewer only looks. Try --control.")
+            raise CommandError(f"{self.server}: this viewer sends no commands. Try --control.")
         return self._client.send(command)
 
     def answer(self, command: dict[str, Any]) -> dict[str, Any]:
-        """Answer a question of the machine, whether it takes other commands or not."""
+        """Answer a question of the machine; this works without remote control."""
         words = [command.get(name) for name in ("path", "answer", "by")]
         if not all(isinstance(word, str) for word in words):
             raise CommandError(
-                f"command 'answer': got {command}; expected path, answer, by as texts."
+                f"command 'answer': got {command}; expected the texts path, answer and by."
             )
         path, answer, by = map(str, words)
         question = self._machine.questions().get(path)
@@ -281,12 +294,12 @@ class Link:
         return {"ok": True, "text": ""}
 
     def picture(self, path: str) -> tuple[str, bytes] | None:
-        """Return media type and bytes of the picture of a question; None when there is none."""
+        """Return media type and bytes of a question's picture; None if it has none."""
         question = self._machine.questions().get(path)
         return None if question is None else fetch_picture(question["service"], node=self._node)
 
     def value(self, container: str, key: str) -> str:
-        """Return a value of the machine's userdata, whole."""
+        """Return the present value of a userdata key, unabridged."""
         try:
             answer = self._values(container, key)
         except ActionlibError as error:
@@ -297,16 +310,16 @@ class Link:
         return text
 
     def on_presence(self, key: str, *, alive: bool) -> None:
-        """A server of this name has come or gone."""
+        """Handle the appearance or disappearance of the server."""
         if alive:
             self._alive.add(key)
-            self._executor.submit(self._come)
+            self._executor.submit(self._on_appeared)
         else:
             self._alive.discard(key)
-            self._executor.submit(self._go)
+            self._executor.submit(self._on_gone)
 
     def on_sample(self, sample: Sample) -> None:
-        """Take what the server has sent."""
+        """Handle a message of the server."""
         if sample.key.endswith(DESCRIPTION_TOPIC):
             self._executor.submit(lambda: self._describe(_text(sample)))
             return
@@ -317,33 +330,35 @@ class Link:
             self._executor.submit(lambda: self._machine.observe([_record(_text(sample))]))
             return
         self._received.append(_text(sample))
-        if len(self._received) == 1:  # the others go with the first
+        if len(self._received) == 1:  # otherwise a call of `_add` is pending and takes it too
             self._executor.submit(self._add)
 
     def lose(self) -> None:
-        """Its network has gone."""
+        """Handle the end of its network."""
         self._alive.clear()
-        self._executor.submit(self._go)
+        self._executor.submit(self._on_gone)
 
-    def _come(self) -> None:
+    def _on_appeared(self) -> None:
         self._read_history()
         self._node.clock.sleep(SETTLE_S)
         self._read_history()
 
-    def _go(self) -> None:
+    def _on_gone(self) -> None:
         if not self._alive:
             self._machine.set_stale(self._node.clock.time_ns())
 
     def _add(self) -> None:
         self._node.clock.sleep(GATHER_S)
+        # Not `clear`: the receiving thread may have appended since the copy.
         texts = list(self._received)
         for _ in texts:
             self._received.popleft()
         events = [_record(text) for text in texts]
+        # Only the history says to which durable mission a new run belongs.
         begins = any(event["kind"] in {"Started", "Recovered"} for event in events)
-        if not self._machine.add(events) or begins:  # of which mission the run is, is there
+        if not self._machine.add(events) or begins:
             self._read_history()
-        if self._received:
+        if self._received:  # `on_sample` submits only for the first one of an empty queue
             self._executor.submit(self._add)
 
     def _describe(self, text: str) -> None:
@@ -357,6 +372,7 @@ class Link:
             logger.info("%s: no history yet", self.server)
             self._node.clock.call_later(RETRY_S, lambda: self._executor.submit(self._read_history))
             return
+        # The same program as before: add what is missing, so that the page need not begin anew.
         machine = self._machine
         known = machine.record is not None and machine.problems == history["problems"]
         if known and machine.epoch == history["epoch"]:
@@ -370,7 +386,7 @@ class Link:
         machine.reset(history)
 
     def _ask_history(self) -> dict[str, Any] | None:
-        """The answer of this link's own server, should there be several of the name."""
+        """Request the history; of several servers of the name, only this link's answer counts."""
         replies: list[Reply] = []
         done = self._node.clock.event(f"history of {self.server}")
         asked = self._node.clock.time_ns()
@@ -383,6 +399,7 @@ class Link:
             on_done=done.set,
         )
         done.wait(HISTORY_S + 1.0)
+        # The server's time is taken for that in the middle between request and answer, as in NTP.
         middle = (asked + self._node.clock.time_ns()) // 2
         query.close()
         answers = [Trigger._response_class.from_bytes(r.payload) for r in replies if not r.error]
@@ -401,6 +418,6 @@ def _text(sample: Sample) -> str:
 
 
 def _record(text: str) -> dict[str, Any]:
-    """What a mission tells; NaN and infinite numbers as texts, for browsers do not know them."""
+    """Parse a machine's message; NaN and infinities become text, as browsers' JSON has none."""
     record: dict[str, Any] = json.loads(text, parse_constant=str)
     return record

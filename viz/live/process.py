@@ -1,4 +1,4 @@
-"""`smachpy view` as a child process that never outlives its parent, nor holds it up."""
+"""`smachpy view` as a child process, which never outlives its parent or delays it."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Self
 
-START_S = 20.0  # a viewer that says nothing for so long is ended
+START_S = 20.0
+"""Longest wait for the viewer to print its address; then it is ended [s]."""
 
 
 class ViewerError(SmachError):
-    """The viewer could not be started; the text is what it said."""
+    """The viewer could not be started; the text is its error message."""
 
 
 class ViewerProcess(ChildProcess):
     """Runs the viewer; a context manager.
 
-    It finds the machine over the network as any other viewer does, so that nothing it does, or
-    fails to do, reaches the mission. It knows the interface definitions of this process's folders.
+    The viewer finds the machine over the network like any other viewer, so its failures cannot
+    affect the mission. It gets the interface definitions from the same folders as this process.
 
     Args:
         arguments: Further arguments of `smachpy view`.
 
     Raises:
-        ViewerError: it could not start; when entered.
+        ViewerError: on entering the context, if the viewer could not start.
     """
 
     def __init__(self, arguments: Sequence[str] = ()) -> None:
@@ -50,10 +51,10 @@ class ViewerProcess(ChildProcess):
 
     @property
     def address(self) -> str:
-        """Where the page is, with the token of its commands if it takes any."""
+        """The address of the page, with the token for commands if they are enabled."""
         return self.first_line
 
 
 def _interface_path() -> str:
-    """The folders in which this process looks for definitions, for the environment."""
+    """The folders in which this process looks for definitions, as an environment variable."""
     return os.pathsep.join(str(p) for p in registry.sources.search_path() if p != BUNDLED)

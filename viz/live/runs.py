@@ -1,4 +1,4 @@
-"""The runs that the home page lists: those of machines that are known, and those in folders."""
+"""Lists the runs for the home page: those of known machines, in folders and in journals."""
 
 from __future__ import annotations
 
@@ -14,39 +14,42 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from viz.live.journals import Journals
-    from viz.live.machines import Machine, Machines
+    from viz.live.machines import Machines
 
 MOST_FILES: Final = 500
-"""So many of the newest files of the folders are listed."""
+"""Recordings in the folders that are listed: the newest ones."""
 
 MOST_OPEN: Final = 20
-"""So many recordings that were opened from the list stay in memory."""
+"""Recordings opened from the list that stay in memory."""
 
 DAY_NS: Final = 86_400_000_000_000
-"""A clock that is further behind is that of a mission in virtual time."""
+"""A machine's clock that differs by more than a day is taken for virtual time."""
 
 MOST_IN_FLEET: Final = 32
-"""So many live runs are shown together, each with so many of its newest poses and goals' events."""
+"""Live runs that are shown together."""
 
 MOST_POSES: Final = 200
+"""Newest poses of each of them."""
+
 MOST_GOALS: Final = 100
+"""Newest events about goals of each of them."""
 
 SAME_NS: Final = 5_000_000
-"""Runs of one machine that began within this time are one: a file and what the network told."""
+"""Runs of one machine that began within this time are one run, live and in a file."""
 
 LARGEST: Final = 200_000_000
-"""Bytes of a file that is read."""
+"""Largest recording that is read [bytes]."""
 
 
 class Runs:
     """Lists runs and opens recordings.
 
     Args:
-        machines: Those that are known; an opened recording becomes one of them.
-        folders: Where recordings are; one that does not exist has none.
-        journals: Durable missions; None lists none.
+        machines: The known machines; an opened recording becomes one of them.
+        folders: Folders of recordings; they need not exist.
+        journals: Journals of durable missions; None for none.
 
-    Threads: every method may be called from any thread, and reads files.
+    Threads: every method may be called from any thread; all read files.
     """
 
     def __init__(
@@ -59,18 +62,18 @@ class Runs:
         self._journals = journals
         self._folders = list(dict.fromkeys(folders))
         self._lock = threading.Lock()
+        # Rows of files, with the time and size by which a change is noticed.
         self._rows: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
         self._opened: dict[str, None] = {}  # names of machines, in the order of their opening
 
     def rows(self) -> dict[str, Any]:
-        """Return `runs`, newest first, `folders`, and `journals`, see `Journals.places`.
+        """Return `runs`, newest first, `folders`, and `journals` (`Journals.places`).
 
-        A row has what `run_row` says, and `id`; `name` of the machine, null for a file that is not
-        open; `live`; `file`, "" for none; `problem`, for a file that cannot be read; `run`, which
-        names the run of a durable mission, else ""; `stamp`, `began` by the mission's own time,
-        which may have been virtual; `asks`, whether a person is asked; `mission`,
-        null or what `Journals.rows` says of it. A run that is on the network, in files and in a
-        journal is one row.
+        A row has the keys of `run_row` and: `id`; `name` of the machine, None for a file that is
+        not open; `live`; `file`, "" for none; `problem`, why a file cannot be read; `run`, the id
+        of a durable mission's run, otherwise ""; `stamp`, the beginning by the mission's own time,
+        which may be virtual; `asks`, whether a question is open; `mission`, None or as in
+        `Journals.rows`. A run on the network, in files and in a journal is one row.
         """
         missions = [] if self._journals is None else self._journals.rows()
         with self._lock:
@@ -92,10 +95,10 @@ class Runs:
         }
 
     def fleet(self) -> list[dict[str, Any]]:
-        """Return the live runs as rows, with what a map of all needs: `observed` and `events`.
+        """Return the live runs as rows with the data for a common map.
 
-        `observed` are the newest map and poses that the robot's topics told; `events` the newest
-        about goals. Those of files and of machines that are gone are left out.
+        `observed` has the newest map and the newest poses of the robot, `events` the newest events
+        about goals. Recordings and machines whose program is gone are left out.
         """
         names = [
             one["name"]
@@ -107,21 +110,21 @@ class Runs:
             machine = self._machines.get(name)
             if machine is None or not (row := self._row_of(name))["live"]:
                 continue
-            seen = machine.observed()
-            maps = [one for one in seen if one["what"] == "map"][-1:]
-            poses = [one for one in seen if one["what"] == "pose"][-MOST_POSES:]
+            observed = machine.observed()
+            maps = [one for one in observed if one["what"] == "map"][-1:]
+            poses = [one for one in observed if one["what"] == "pose"][-MOST_POSES:]
             goals = [one for one in machine.events() if one["kind"].startswith("Goal")]
             found.append({**row, "observed": maps + poses, "events": goals[-MOST_GOALS:]})
         return found
 
     def command(self, mission: dict[str, Any]) -> str:
-        """Resume or cancel a durable mission; return what happens now, in words.
+        """Resume or cancel a durable mission; return a text that says what happens now.
 
         Args:
-            mission: `journal`, `id` and `command`, texts.
+            mission: The texts `journal`, `id` and `command`.
 
         Raises:
-            SmachError: that is not what was given, or see `Journals.command`.
+            SmachError: a text is missing, or as for `Journals.command`.
         """
         words = [mission.get(name) for name in ("journal", "id", "command")]
         if self._journals is None or not all(isinstance(word, str) for word in words):
@@ -130,12 +133,13 @@ class Runs:
                 "mission that is listed."
             )
         journal, name, command = map(str, words)
+        # A resumed run continues its recording, so that it stays one run in one file.
         listed = self.rows()["runs"]
         file = next((one["file"] for one in listed if _is_mission(one, journal, name)), "")
         return self._journals.command(journal, name, command, file)
 
     def open(self, run: str) -> str:
-        """Return the name of the machine that shows a run, which is read if it is a file.
+        """Return the name of the machine that shows a run; read its file if necessary.
 
         Args:
             run: The `id` of a row.
@@ -148,12 +152,13 @@ class Runs:
             return name
         path = Path(name)
         with self._lock:
+            # Only files that are listed: a page must not read any other file of this computer.
             if kind != "file" or path not in self._files():
-                raise RecordingError(name, "no such run in the list; expected one of it.")
+                raise RecordingError(name, "no such run; expected one in the list.")
             machine = self._machines.obtain(f"run {path.name}")
             if machine.name not in self._opened or machine.file != str(path):
-                self._fill(machine, path)
-            self._opened.pop(machine.name, None)
+                machine.load(read_recording(path))
+            self._opened.pop(machine.name, None)  # moved to the end: the most recently used
             self._opened[machine.name] = None
             while len(self._opened) > MOST_OPEN:
                 oldest = next(iter(self._opened))
@@ -161,19 +166,13 @@ class Runs:
                 self._machines.forget(oldest)
         return machine.name
 
-    def _fill(self, machine: Machine, path: Path) -> None:
-        recording = read_recording(path)
-        machine.recorded, machine.file = True, str(path)
-        machine.date_shift = recording.made_ns - recording.stamp_ns
-        machine.reset(recording.history(), limit=len(recording.events) + 1)
-
     def _files(self) -> list[Path]:
         found: list[tuple[int, Path]] = []
         for folder in self._folders:
             for path in folder.glob("*.jsonl") if folder.is_dir() else ():
                 try:
                     found.append((path.stat().st_mtime_ns, path))
-                except OSError:  # it has just been removed
+                except OSError:  # removed since `glob` listed it
                     continue
         return [path for _, path in sorted(found, reverse=True)[:MOST_FILES]]
 
@@ -212,9 +211,9 @@ class Runs:
 def with_missions(
     rows: list[dict[str, Any]], missions: Iterable[dict[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Return runs with the missions that they are of, and those missions that have no other row."""
+    """Join rows of runs with their missions; missions without a run get a row of their own."""
     of_run = {one["run"]: one for one in missions}
-    joined: dict[str, dict[str, Any]] = {}
+    joined: dict[str, dict[str, Any]] = {}  # by run; a live row comes before its recording's
     found = []
     for row in rows:
         mission = of_run.get(row["run"]) if row["run"] else None
@@ -226,10 +225,10 @@ def with_missions(
                 known |= {one: mission[one] for one in ("outcome", "ended", "began", "outages")}
                 known["reason"] = (row if mission["outcome"] else mission)["reason"]
             found.append(known)
-        elif not joined[row["run"]]["file"]:  # a live one that is being written
+        elif not joined[row["run"]]["file"]:  # the recording of a live run is dropped but for this
             joined[row["run"]]["file"] = row["file"]
-    none = {"stamp": None, "name": None, "live": False, "asks": False, "file": "", "problem": ""}
-    return found + [{**none, **one} for one in of_run.values() if one["run"] not in joined]
+    empty = {"stamp": None, "name": None, "live": False, "asks": False, "file": "", "problem": ""}
+    return found + [{**empty, **one} for one in of_run.values() if one["run"] not in joined]
 
 
 def _is_mission(row: dict[str, Any], journal: str, name: str) -> bool:
@@ -238,7 +237,7 @@ def _is_mission(row: dict[str, Any], journal: str, name: str) -> bool:
 
 
 def _is_same(file: dict[str, Any], row: dict[str, Any]) -> bool:
-    """Tell whether a file holds the run of a machine's row: it was opened, or is being written."""
+    """Return whether a file has a machine's run: it was opened from it, or is being written."""
     if file["file"] == row["file"]:
         return True
     if file["stamp"] is None or row["stamp"] is None or file["machine"] != row["machine"]:
@@ -247,9 +246,9 @@ def _is_same(file: dict[str, Any], row: dict[str, Any]) -> bool:
 
 
 def _dated(row: dict[str, Any], shift: int) -> dict[str, Any]:
-    """Return a row with its real date, where the mission's own time was virtual.
+    """Shift a row's times to the real date, in case the mission's own time was virtual.
 
-    `stamp` is when it began by the mission's own time, which names the run.
+    `stamp` keeps the beginning by the mission's own time, by which a run is recognised.
     """
     times = {name: row[name] for name in ("began", "ended", "last")}
     real = {name: None if at is None else at + shift for name, at in times.items()}
@@ -259,13 +258,6 @@ def _dated(row: dict[str, Any], shift: int) -> dict[str, Any]:
 def _read_row(path: Path, size: int) -> dict[str, Any]:
     row: dict[str, Any] = {"id": f"file {path}", "name": None, "live": False, "file": str(path)}
     row |= {"run": "", "mission": None, "asks": False}
-    nothing: dict[str, Any] = {
-        "machine": path.stem,
-        "robots": [],
-        "began": None,
-        "ended": None,
-        "last": None,
-    }
     problem = f"got {size} bytes; expected at most {LARGEST}" if size > LARGEST else ""
     if not problem:
         try:
@@ -277,5 +269,6 @@ def _read_row(path: Path, size: int) -> dict[str, Any]:
             listed = run_row(recording.record, recording.events)
             shift = recording.made_ns - recording.stamp_ns
             return {**row, **_dated(listed, shift), "problem": ""}
-    nothing |= {"stamp": None, "outcome": None, "reason": "", "strip": [], "outages": []}
-    return {**row, **nothing, "problem": problem}
+    row |= dict.fromkeys(("began", "ended", "last", "stamp", "outcome"))
+    row |= {"machine": path.stem, "robots": [], "reason": "", "strip": [], "outages": []}
+    return {**row, "problem": problem}

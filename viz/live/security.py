@@ -1,8 +1,8 @@
-"""Who may ask the page's server for what.
+"""Protects the page's server against other web sites and foreign commands.
 
-The server shows a robot's inside and may steer it, so a web page from elsewhere that runs in the
-same browser must not reach it: requests need a host name that is this server's own (which defeats
-DNS rebinding), commands also an origin that is this page and the token of the printed address.
+The server shows a robot's data and can control it, so another web page in the same browser must not
+reach it. Every request must name a host of this server, which defeats DNS rebinding; a command must
+also come from this page's origin and carry the token of the printed address.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ def make_token() -> str:
 
 
 def policy() -> str:
-    """Return the content security policy: nothing from anywhere else, no inline code."""
+    """Return the content security policy: nothing from other hosts, no inline code.
+
+    The only inline script is the import map, which is allowed by its hash.
+    """
     return (
         f"default-src 'none'; script-src 'self' {script_hash()}; style-src 'self'; "
         "font-src 'self'; img-src 'self' data: blob:; connect-src 'self'; worker-src 'self'; "
@@ -42,11 +45,11 @@ def policy() -> str:
 
 
 class Guard:
-    """Middleware: refuses foreign hosts, adds the protective headers.
+    """Middleware that refuses foreign hosts and adds protective headers.
 
     Args:
-        app: What is protected.
-        hosts: Names that the server goes by, besides addresses.
+        app: The protected application.
+        hosts: Host names of the server; addresses and "localhost" are always allowed.
     """
 
     def __init__(self, app: ASGIApp, *, hosts: tuple[str, ...] = ()) -> None:
@@ -66,7 +69,7 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        host = dict(scope["headers"]).get(b"host", b"").decode("latin-1")
+        host = dict(scope["headers"]).get(b"host", b"").decode("latin-1")  # as ASGI has headers
         if not self._is_ours(host):
             refusal = PlainTextResponse(
                 f"host: got {host!r}; expected an address, or one of {sorted(self._hosts)}.",
@@ -89,10 +92,12 @@ class Guard:
         headers.extend(pair for pair in self._headers if pair[0] not in have)
 
     def _is_ours(self, host: str) -> bool:
+        # "name:port", "1.2.3.4:port", "[::1]:port" or the same without a port.
         name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
         name = name.strip("[]").lower()
         if name in self._hosts:
             return True
+        # DNS rebinding needs a name: an address cannot be made to point elsewhere.
         try:
             ipaddress.ip_address(name)
         except ValueError:
@@ -101,13 +106,14 @@ class Guard:
 
 
 def refuse_command(request: Request, token: str | None) -> str | None:
-    """Return why a command is refused, None when it is not."""
+    """Return why a command is refused; None if it is accepted."""
     headers: Headers = request.headers
     if token is None:
-        return "this viewer only looks. Try: smachpy view --control"
+        return "this viewer sends no commands. Try: smachpy view --control"
     origin = headers.get("origin", "")
     if origin != f"{request.url.scheme}://{headers.get('host', '')}":
         return f"origin: got {origin!r}; expected this page."
+    # compare_digest takes the same time for every wrong token, so none can be guessed by timing.
     if not secrets.compare_digest(headers.get(TOKEN_HEADER, "").encode(), token.encode()):
         return WRONG_TOKEN
     return None

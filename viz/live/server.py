@@ -1,4 +1,4 @@
-"""Serves the page until the program is to end."""
+"""Serves the page until the program is asked to end."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from smachpy.exceptions import SmachError
 if TYPE_CHECKING:
     from viz.live.app import Viewer
 
-GOODBYE_S = 1
+SHUTDOWN_S = 1
+"""Longest wait for open requests at the end; uvicorn takes whole seconds."""
 EVERYWHERE = {
-    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),  # noqa: S104  what a user asked for
+    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),  # noqa: S104  the user's choice
     "::": (socket.AF_INET6, "2001:db8::1", "::1"),
 }
-"""Hosts that mean all of this computer's addresses: family, an address far away, its own."""
+"""Hosts that mean all addresses of this computer: family, a remote address, the local one."""
 
 
 class AddressError(SmachError):
-    """The page cannot be served at the address asked for.
+    """The page cannot be served at the given address.
 
     Attributes:
         host: The host.
@@ -33,15 +34,16 @@ class AddressError(SmachError):
         self.port = port
         super().__init__(
             f"smachpy view: {host}:{port}: cannot listen: {reason}; expected a free port. "
-            "Try --port 0, which takes any."
+            "Try --port 0 for any free port."
         )
 
 
 def outward_address(host: str) -> str:
-    """Return this computer's address on the way to other networks, where a server listens to all.
+    """Return the address under which other computers reach a server that listens on all addresses.
 
-    Nothing is sent: a datagram socket that is connected only looks the way up (the addresses are
-    those for documentation, RFC 5737 and RFC 3849). Without a way out it is the computer itself.
+    It is the local address of the route to other networks, or the loopback address without such a
+    route. Nothing is sent: connecting a datagram socket only looks up the route. The remote
+    addresses are reserved for documentation (RFC 5737 and RFC 3849).
 
     Args:
         host: "0.0.0.0" or "::".
@@ -60,22 +62,24 @@ class PageServer(uvicorn.Server):
     """Serves one `Viewer`.
 
     Args:
-        viewer: What to serve.
-        host: Where to listen.
-        port: 0 takes any free port.
+        viewer: The viewer.
+        host: The address to listen on.
+        port: The port; 0 for any free one.
 
     Raises:
-        AddressError: nobody can listen there.
+        AddressError: the address is invalid or in use.
     """
 
     def __init__(self, viewer: Viewer, host: str, port: int) -> None:
         self._viewer = viewer
+        # The socket is opened here and not by uvicorn, which would exit the program on an error and
+        # does not tell which port it got.
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
             self._socket = socket.create_server((host, port), family=family)
         except OSError as error:
             raise AddressError(host, port, error.strerror or str(error)) from error
-        except (OverflowError, UnicodeError) as error:  # a port or a host that is none
+        except (OverflowError, UnicodeError) as error:  # an invalid port or host name
             raise AddressError(host, port, str(error)) from error
         self.host = host
         self.port: int = self._socket.getsockname()[1]
@@ -85,13 +89,13 @@ class PageServer(uvicorn.Server):
             access_log=False,
             server_header=False,
             ws="none",
-            timeout_graceful_shutdown=GOODBYE_S,
+            timeout_graceful_shutdown=SHUTDOWN_S,
         )
         super().__init__(config)
 
     @property
     def address(self) -> str:
-        """Return the page's address: one that others can open where it listens everywhere."""
+        """The page's URL; if the server listens on all addresses, one that others can open."""
         host = outward_address(self.host) if self.host in EVERYWHERE else self.host
         host = f"[{host}]" if ":" in host and not host.startswith("[") else host
         return f"http://{host}:{self.port}/"
@@ -99,15 +103,15 @@ class PageServer(uvicorn.Server):
     def serve_here(self) -> None:
         """Serve until SIGINT, SIGTERM or `stop`.
 
-        Blocks: until then.
+        Blocks: until the server has stopped.
         """
         self.run(sockets=[self._socket])
 
     def stop(self) -> None:
-        """End `serve_here`; from any thread."""
+        """End `serve_here`; may be called from any thread."""
         self.should_exit = True
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the streams first, as they would never end by themselves."""
+        """End the event streams first; uvicorn waits for them and they never end by themselves."""
         self._viewer.close()
         await super().shutdown(sockets)

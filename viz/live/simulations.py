@@ -1,4 +1,4 @@
-"""Many simulated runs that the page starts: each batch is a process, a folder and a report."""
+"""Batches of simulated runs, started from the page; each has a process, a folder and a report."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import RealClock
+from smachpy.command import EXIT_ERROR
 from smachpy.command.targets import list_missions
 from smachpy.exceptions import SmachError
 from viz.runs.simulate import Vary
@@ -24,20 +25,24 @@ if TYPE_CHECKING:
 
 MOST_RUNS: Final = 1_000
 MOST_RUNNING: Final = 2
-"""So many batches run at the same time; each takes all cores."""
+"""Batches that may run at the same time; each of them uses all cores."""
 
 MOST_BATCHES: Final = 50
+"""Batches that are listed: the newest ones."""
+
 MOST_VARIED: Final = 8
 STOP_S: Final = 5.0
-EXIT_BAD_INPUT: Final = 2
+"""Time after an interrupt until a batch is killed [s]."""
 
 _ID = re.compile(r"[\w.-]{1,120}", re.ASCII)
 _LIMIT = re.compile(r"\d{1,9}(\.\d{1,3})?[smh]?", re.ASCII)
 _FACTS = "batch.json"
+_ERRORS = "errors.txt"
+_REPORT = "report.html"
 
 
 class SimulationError(SmachError):
-    """Runs cannot be started, or there are none of that name."""
+    """A batch cannot be started, or does not exist."""
 
 
 @dataclass(slots=True)
@@ -45,18 +50,18 @@ class Batch:
     """Runs that were started together.
 
     Attributes:
-        id: Its folder's name.
-        mission: What is simulated.
-        runs: How many.
-        vary: What varies, as `smachpy simulate --vary` takes it.
-        seed: See `smachpy simulate`.
-        limit: Virtual time that a run may take: "4h".
-        compare: Id of the batch that it is compared with, or "".
+        id: Name of its folder.
+        mission: The mission.
+        runs: Number of runs.
+        vary: The values that vary, as for `smachpy simulate --vary`.
+        seed: As for `smachpy simulate`.
+        limit: Virtual time that a run may take, such as "4h".
+        compare: Id of the batch to compare with, or "".
         began_ns: When it was started [ns since the epoch].
-        outcomes: How runs have ended -> how many.
-        failed: So many raised, or did not end.
-        first_failure: Why, of the first of them.
-        running: Whether it goes on.
+        outcomes: Outcome -> number of runs.
+        failed: Number of runs that raised an exception or did not end.
+        first_failure: The reason for the first of these.
+        running: Whether it is still running.
         problem: Why there is no report, or "".
     """
 
@@ -76,11 +81,11 @@ class Batch:
 
 
 class Simulations:
-    """Starts batches and tells how they stand; those of earlier viewers too.
+    """Starts batches and lists them with those of earlier viewers.
 
     Args:
-        folder: Where their folders are; it need not exist.
-        missions: What may be simulated besides the installed missions.
+        folder: The folder of their folders; it need not exist.
+        missions: Missions that may be simulated besides the installed ones.
 
     Threads: every method may be called from any thread; `start` and `rows` read files.
     """
@@ -96,11 +101,11 @@ class Simulations:
         self._tasks: list[Any] = []
 
     def missions(self) -> dict[str, str]:
-        """Return what may be simulated, name -> what it does."""
+        """Return the missions that may be simulated: name -> description."""
         return {**dict.fromkeys(self._own, ""), **list_missions()}
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return all batches, the newest first: `Batch`, and `report`, whether there is one."""
+        """Return the batches, newest first: the fields of `Batch`, and whether it has `report`."""
         with self._lock:
             for path in self._folder.glob(f"*/{_FACTS}") if self._folder.is_dir() else ():
                 name = path.parent.name
@@ -108,7 +113,7 @@ class Simulations:
                     self._batches[name] = read
             found = sorted(self._batches.values(), key=lambda one: one.began_ns, reverse=True)
             return [
-                {**asdict(one), "report": (self._folder / one.id / "report.html").is_file()}
+                {**asdict(one), "report": (self._folder / one.id / _REPORT).is_file()}
                 for one in found[:MOST_BATCHES]
             ]
 
@@ -119,26 +124,29 @@ class Simulations:
             asked: `mission`, `runs`, `vary` (a list of texts), `seed`, `limit` and `compare`.
 
         Raises:
-            SimulationError: that makes no sense, with all problems; or too many run already.
+            SimulationError: the arguments are invalid, with all problems; or too many batches run.
         """
         batch = self._checked(asked)
         with self._lock:
             if sum(one.running for one in self._batches.values()) >= MOST_RUNNING:
-                raise SimulationError(f"{MOST_RUNNING} batches run already; expected fewer.")
+                raise SimulationError(
+                    f"batches: got {MOST_RUNNING} running ones; expected fewer. Stop one, or wait."
+                )
             folder = self._folder / batch.id
             try:
                 folder.mkdir(parents=True)
                 _write(folder, batch)
-                said = (folder / "said.txt").open("w", encoding="utf-8")
+                errors = (folder / _ERRORS).open("w", encoding="utf-8")
             except OSError as error:
                 raise SimulationError(f"{str(folder)!r}: {error.strerror or error}.") from error
-            with said:
+            with errors:
                 process = subprocess.Popen(  # noqa: S603  our own command
                     [sys.executable, "-m", "smachpy.command", *self._words(batch, folder)],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
-                    stderr=said,
-                    start_new_session=True,  # its group: the command and its processes
+                    stderr=errors,
+                    # A group of its own: signals reach the command and its worker processes.
+                    start_new_session=True,
                     text=True,
                     encoding="utf-8",
                     errors="replace",
@@ -151,34 +159,35 @@ class Simulations:
         return batch.id
 
     def stop(self, name: object) -> None:
-        """End a batch that runs, as Ctrl-C does; it is killed after `STOP_S`. What is done is left.
+        """Interrupt a batch as Ctrl-C does, and kill it after `STOP_S`; finished runs remain.
 
         Raises:
-            SimulationError: there is none of that name that runs.
+            SimulationError: there is no running batch of that name.
         """
         with self._lock:
             process = self._processes.get(name) if isinstance(name, str) else None
             if process is None:
-                raise SimulationError(f"batch: got {name!r}; expected one that runs.")
+                raise SimulationError(f"batch: got {name!r}; expected a running one.")
             self._stopped.add(str(name))
         _signal(process, signal.SIGINT)
         self._clock.call_later(STOP_S, lambda: self._kill(name, process))
 
     def report(self, name: str) -> bytes:
-        """Return the report of a batch, a page.
+        """Return the report of a batch, an HTML page.
 
         Raises:
-            SimulationError: there is none.
+            SimulationError: there is no such batch, or it has no report.
         """
-        path = self._folder / name / "report.html"
+        path = self._folder / name / _REPORT
+        # The pattern has no "/": a name cannot lead out of the folder.
         if not _ID.fullmatch(name) or not path.is_file():
             raise SimulationError(f"batch: got {name!r}; expected one that has a report.")
         return path.read_bytes()
 
     def close(self) -> None:
-        """End what runs.
+        """End all running batches.
 
-        Blocks: until it has ended, some seconds at most.
+        Blocks: until they have ended, a few seconds at most.
         """
         with self._lock:
             processes, tasks = list(self._processes.values()), list(self._tasks)
@@ -195,12 +204,16 @@ class Simulations:
     # -- parts -----------------------------------------------------------------------------------
 
     def _kill(self, name: object, process: subprocess.Popen[str]) -> None:
-        """Kill a process that goes on: Python loses an interrupt in a destructor or callback."""
+        """Kill a process that is still running.
+
+        Python drops the KeyboardInterrupt if it is raised in a destructor or C callback.
+        """
         with self._lock:
             if self._processes.get(str(name)) is process:
                 _signal(process, signal.SIGKILL)
 
     def _checked(self, asked: dict[str, Any]) -> Batch:
+        """Return the batch that a page asks for; the page's data may be of any type."""
         problems = []
         mission, runs, seed = asked.get("mission"), asked.get("runs"), asked.get("seed", 1)
         vary, limit = asked.get("vary", []), asked.get("limit") or "4h"
@@ -239,7 +252,7 @@ class Simulations:
         words += ["--limit", batch.limit, "--record", str(folder / "runs"), "--json"]
         words += [word for one in batch.vary for word in ("--vary", one)]
         words += ["--compare", str(self._folder / batch.compare / "runs")] if batch.compare else []
-        return [*words, "-o", str(folder / "report.html")]
+        return [*words, "-o", str(folder / _REPORT)]
 
     def _follow(self, batch: Batch, process: subprocess.Popen[str], folder: Path) -> None:
         """Count the runs of a batch until it ends."""
@@ -252,25 +265,25 @@ class Simulations:
         with self._lock:
             self._processes.pop(batch.id, None)
             batch.running = False
-            if not (folder / "report.html").is_file():
-                # The code alone does not tell: 1 where the interrupt comes while Python starts.
-                stopped = batch.id in self._stopped or code not in {0, 1, EXIT_BAD_INPUT}
-                batch.problem = "it was stopped" if stopped else _last_line(folder / "said.txt")
+            if not (folder / _REPORT).is_file():
+                # The exit code alone is ambiguous: an interrupt while Python starts gives 1.
+                stopped = batch.id in self._stopped or code not in {0, 1, EXIT_ERROR}
+                batch.problem = "it was stopped" if stopped else _last_line(folder / _ERRORS)
             with contextlib.suppress(OSError):
                 _write(folder, batch)
 
-    def _count(self, batch: Batch, told: Any) -> None:
-        outcome = told.get("outcome") if isinstance(told, dict) else None
+    def _count(self, batch: Batch, run: Any) -> None:
+        outcome = run.get("outcome") if isinstance(run, dict) else None
         with self._lock:
             if isinstance(outcome, str):
                 batch.outcomes[outcome] = batch.outcomes.get(outcome, 0) + 1
                 return
             batch.failed += 1
-            batch.first_failure = batch.first_failure or f"run {told['run']}: {told['error']}"
+            batch.first_failure = batch.first_failure or f"run {run['run']}: {run['error']}"
 
 
 def _signal(process: subprocess.Popen[str], number: int) -> None:
-    """Send a signal to a process that leads a group, and to its group."""
+    """Send a signal to a process and its group, which it leads."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, number)
 
@@ -280,7 +293,7 @@ def _write(folder: Path, batch: Batch) -> None:
 
 
 def _read(path: Path) -> Batch | None:
-    """Read a batch of an earlier viewer; one that ran then runs no more."""
+    """Read a batch of an earlier viewer; it cannot be running any more."""
     try:
         batch = Batch(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
@@ -288,14 +301,14 @@ def _read(path: Path) -> Batch | None:
     if batch.id != path.parent.name or type(batch.began_ns) is not int:
         return None
     if batch.running:
-        batch.running, batch.problem = False, "the viewer ended before it"
+        batch.running, batch.problem = False, "the viewer ended before the batch"
     return batch
 
 
 def _last_line(path: Path) -> str:
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        return "it ended without a word"
-    said = [line for line in lines if line.strip()]
-    return said[-1].removeprefix("smachpy: ") if said else "it ended without a word"
+        text = ""
+    lines = [line for line in text.split("\n") if line.strip()]
+    return lines[-1].removeprefix("smachpy: ") if lines else "it ended without an error message"

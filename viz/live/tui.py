@@ -1,4 +1,4 @@
-"""The live view in a terminal: tree, goals, userdata and log; works over ssh."""
+"""The live view in a terminal: tree, goals, userdata and log. It works over ssh."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from smachpy.events import answered_text, asker_text, recovered_text
 from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.outcome_classes import outcome_class
-from viz.model.labels import GLYPHS, shorten
+from viz.model.labels import GLYPHS, innermost, shorten
 from viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING
 
 if TYPE_CHECKING:
@@ -30,17 +30,18 @@ if TYPE_CHECKING:
     from viz.live.machines import Machine, Machines
 
 FRAME_S = 0.2
+"""Time between two updates [s]."""
 BAR = 20
 WIDE = 100
-"""From this many columns on the names and bars of goals have all their room."""
+"""From this width on, names and bars of goals have their full length [columns]."""
 MOST_GOALS = 4
 MOST_VALUES = 100
 LOGGED_LINES = 500
 LOGGED_BACK = 100
-"""Lines of the log while one looks back: all of them at every step take too long."""
+"""Lines of the log while looking back, where every step writes all of them anew."""
 
 STRIDE = 1000
-"""Steps back fold so many events at most, but for one in so many."""
+"""Events before the shown one at which the folded state is kept for further steps back."""
 
 LOGGED = {
     *("Started", "Recovered", "Finished", "Left", "Failed", "GoalDone", "Retried"),
@@ -53,8 +54,8 @@ class MissionApp(App[None]):
     """Shows one machine at a time.
 
     Args:
-        machines: What there is to see.
-        send: Sends a command to a machine; None only looks.
+        machines: The machines.
+        send: Sends a command to a machine; None disables commands.
     """
 
     TITLE = "smachpy"
@@ -68,7 +69,7 @@ class MissionApp(App[None]):
     .-narrow Horizontal { layout: vertical; } .-narrow #left { width: 1fr; height: 40%; }
     .-narrow #userdata { height: auto; max-height: 5; }
     """
-    HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012  not declared as a class variable there
+    HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012  textual does not declare it as a class variable
         (0, "-narrow"),
         (NARROW, "-wide"),
     ]
@@ -77,7 +78,7 @@ class MissionApp(App[None]):
         ("n", "next", "Next machine"),
         ("o", "follow", "Follow"),
         ("slash", "search", "Search"),
-        Binding("space", "pause", "Pause", priority=True),  # else the tree takes it
+        Binding("space", "pause", "Pause", priority=True),  # otherwise the tree would take it
         ("s", "step", "Step"),
         ("comma", "go_by(-1)", "Event back"),
         ("full_stop", "go_by(1)", "Event on"),
@@ -94,18 +95,19 @@ class MissionApp(App[None]):
         self._machines = machines
         self._send = send
         self._machine: Machine | None = None
-        self._shown: tuple[str, int] = ("", 0)
-        self._seq = 0
-        self._until: int | None = None  # number of the event that is looked back at
-        self._mark = 0, ""  # number of an earlier one, and the state after it
+        self._shown: tuple[str, int] = ("", 0)  # epoch and revision of the machine in the tree
+        self._seq = 0  # number of the newest event in `_state`
+        self._until: int | None = None  # while looking back: number of the event that is shown
+        # Number of an earlier event and the state after it as JSON: a step back folds from there.
+        self._mark = 0, ""
         self._state = RunState()
-        self._places: dict[str, TreeNode[StateRecord]] = {}
-        self._targets: dict[tuple[str, str], str] = {}
+        self._places: dict[str, TreeNode[StateRecord]] = {}  # by path
+        self._targets: dict[tuple[str, str], str] = {}  # by path and outcome
         self._follow = True
-        self._rung: set[str] = set()  # services of the questions that were heard of
+        self._rung: set[str] = set()  # services of the questions for which the bell has rung
 
     def compose(self) -> ComposeResult:
-        """Lay the widgets out."""
+        """Create the widgets."""
         yield Static(id="status")
         yield Static(id="preempt")
         yield Static(id="question")
@@ -120,12 +122,12 @@ class MissionApp(App[None]):
         yield Footer()
 
     def on_mount(self) -> None:
-        """Begin to draw."""
+        """Begin with the updates."""
         self.query_one(DataTable).add_columns("key", "value", "written by")
         self.set_interval(FRAME_S, self.refresh_view)
 
     def on_resize(self) -> None:
-        """Wrap the log anew; it keeps the lines of the old width."""
+        """Write the log again: it keeps lines wrapped for the old width."""
         self.call_after_refresh(self._wrap_anew)
 
     def _wrap_anew(self) -> None:
@@ -134,8 +136,8 @@ class MissionApp(App[None]):
             self._write_anew(events, LOGGED_LINES if self._until is None else LOGGED_BACK)
 
     def refresh_view(self) -> None:
-        """Draw what has changed."""
-        if not self.query("#status"):  # at the end the widgets go before the timer does
+        """Draw the changes since the last update."""
+        if not self.query("#status"):  # at the end, widgets are removed before the timer
             return
         machine = self._machine or self._machines.first()
         self._machine = machine
@@ -151,6 +153,7 @@ class MissionApp(App[None]):
         if self._until is not None:
             events = [event for event in events if event["seq"] <= self._until]
             ended = events
+        # Durations end with the newest event if nothing can follow; else at the machine's time now.
         now = events[-1]["stamp_ns"] if ended else time.time_ns() - (machine.behind or 0)
         self._draw_preempt(now)
         self._draw_question(machine, now)
@@ -174,7 +177,7 @@ class MissionApp(App[None]):
         self._fold_anew(machine)
 
     def _fold_anew(self, machine: Machine) -> None:
-        """Fold what is known of the machine."""
+        """Fold all events of the machine from the beginning."""
         base, events = machine.history()
         self._state, self._seq = RunState(base), 0
         self._mark = 0, ""
@@ -183,14 +186,14 @@ class MissionApp(App[None]):
         self._write_anew(events, LOGGED_LINES)
 
     def _look_back(self, machine: Machine, until: int) -> None:
-        """Fold as far as event `until`, from the mark if that is one of those before it."""
+        """Show the state after event `until`; fold from the mark if it is before that event."""
         base, events = machine.history()
         events = [event for event in events if event["seq"] <= until]
         number, text = self._mark
         at = sum(event["seq"] <= number for event in events)
         if at and events[at - 1]["seq"] == number:
             self._state = RunState(json.loads(text))
-        else:
+        else:  # set a new mark STRIDE events before: the next steps back fold only up to STRIDE
             at = max(0, len(events) - STRIDE)
             self._state = RunState(base)
             self._fold(events[:at])
@@ -211,20 +214,20 @@ class MissionApp(App[None]):
         if self._until is not None:
             return
         texts = machine.since(self._seq)
-        if texts is None:  # some are gone, or it was all told anew
+        if texts is None:  # some are no longer kept, or the machine was reset
             self._fold_anew(machine)
         else:
-            self._go_on([json.loads(text) for text in texts])
+            self._add([json.loads(text) for text in texts])
 
     def _fold(self, events: list[dict[str, Any]]) -> bool:
-        """Take events in; whether userdata was written."""
+        """Fold events; return whether userdata was written."""
         for event in events:
             self._state.fold(event)
             self._seq = event["seq"]
         return any(event["kind"] == "UserdataWritten" for event in events)
 
-    def _go_on(self, events: list[dict[str, Any]]) -> None:
-        """Take in and show what comes next."""
+    def _add(self, events: list[dict[str, Any]]) -> None:
+        """Fold and show the next events."""
         if self._fold(events):
             self._draw_userdata()
         self._write(events, LOGGED_LINES)
@@ -265,7 +268,7 @@ class MissionApp(App[None]):
         else:
             word, style = "running", RUNNING
         active = self._state.active()
-        leaf = next((p for p in reversed(active) if not _inside(p, active)), "")
+        leaf = next(reversed(innermost(active)), "")
         trail = " \u203a ".join(shorten(name, 24) for name in leaf.strip("/").split("/"))
         text = Text.assemble(
             (f" {machine.name} ", "bold"), (f" {word} ", f"{style} reverse"), f"  {trail}"
@@ -275,7 +278,7 @@ class MissionApp(App[None]):
         self.query_one("#status", Static).update(text)
 
     def _draw_preempt(self, now: int) -> None:
-        """Who asked for the preempt that is under way, and who holds it up."""
+        """Draw who requested the running preempt, and which states it waits for."""
         widget = self.query_one("#preempt", Static)
         states = self._state.data["states"]
         holds = self._state.holding_up()
@@ -298,11 +301,11 @@ class MissionApp(App[None]):
         widget.update(lines)
 
     def _question(self) -> tuple[str, dict[str, Any]] | None:
-        """Path and question of what is asked first."""
+        """Path and question of the oldest unanswered question."""
         return next(iter(self._state.questions().items()), None)
 
     def _draw_question(self, machine: Machine, now: int) -> None:
-        """What the mission asks, the answers with their keys, and how long it waits."""
+        """Draw the question, the answers with their keys, and the time left."""
         widget = self.query_one("#question", Static)
         found = None if machine.recorded or machine.stale is not None else self._question()
         widget.display = found is not None
@@ -337,7 +340,7 @@ class MissionApp(App[None]):
     def _draw_goals(self) -> None:
         lines = Text()
         goals = list(self._state.data["goals"].values())
-        goals.sort(key=lambda goal: goal["ended"] is None)  # those that run come last
+        goals.sort(key=lambda goal: goal["ended"] is None)  # running ones last: those are shown
         name, bar = (20, BAR) if self.size.width >= WIDE else (14, BAR // 3)
         if len(goals) > MOST_GOALS and (hidden := _running(goals[:-MOST_GOALS])):
             lines.append(f"{hidden} more under way\n", "dim")
@@ -358,7 +361,7 @@ class MissionApp(App[None]):
     # -- keys ----------------------------------------------------------------------------------
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Leave the space bar to the search while somebody types there."""
+        """Leave the space bar to the search field while it has the focus."""
         del parameters
         return not (action == "pause" and self.query_one("#search", Input).has_focus)
 
@@ -370,7 +373,7 @@ class MissionApp(App[None]):
             self._machine = self._machines.get(names[after])
 
     def action_go_by(self, step: int) -> None:
-        """Look at the instant one event back or on."""
+        """Show the instant one event back or forward."""
         machine = self._machine
         if machine is None or machine.record is None:
             return
@@ -388,33 +391,33 @@ class MissionApp(App[None]):
         if self._until is None:
             self._fold_anew(machine)
         elif step > 0 and machine.since(here) is not None:
-            self._go_on([events[numbers.index(to[0])]])
+            self._add([events[numbers.index(to[0])]])
         else:
             self._look_back(machine, to[0])
 
     def action_live(self) -> None:
-        """Show what goes on now."""
+        """Return to the present."""
         if self._machine is not None and self._until is not None:
             self._until = None
             self._fold_anew(self._machine)
 
     def action_follow(self) -> None:
-        """Open what runs, or not."""
+        """Switch opening of running containers on or off."""
         self._follow = not self._follow
 
     def action_search(self) -> None:
-        """Ask what to look for."""
+        """Show the search field."""
         search = self.query_one("#search", Input)
         search.display = True
         search.focus()
 
     def action_leave(self) -> None:
-        """Leave the search."""
+        """Hide the search field."""
         self.query_one("#search", Input).display = False
         self.query_one(Tree).focus()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Go to the first state that is called so."""
+        """Go to the first state whose name contains the text."""
         wanted = event.value.lower()
         for path, node in self._places.items():
             if wanted and wanted in path.rpartition("/")[2].lower():
@@ -427,19 +430,19 @@ class MissionApp(App[None]):
         self.action_leave()
 
     def action_pause(self) -> None:
-        """Pause or go on."""
+        """Pause or resume the machine."""
         machine = self._machine
         if machine is not None:
             paused = bool(machine.control and machine.control["paused"])
             self._command(machine.name, "resume" if paused else "pause")
 
     def action_step(self) -> None:
-        """Let one state run."""
+        """Run one state of a paused machine."""
         if self._machine is not None:
             self._command(self._machine.name, "step")
 
     async def on_key(self, event: events.Key) -> None:
-        """Answer the question by the number of an answer, unless somebody types in the search."""
+        """Answer the question by the number of an answer, unless the search field has the focus."""
         found = self._question()
         machine = self._machine
         if found is None or machine is None or self.query_one("#search", Input).has_focus:
@@ -449,10 +452,11 @@ class MissionApp(App[None]):
         if self._until is None and 1 <= number <= len(question["answers"]):
             self._command(machine.name, "answer", path=path, answer=question["answers"][number - 1])
 
+    # In a thread: the answer can take seconds, in which the view must stay alive.
     @work(thread=True)
     def _command(self, name: str, command: str, **more: str) -> None:
         if self._send is None:
-            self.call_from_thread(self._say, "this viewer only looks; try --control")
+            self.call_from_thread(self._say, "this viewer sends no commands; try --control")
             return
         try:
             answer = self._send(name, {"command": command, "by": f"terminal of {_user()}", **more})
@@ -488,14 +492,10 @@ def _asked(state: dict[str, Any]) -> bool:
 
 
 def _asker(asked: dict[str, Any] | None) -> str:
-    """Who asked, in one phrase; recordings of older versions do not say."""
+    """The origin of a preempt as a phrase; recordings of older versions have none."""
     if not asked or not asked.get("source"):
         return "someone"
     return asker_text(asked["source"], asked["by"], asked["why"])
-
-
-def _inside(path: str, active: list[str]) -> bool:
-    return any(other.startswith(path + "/") for other in active)
 
 
 def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:

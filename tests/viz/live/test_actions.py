@@ -161,7 +161,9 @@ def test_a_definition_that_is_not_known_here_names_the_way_out(world):
     with pytest.raises(GoalRefusedError, match="SMACHPY_INTERFACE_PATH"):
         world.actions.definition("vanish")
     world.actions._servers["vanish"] = {"x": end._replace(md5="0" * 32)}
-    with pytest.raises(GoalRefusedError, match="is not that of the server"):
+    with pytest.raises(
+        GoalRefusedError, match="of the definition here; expected that of the server"
+    ):
         world.actions.definition("vanish")
     assert registry.action("gone_msgs/Vanish") is spec
 
@@ -186,7 +188,9 @@ def test_installed_packages_make_their_definitions_known(world, monkeypatch):
     other = get_action("actionlib/Test")
     assert other._md5sum == end.md5
     world.actions._servers["late"] = {"x": end._replace(type="late_msgs/LateAction")}
-    with pytest.raises(GoalRefusedError, match="is not that of the server"):  # but it is found
+    with pytest.raises(
+        GoalRefusedError, match="of the definition here; expected that of the server"
+    ):  # but it is found
         world.actions.definition("late")
     assert loaded == ["own.interfaces"]
 

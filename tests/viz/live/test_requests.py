@@ -19,7 +19,7 @@ from viz.live.app import Viewer
 from viz.live.cli import print_qr
 from viz.live.machines import Machines
 from viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
-from viz.model import why
+from viz.runs import html
 
 
 @pytest.mark.parametrize("last", ["x:²", "x:٣", "x:-1", "x", "x:", f"x:{'9' * 5000}", "x:1.0"])
@@ -93,7 +93,7 @@ def test_the_server_answers_while_a_run_is_exported(served, monkeypatch, form):
 
         return made
 
-    monkeypatch.setattr(why, "why", held(why.why))
+    monkeypatch.setattr(html, "why", held(html.why))
     monkeypatch.setattr(machine, "history", held(machine.history))
     address = served.start()
 

@@ -67,7 +67,7 @@ def test_tree_log_status_search_and_refused_commands(tmp_path, clock):
         "tree"
     ][0]
     assert found["log"] > 3
-    assert found["told"] == ["this viewer only looks; try --control"] * 2
+    assert found["told"] == ["this viewer sends no commands; try --control"] * 2
     assert found["typed"] == "a b"
     assert "DEEP" in found["cursor"]
 
