@@ -1,9 +1,9 @@
-// Types of what the server sends (viz/live) and of what modules hand to each other; for the type checker only.
+// Types of the server's messages (viz/live) and of data that modules share; only for the type checker.
 
 type Theme = "system" | "light" | "dark";
 type OutcomeClass = "success" | "failure" | "preempted" | "other";
 
-// An event as `smachpy.events.to_record` writes it; which fields there are depends on `kind`.
+// An event as written by `smachpy.events.to_record`; its fields depend on `kind`.
 interface RunEvent {
   kind: string;
   path: string;
@@ -94,11 +94,11 @@ interface RunState {
   states: Record<string, StateRun>;
   goals: Record<string, GoalRun>;
   userdata: Record<string, UserdataEntry>;
-  outages?: [number, number][]; // in which no process ran it
+  outages?: [number, number][]; // times without a process
   dropped?: number;
 }
 
-// The time in which a state ran; `to` is null while it runs, `outcome` null when its end is unknown.
+// The time of a visit; `to` is null while it runs, `outcome` is null if its end is unknown.
 interface Span {
   path: string;
   from: number;
@@ -119,7 +119,7 @@ interface Preempt {
   holds: PreemptedSpan[];
 }
 
-// A machine as `viz.live.page.model` draws it, with what the page's `Model` adds to each node.
+// A machine from `viz.live.assets.model`, with the fields that the page's `Model` adds to each node.
 type Change = "" | "added" | "removed" | "changed" | "numbers";
 interface Edge {
   source: string;
@@ -140,7 +140,7 @@ interface Join {
   outcome: string;
   text: string;
   conditions: [string, string][];
-  need: number; // so many of the conditions must hold
+  need: number; // number of conditions that must hold
   change: Change;
 }
 interface StateNode {
@@ -158,7 +158,7 @@ interface StateNode {
   pills: { outcome: string; by_default: boolean }[];
   change: Change;
   note: string;
-  caption: string; // shown in place of the label; of what a net has beside its actions
+  caption: string; // shown in place of the label, for places and transitions of a net
   tokens: number;
   parent: StateNode | null;
   depth: number;
@@ -166,7 +166,7 @@ interface StateNode {
   total: number;
   name: string;
   shown: string;
-  isRepeated: boolean; // several states have its name
+  isRepeated: boolean; // whether several states have its name
   links: Link[];
   joins: Join[];
   wired: string[];
@@ -177,7 +177,7 @@ interface MachinePayload {
   keys: Record<string, { inputs: string[]; outputs: string[]; remapping: [string, string][] }>;
 }
 
-// What the server sends of a machine besides its events.
+// The server's facts about a machine, besides its events.
 interface Control {
   paused: boolean;
   breakpoints: [string, string | null][];
@@ -197,15 +197,15 @@ interface MachineFacts {
   recorded: boolean;
   node: string;
   behind: number | null;
-  before?: string | null; // the machine that keeps what the program before this one did
-  after?: string | null; // of such a machine: the one that it was
+  before?: string | null; // the machine of the previous program
+  after?: string | null; // of a previous program: the machine that took its place
 }
 interface MachineSummary extends MachineFacts {
   active: string[];
   started: number | null;
   ended: number | null;
   outcome: string | null;
-  questions?: number; // that wait for an answer
+  questions?: number; // number of unanswered questions
 }
 interface Snapshot extends MachineFacts {
   seq: number;
@@ -249,7 +249,7 @@ interface Answer {
   [fact: string]: any;
 }
 
-// Actions on the network, and the goals that were sent from the page.
+// Actions on the network, and goals sent from the page.
 interface ActionServer {
   name: string;
   type: string;
@@ -278,7 +278,7 @@ interface ActionsSeen {
   known: boolean;
 }
 
-// A field of a goal's form (viz/live/forms.py), and a problem with the value of one.
+// A field of a goal's form (viz/live/forms.py), and a problem with its value.
 interface FormField {
   name: string;
   type: string;
@@ -312,7 +312,7 @@ interface Window {
   smachpy: unknown;
 }
 
-// `viz.model.why`: from the first cause to the outcome.
+// The causes of a run's end from `viz.model.why`, from the first one to the outcome.
 interface WhyStep {
   path: string;
   stamp_ns: number;
@@ -332,7 +332,7 @@ interface Why {
   text: string;
 }
 
-// What robots' topics told (smachpy.network.observations), and what the page makes of it (core/scene.js).
+// Records of robot topics (smachpy.network.observations), and the page's data made from them (core/scene.js).
 interface Observed {
   what: string;
   robot: string;
@@ -360,7 +360,7 @@ interface GridMap {
   origin: [number, number, number];
   cells: string;
 }
-// A goal with a place; `visit` is when the state that sent it was entered.
+// A goal with a place; `visit` is the beginning of the visit that sent it.
 interface DrivenGoal extends Place {
   id: string;
   path: string;
@@ -377,13 +377,13 @@ interface Piece {
 }
 interface Robot {
   poses: Pose[];
-  observed: number | null; // from then on its topics tell where it is
+  observed: number | null; // time from which poses come from its topics
   scans: Scan[];
   plans: { t: number; points: [number, number][] }[];
   goals: DrivenGoal[];
-  tasks: Pick<DrivenGoal, "id" | "path" | "visit" | "t" | "to">[]; // goals that are no places
+  tasks: Pick<DrivenGoal, "id" | "path" | "visit" | "t" | "to">[]; // goals without a place
   pieces: Piece[];
-  done: number; // so many poses are in pieces
+  done: number; // number of poses that are in pieces
 }
 interface Series {
   name: string;
@@ -411,9 +411,9 @@ interface RunRow {
   file: string;
   strip: [number, string, number, number | null, string][]; // row, state, from and to [s], class
   outages: [number, number][]; // [s]
-  run: string; // names the run of a durable mission
-  asks: boolean; // a person
-  stamp: number | null; // `began` by the mission's own time, which may have been virtual
+  run: string; // id of the run of a durable mission
+  asks: boolean; // whether a question is open
+  stamp: number | null; // `began` by the mission's own time, which may be virtual
   mission: Mission | null;
 }
 
@@ -457,7 +457,7 @@ interface Batch {
   report: boolean;
 }
 
-// A live run, with what a map of all needs.
+// A live run with the data for the common map.
 interface FleetRow extends RunRow {
   observed: Observed[];
   events: RunEvent[];

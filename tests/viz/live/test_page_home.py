@@ -195,7 +195,7 @@ def test_the_timeline_has_a_gap_where_no_process_ran_the_mission(served, look):
     page.click(".time-tools button")
     assert page.evaluate("() => smachpy.store.run.now.outages.length") == 1
     assert page.evaluate("() => smachpy.page.timeline.gaps.length") == 1
-    assert page.locator(".log >> text=goes on after an outage of 10 s").count() == 1
+    assert page.locator(".log >> text=resumed after an outage of 10 s").count() == 1
 
 
 def test_live_runs_together_have_cards_lanes_and_one_map(served, look):

@@ -1,4 +1,5 @@
-// Puts the page together: the diagram and the timeline outside the virtual DOM, the panels inside it.
+// Puts the page together. The diagram, timeline and map draw themselves outside the virtual DOM; the panels are Preact
+// components.
 import "@preact/signals";
 import { render } from "preact";
 import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
@@ -35,7 +36,7 @@ const floor = document.createElement("canvas");
 floor.tabIndex = 0;
 floor.setAttribute("role", "img");
 
-/** An element that is not of the virtual DOM. @param {{ element: Element }} props */
+/** Holds an element from outside the virtual DOM. @param {{ element: Element }} props */
 function Mounted({ element }) {
   const place = useRef(/** @type {HTMLElement | null} */ (null));
   useLayoutEffect(() => place.current?.replaceChildren(element), [element]);
@@ -111,6 +112,6 @@ function App() {
 applyTheme();
 const page = new Page(/** @type {SVGSVGElement} */ (svg), /** @type {SVGSVGElement} */ (minimap), canvas, floor);
 listenToKeys(page);
-window.smachpy = { page, store }; // for tests and the curious
+window.smachpy = { page, store }; // for tests, and for looking around in the browser's console
 render(html`<${App} />`, /** @type {HTMLElement} */ (document.getElementById("app")));
 document.querySelector(".boot")?.remove();

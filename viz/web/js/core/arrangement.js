@@ -1,11 +1,10 @@
-// Where the panels are: in which dock around the diagram, in which order, and how large. It is one word, for the
-// browser's storage and for links: "tree|map:312,details|time,plots|208:416" are the left dock, the right one and the
-// one at the bottom, each from its top, and the widths of the left and the right one [px]. A panel that is not named
-// is hidden.
+// The arrangement of the panels: dock, order and size of each. In the browser's storage and in links it is one word,
+// such as "tree|map:312,details|time,plots|208:416": the panels of the left, right and bottom dock from the top down,
+// and the widths of the left and right dock [px]. A panel that is not named is hidden.
 
 /** @typedef {"tree" | "map" | "details" | "time" | "plots"} PanelName */
 /** @typedef {"left" | "right" | "bottom"} DockName */
-/** @typedef {{ name: PanelName, size: number | null }} Docked its height [px]; null: as it needs */
+/** @typedef {{ name: PanelName, size: number | null }} Docked its height [px]; null: as its content needs */
 /** @typedef {Record<DockName, Docked[]> & { widths: { left: number, right: number } }} Arrangement */
 
 /** @type {PanelName[]} */
@@ -39,7 +38,7 @@ export function wordOf(all) {
   return [...DOCKS.map(dock), `${all.widths.left}:${all.widths.right}`].join("|");
 }
 
-/** The arrangement that a word names; null: it names none. @param {unknown} word @returns {Arrangement | null} */
+/** The arrangement of a word; null if it is invalid. @param {unknown} word @returns {Arrangement | null} */
 export function arrangementOf(word) {
   if (typeof word !== "string" || word.length > 200) return null;
   const parts = word.split("|");
@@ -59,7 +58,7 @@ export function arrangementOf(word) {
   return { ...all, widths: { left: within(Number(left), WIDTHS), right: within(Number(right), WIDTHS) } };
 }
 
-/** Where a panel is; null: it is hidden. @param {Arrangement} all @param {PanelName} name */
+/** The place of a panel; null if it is hidden. @param {Arrangement} all @param {PanelName} name */
 export function placeOf(all, name) {
   for (const dock of DOCKS) {
     const index = all[dock].findIndex((one) => one.name === name);
@@ -69,7 +68,7 @@ export function placeOf(all, name) {
 }
 
 /**
- * With a panel in another place.
+ * The arrangement with a panel in another place.
  * @param {Arrangement} all
  * @param {PanelName} name
  * @param {DockName | null} dock null: hidden
@@ -82,12 +81,12 @@ export function moved(all, name, dock, index = Infinity) {
   const next = { ...all };
   for (const one of DOCKS) next[one] = all[one].filter((panel) => panel.name !== name);
   if (dock === null) return next;
-  const at = same && before.index < index ? index - 1 : index;
+  const at = same && before.index < index ? index - 1 : index; // the panel itself has left its place
   next[dock] = [...next[dock].slice(0, at), { name, size }, ...next[dock].slice(at)];
   return next;
 }
 
-/** With a panel of another height. @param {Arrangement} all @param {PanelName} name @param {number} size [px] */
+/** The arrangement with another height of a panel. @param {Arrangement} all @param {PanelName} name @param {number} size [px] */
 export function resized(all, name, size) {
   const next = { ...all };
   for (const dock of DOCKS)
@@ -95,11 +94,11 @@ export function resized(all, name, size) {
   return next;
 }
 
-/** With a dock of another width. @param {Arrangement} all @param {"left" | "right"} dock @param {number} width [px] */
+/** The arrangement with another width of a dock. @param {Arrangement} all @param {"left" | "right"} dock @param {number} width [px] */
 export const widened = (all, dock, width) => ({ ...all, widths: { ...all.widths, [dock]: within(width, WIDTHS) } });
 
 /**
- * Where a panel is dropped: into the dock over which the pointer is, else the nearest part of the page.
+ * The place where a panel is dropped: in the dock below the pointer, otherwise in the nearest one.
  * @param {Point} at
  * @param {{ dock: DockName, box: Box, panels: Box[] }[]} docks as they are now
  * @param {{ w: number, h: number }} page

@@ -1,17 +1,17 @@
-// Where events come from: a server, or the file that this page is; and what the page asks of the server.
+// Receives events, from a server or from the file that this page is, and sends requests to the server.
 import { batch } from "@preact/signals";
 import * as store from "#core/store.js";
 
-const SILENT_BEATS = 2; // a server that says nothing for so long is lost
-const CAUGHT_UP_MS = 1000; // until then a stream may bring old events
-const RETRY_MS = 250; // between two tries to fetch a structure, at first
+const SILENT_BEATS = 2; // beats without a message after which a server counts as lost
+const CAUGHT_UP_MS = 1000; // time in which a new stream may bring old events
+const RETRY_MS = 250; // time between two attempts to fetch a structure; it doubles
 const LONGEST_RETRY_MS = 4000;
 
 /** @type {EventSource | null} */
 let stream = null;
 let lastId = ""; // of the newest message of events
 let silence = 0; // half beats without a message
-let patience = SILENT_BEATS; // with a stream that is open; longer when one was cut before a beat came
+let patience = SILENT_BEATS; // of an open stream [beats]; doubled when one was closed for its silence
 /** @type {ReturnType<typeof setInterval> | undefined} */
 let watchdog;
 let streamBegan = 0; // [ms]
@@ -26,10 +26,10 @@ let onObserved = () => {};
 /** @type {Why | null} */
 let whyOfFile = null;
 
-/** Whether this page is a file that holds its run. */
+/** Whether this page is a file that contains its run. */
 export const isFile = () => document.getElementById("run-data") !== null;
 
-/** @param {string} id of an element with base64 of gzip */
+/** The text in an element. @param {string} id of an element with gzip data in base64 */
 async function unpack(id) {
   const text = document.getElementById(id)?.textContent ?? "";
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -37,7 +37,7 @@ async function unpack(id) {
   return new Response(plain).text();
 }
 
-/** The bytes of base64 of zlib. @param {string} text */
+/** The bytes of zlib data in base64. @param {string} text */
 export async function bytesOf(text) {
   const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -73,7 +73,10 @@ export async function connect(handlers) {
   open();
 }
 
-/** The token stands in the fragment of the address, which no server is sent; an old tab may be given a new one. */
+/**
+ * Read the token from the fragment of the address, which browsers do not send to servers, and remove it there, so that
+ * a copied address does not contain it.
+ */
 export function readToken() {
   const words = new URLSearchParams(location.hash.slice(1));
   const given = words.get("token") || null;
@@ -82,7 +85,7 @@ export function readToken() {
     if (given) sessionStorage.setItem("smachpy.token", given);
     token = given ?? sessionStorage.getItem("smachpy.token");
   } catch {
-    token = given; // a file has no storage
+    token = given; // a page in a file has no storage
   }
   const rest = String(words);
   if (given) history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
@@ -90,13 +93,13 @@ export function readToken() {
 
 export const hasToken = () => token !== null && store.settings.value.control;
 
-/** Pause and breakpoints of the machine; null when this page may not command it. */
+/** Pause and breakpoints of the machine; null if this page cannot send commands to it. */
 export function control() {
   const facts = store.facts.value;
   return hasToken() && store.connection.value === "live" && facts?.stale == null ? (facts?.control ?? null) : null;
 }
 
-/** Whether a question of the machine shown may be answered from this page, which needs no control of the mission. */
+/** Whether this page can answer questions of the machine shown; the mission needs no remote control for that. */
 export function canAnswer() {
   const facts = store.facts.value;
   return hasToken() && store.connection.value === "live" && facts?.stale == null && !facts?.recorded;
@@ -115,10 +118,10 @@ export function choose(name) {
   open();
 }
 
-/** For an address; half of a pair of UTF-16, which a name may hold, has no place in one. @param {string} text */
+/** A text for an address; without lone surrogates, at which encodeURIComponent would throw. @param {string} text */
 export const encoded = (text) => encodeURIComponent(text.replace(/\p{Surrogate}/gu, "\ufffd"));
 
-/** The address of something of the machine shown. @param {string} what @param {string} [more] */
+/** The address of a resource of the machine shown. @param {string} what @param {string} [more] */
 export const link = (what, more = "") => `/api/${what}?machine=${encoded(store.facts.value?.name ?? "")}${more}`;
 
 // -- the stream of events -----------------------------------------------------------------------
@@ -175,8 +178,8 @@ function open() {
 }
 
 /**
- * A connection that was cut shows no error for minutes: it is lost when the beats stay away.
- * So they do while a long message comes over a slow link: the next time it is given twice as long.
+ * Reconnect when the beats stay away: a broken connection shows no error for minutes. Beats are also missing while a
+ * long message arrives over a slow link, so the next stream gets twice the time.
  * @param {number} beat [ms]
  */
 function watch(beat) {
@@ -192,7 +195,7 @@ function watch(beat) {
   }, beat / 2);
 }
 
-/** Ask for what comes after the last message. */
+/** Open a new stream that continues after the last message. */
 export function reconnect() {
   silence = 0;
   store.connection.value = "lost";
@@ -210,6 +213,7 @@ async function takeFacts(facts) {
 async function takeSnapshot(snapshot, payload) {
   store.wanted.value ||= snapshot.name;
   const known = store.facts.value;
+  // Another snapshot of the same program, after a gap: its structure need not be fetched again.
   const same = known?.name === snapshot.name && known.epoch === snapshot.epoch;
   if (!same) {
     store.robotLag.forget();
@@ -229,7 +233,7 @@ async function takeSnapshot(snapshot, payload) {
   else await load(snapshot);
 }
 
-/** Fetch the structure of a machine, until it comes or another one is wanted. @param {MachineFacts} facts */
+/** Fetch the structure of a machine; try again until it comes or another fetch begins. @param {MachineFacts} facts */
 async function load(facts) {
   loads += 1;
   const mine = loads;
@@ -255,14 +259,14 @@ async function fetchModel(name) {
     const answer = await fetch(`/api/model?machine=${encoded(name)}`);
     return answer.ok ? await answer.json() : null;
   } catch {
-    return null; // the connection shows that the server is gone
+    return null; // the page already shows a lost connection
   }
 }
 
 // -- questions and commands ---------------------------------------------------------------------
 
 /**
- * The JSON answer of the server; when it gives none, the same shape.
+ * The JSON answer of the server, or an error in the same form.
  * @param {string} address
  * @param {RequestInit} [options]
  * @returns {Promise<Answer>}
@@ -294,11 +298,11 @@ async function post(address, data) {
     headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
     body: JSON.stringify(data),
   });
-  if (answer.wants_token) store.tokenAsked.value = true; // of a viewer that was started anew
+  if (answer.wants_token) store.tokenAsked.value = true; // a restarted viewer has another token
   return answer;
 }
 
-/** Take the token of the viewer as it runs now. @param {string} text the token, or the address it stands in */
+/** Set the token. Returns false if there is none. @param {string} text the token, or an address that contains it */
 export function takeToken(text) {
   const [, found] = /#token=([\w-]+)/.exec(text) ?? /^\s*([\w-]+)\s*$/.exec(text) ?? [];
   if (!found) return false;
@@ -306,7 +310,7 @@ export function takeToken(text) {
   try {
     sessionStorage.setItem("smachpy.token", found);
   } catch {
-    // it is kept until the page is loaded again
+    // without storage it is lost when the page is loaded again
   }
   store.tokenAsked.value = false;
   store.notify("Try again now");
@@ -316,25 +320,25 @@ export function takeToken(text) {
 /** Check or send a goal, or cancel one. @param {object} data */
 export const askAction = (data) => post("/api/action", data);
 
-/** Show why the run ended so, or stop showing it. @param {boolean} [open] */
+/** Show or hide the causes of the run's end. @param {boolean} [open] */
 export async function showWhy(open = store.why.value === null) {
   const shown = store.facts.value?.epoch;
   const answer = open ? (whyOfFile ?? (await ask(link("why")))) : null;
   if (answer && "ok" in answer) store.notify(`Why: ${answer.text}`, "error");
   else if (shown === store.facts.value?.epoch) {
     store.why.value = /** @type {Why | null} */ (answer);
-    if (answer) store.part.value = "log"; // where a phone shows it
+    if (answer) store.part.value = "log"; // the part in which a phone shows them
   }
 }
 
-/** Give the machine shown a command. @param {string} name @param {Record<string, unknown>} [more] */
+/** Send a command to the machine shown. @param {string} name @param {Record<string, unknown>} [more] */
 export async function command(name, more = {}) {
   if (store.whyDisarmed.value) {
     store.notify(store.whyDisarmed.value, "error");
     return false;
   }
   const result = await post(link("control"), { command: name, ...more });
-  if (result.wants_token) return false; // it is asked for
+  if (result.wants_token) return false; // the page asks for the token
   if (result.ok) store.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
   else store.notify(`${name}: ${result.text ?? "refused"}`, "error");
   return result.ok;
@@ -342,12 +346,12 @@ export async function command(name, more = {}) {
 
 // -- the list of runs ---------------------------------------------------------------------------
 
-const REFRESH_MS = 2000; // between two lists of runs
+const REFRESH_MS = 2000; // shortest time between two lists of runs
 let refreshed = -REFRESH_MS; // [ms]
 /** @type {ReturnType<typeof setTimeout> | 0} */
 let refreshDue = 0;
 
-/** Ask for the runs again, at once or soon. */
+/** Request the list of runs, at once or when it is due. */
 export function refreshRuns() {
   if (refreshDue) return;
   refreshDue = setTimeout(
@@ -378,7 +382,7 @@ export async function askSimulation(data) {
   return answer;
 }
 
-/** Ask for the batches of simulated runs again. */
+/** Request the batches of simulated runs. */
 export async function refreshSimulations() {
   const answer = await ask("/api/simulations");
   if (Array.isArray(answer.batches)) store.simulations.value = /** @type {any} */ (answer);

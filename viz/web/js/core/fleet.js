@@ -1,7 +1,7 @@
-// Several live runs together: their lanes on one axis of time, and one scene for the map of all.
+// Several live runs together: their lanes on one axis of time, and one scene for the common map.
 import { Scene } from "#core/scene.js";
 
-/** What a run is called among others of its machine. @param {RunRow} row */
+/** The name of a run among others of its machine. @param {RunRow} row */
 export const nameOfRow = (row) => (row.robots.length === 1 ? row.robots[0] : (row.name ?? row.machine));
 
 /**
@@ -28,7 +28,7 @@ export function lanesOf(rows, now) {
 }
 
 /**
- * One scene of all robots. A robot without a name is called as its run; one that two runs drive has both in one track.
+ * One scene of all robots. A robot without a name gets that of its run; if two runs drive a robot, they share a track.
  * @param {FleetRow[]} rows
  */
 export function sceneOf(rows) {

@@ -1,13 +1,13 @@
-// What the events of a machine add up to, by the same rules as smachpy's `RunState`:
-// tests/data/folds.json holds for both. Times here are nanoseconds since the epoch.
+// Folds the events of a machine into the state of its run, by the same rules as smachpy's `RunState`;
+// tests/data/folds.json has examples for both. Times here are nanoseconds since the epoch.
 
-export const RAISED = "exception"; // stands for the outcome of a state that raised
+export const RAISED = "exception"; // in place of the outcome of a state that raised an exception
 const CUT_SHORT = "a new run began before it ended"; // text of a LOST goal
 const NOT_RECORDED = "its end was not recorded"; // text of a LOST goal
-const ENDED_GOALS = 20; // so many goals that have ended are kept
+const ENDED_GOALS = 20; // ended goals that are kept
 const NO_PREEMPT = { preempt: null, asked: null, serviced: null, abandoned: null };
 
-/** @type {("question" | "marking" | "fired" | "held")[]} */
+/** Facts that end with the visit of a state. @type {("question" | "marking" | "fired" | "held")[]} */
 const OF_VISIT = ["question", "marking", "fired", "held"];
 
 /** @returns {RunState} */
@@ -25,7 +25,7 @@ export const emptyState = () => ({
 export const ms = (ns) => (ns == null ? null : ns / 1e6);
 
 /**
- * What a map whose keys come from a mission holds; names like "constructor" are keys as all others.
+ * The value of a key in an object whose keys come from a mission: keys like "constructor" must not find inherited ones.
  * @template T
  * @param {Record<string, T> | null | undefined} map
  * @param {string} key
@@ -34,6 +34,7 @@ export const ms = (ns) => (ns == null ? null : ns / 1e6);
 export const own = (map, key) => (map && Object.hasOwn(map, key) ? map[key] : undefined);
 
 /**
+ * Set the value of a key from a mission; assigning to "__proto__" would replace the prototype.
  * @template T
  * @param {Record<string, T>} map
  * @param {string} key
@@ -55,12 +56,12 @@ export const requestOf = (e) => ({
 });
 
 /**
- * Take one event in; kinds that change nothing are passed over.
+ * Fold one event; kinds without a rule change nothing.
  * @param {RunState} data
  * @param {RunEvent} e
  */
 export function foldOne(data, e) {
-  if (e.dropped) data.dropped = (data.dropped ?? 0) + e.dropped; // so many are missing before it
+  if (e.dropped) data.dropped = (data.dropped ?? 0) + e.dropped; // events missing before this one
   own(RULES, e.kind)?.(data, e);
 }
 
@@ -70,7 +71,7 @@ const RULES = {
     data.run += 1;
     Object.assign(data, { started: e.stamp_ns, ended: null, outcome: null });
     delete data.outages;
-    // What an earlier run of this root left open was cut short: nothing will say that it ended.
+    // States and goals that an earlier run of this root left open were cut short: no event will end them.
     const below = `${e.path}/`;
     for (const [path, state] of Object.entries(data.states))
       if (path === e.path || path.startsWith(below)) Object.assign(state, { since: null, waits: null, ...NO_PREEMPT });
@@ -92,8 +93,8 @@ const RULES = {
         Object.assign(state, { since: null, left: e.stamp_ns, waits: null, ...NO_PREEMPT });
     for (const [path, since] of active) {
       const state = stateOf(data, path);
-      if (state.since == null && (state.left ?? -1) >= since)
-        reopen(state, since); // the process's own end
+      // Left after that visit began: it was the end of the process that ended the visit.
+      if (state.since == null && (state.left ?? -1) >= since) reopen(state, since);
       else if (state.since == null) Object.assign(state, { visits: state.visits + 1, attempt: 1 });
       Object.assign(state, { since: state.since ?? since, waits: null, error: null, ...NO_PREEMPT });
     }
@@ -178,7 +179,7 @@ const RULES = {
       ended: null,
       attempt: stateOf(data, e.path).attempt ?? 1,
     });
-    // Not in the order of the object: JavaScript puts ids that look like numbers first.
+    // Sorted, because objects of JavaScript have keys that look like numbers first.
     const ended = Object.entries(data.goals).filter(([, goal]) => goal.ended != null);
     ended.sort(([a, one], [b, other]) => one.since - other.since || (a < b ? -1 : 1));
     for (const [id] of ended.slice(0, Math.max(0, ended.length - ENDED_GOALS))) delete data.goals[id];
@@ -226,7 +227,7 @@ function leave(data, e, outcome) {
   put(state.outcomes, outcome, (own(state.outcomes, outcome) ?? 0) + 1);
 }
 
-/** Take the last end of a state back: it has not ended. @param {StateRun} state @param {number} since */
+/** Undo the last end of a state, as its visit continues. @param {StateRun} state @param {number} since */
 function reopen(state, since) {
   state.seconds = Math.max(0, state.seconds - ((state.left ?? since) - since) / 1e9);
   const { outcome, outcomes } = state;

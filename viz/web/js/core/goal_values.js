@@ -1,6 +1,6 @@
-// The values of a goal's form: fields as the server describes them (viz/live/forms.py), values as a
-// tree of texts, and the YAML that the server reads. The server alone judges values.
-// tests/data/forms.json holds for both sides.
+// The values of a goal's form: converts between the server's description of fields (viz/live/forms.py), a tree of
+// texts, and YAML for the server. Only the server decides whether a value is valid.
+// tests/data/forms.json has examples that are tested on both sides.
 
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 /** @type {Record<string, string>} */
@@ -17,7 +17,7 @@ const SPECIAL = {
 };
 const UNPRINTABLE = /[\u007f-\u009f\u2028\u2029\ufeff\ufffe\uffff]/g;
 
-/** Whether an array is edited as one text, separated by commas. @param {FormField} field */
+/** Whether an array is edited as one text with commas. @param {FormField} field */
 export const isOneText = (field) => Boolean(field.array) && !["string", "message"].includes(field.kind);
 
 /**
@@ -71,19 +71,20 @@ function scalar(kind, value) {
   const text = String(value).trim();
   if (kind === "bool") return ["true", "false"].includes(text) ? text : quoted(value);
   if (kind === "time") return text === "now" ? "now" : NUMBER.test(text) ? time(text) : quoted(text);
+  // BigInt, because a Number would round 64-bit integers.
   if (kind === "integer" && /^[-+]?\d+$/.test(text)) return BigInt(text.replace("+", "")).toString();
   if (kind === "float" && Object.hasOwn(SPECIAL, text.toLowerCase())) return SPECIAL[text.toLowerCase()];
   return NUMBER.test(text) && Number.isFinite(Number(text)) ? decimal(text) : quoted(text);
 }
 
-/** What YAML takes for a float: with a point. @param {string} text */
+/** A number with a decimal point, without which YAML reads an integer or a string. @param {string} text */
 function decimal(text) {
   const short = String(Number(text));
   if (short.includes(".")) return short;
   return short.includes("e") ? short.replace("e", ".0e") : `${short}.0`;
 }
 
-/** Seconds and nanoseconds, without the rounding of a float. @param {string} text */
+/** Seconds and nanoseconds, exactly: a Number would round times since the epoch. @param {string} text */
 function time(text) {
   if (/e/i.test(text)) return decimal(text);
   const [whole, part = ""] = text.replace(/^[-+]/, "").split(".");
@@ -103,7 +104,7 @@ const quoted = (text) =>
   JSON.stringify(String(text)).replace(UNPRINTABLE, (c) => `\\u${c.charCodeAt(0).toString(16).padStart(4, "0")}`);
 
 /**
- * The problem of a field: its own, or one of the items of an array that is one text.
+ * The problem of a field, or of an item in an array that is one text.
  * @param {FieldProblem[]} problems
  * @param {string} path
  * @param {FormField} [field]
@@ -116,7 +117,7 @@ export function problemOf(problems, path, field) {
 }
 
 /**
- * Problems that no field of the form shows.
+ * The problems that no field of the form shows.
  * @param {FieldProblem[]} problems
  * @param {FormField[]} fields
  * @param {Record<string, any>} state
@@ -148,7 +149,7 @@ export function problemsWithoutField(problems, fields, state) {
 }
 
 /**
- * What is wrong with a value, with the value in place of its type.
+ * The text of a problem, with the value in place of the type that the server got.
  * @param {string} text
  * @param {unknown} value
  */

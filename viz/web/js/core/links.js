@@ -1,5 +1,5 @@
-// What an address says of the view: instant, selected state and stretch, open containers, panels, plots, notes. All of
-// it is in the fragment, which no server is sent.
+// The view in an address: instant, selected state and stretch, open containers, panels, plots, notes. It is all in the
+// fragment, which browsers do not send to servers.
 import { arrangementOf, wordOf } from "#core/arrangement.js";
 import { knownPlots } from "#core/series.js";
 
@@ -14,14 +14,14 @@ const LATEST = 1e15; // [ms], later than any clock
  * @typedef {object} LinkedView
  * @property {number | null} at instant [ms]; null: now
  * @property {string | null} selected path
- * @property {string[] | null} opened paths; null: as the page likes
+ * @property {string[] | null} opened paths; null: the page's choice
  * @property {Note[]} notes
- * @property {[number, number] | null} stretch that is selected, from and to [ms]
- * @property {import("#core/arrangement.js").Arrangement | null} panels null: as the reader likes
+ * @property {[number, number] | null} stretch the selected one, from and to [ms]
+ * @property {import("#core/arrangement.js").Arrangement | null} panels null: the reader's own
  * @property {string[][] | null} plots ids of series; null: the usual ones
  */
 
-/** An instant as seconds with microseconds, no earlier than it is. @param {number} at [ms] */
+/** An instant in seconds, rounded up to microseconds: the event at the instant must be included. @param {number} at [ms] */
 const instant = (at) => (Math.ceil(at * 1000) / 1e6).toFixed(6);
 
 /** @param {string | null} text @returns {number | null} */
@@ -31,7 +31,7 @@ function instantOf(text) {
   return at < LATEST ? at : null;
 }
 
-/** The fragment of an address that shows this. @param {LinkedView} view */
+/** The fragment of an address for a view. @param {LinkedView} view */
 export function fragmentOf({ at, selected, opened, notes, stretch, panels, plots }) {
   const words = new URLSearchParams();
   if (at !== null) words.append("at", instant(at));
@@ -47,7 +47,7 @@ export function fragmentOf({ at, selected, opened, notes, stretch, panels, plots
   return words.toString();
 }
 
-/** What the fragment of an address shows; what makes no sense is left out. @param {string} text */
+/** The view of an address's fragment; invalid parts are left out. @param {string} text */
 export function viewOf(text) {
   const words = new URLSearchParams(text.replace(/^#/, ""));
   const notes = [];
@@ -75,7 +75,7 @@ export function viewOf(text) {
 }
 
 /**
- * Notes with one more, in the order of their instants; the oldest written go when there are too many.
+ * Notes and further ones, in the order of their instants; if there are too many, the ones written first are dropped.
  * @param {Note[]} notes @param {Note[]} more
  */
 export function withNotes(notes, more) {

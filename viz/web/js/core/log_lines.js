@@ -1,4 +1,4 @@
-// An event as a line of the log.
+// The lines of the log: a text and a colour for each event.
 import { RAISED, requestOf } from "#core/fold.js";
 import { endClass, outcomeClass } from "#core/outcomes.js";
 import { askerText, duration } from "#core/text.js";
@@ -7,7 +7,7 @@ import { brief } from "#core/values.js";
 /** @type {Record<string, (e: RunEvent) => [string, string]>} */
 const LINES = {
   Started: () => ["started", "active"],
-  Recovered: (e) => [`goes on after an outage of ${outageText(e)}`, "waiting"],
+  Recovered: (e) => [`resumed after an outage of ${outageText(e)}`, "waiting"],
   Finished: (e) => [`ended: ${e.outcome || RAISED}`, outcomeClass(e.outcome || RAISED)],
   Left: (e) => [e.outcome, outcomeClass(e.outcome)],
   Failed: (e) => [e.error, "failure"],

@@ -1,7 +1,7 @@
 // The machine as the page draws it: an index over the structure that the server sends.
 import { shorten } from "#core/text.js";
 
-// What stands before the name of what has changed between two versions.
+// Signs before the names of states that differ between two versions.
 export const CHANGE_SIGNS = { added: "+", removed: "\u2212", changed: "\u2260", numbers: "\u00d7" };
 
 /** @param {Change | undefined} change @param {string} name */
@@ -27,10 +27,10 @@ export const KIND_NAMES = {
   missing: "missing state",
 };
 
-/** Whether a box is no state, but a place or a transition of a plan. @param {StateNode} node */
+/** Whether a box is a place or a transition of a plan instead of a state. @param {StateNode} node */
 export const isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
 
-const READABLE = 40; // so many boxes are readable at a glance
+const READABLE = 40; // boxes that are readable at a glance
 
 export class Model {
   /** @type {Map<string, StateNode>} */
@@ -84,7 +84,7 @@ export class Model {
     return found;
   }
 
-  /** Where an outcome of a state leads to. @param {StateNode} node @param {string} outcome */
+  /** The arrow of an outcome of a state. @param {StateNode} node @param {string} outcome */
   linkOf(node, outcome) {
     return node.parent?.links.find((link) => link.source === node.label && link.outcomes.includes(outcome));
   }
@@ -119,7 +119,7 @@ export class Model {
 }
 
 /**
- * The rules of a container that several of its children decide together: a bar each.
+ * The rules of a container with conditions on several children; each is drawn as a bar.
  * The same choice as the static picture's (viz.pictures.shapes).
  * @param {StateNode} node
  * @returns {Join[]}
@@ -135,17 +135,17 @@ function joinsOf(node) {
 }
 
 /**
- * What stands at a join: what it needs, and while it waits how much of that has come.
- * @param {Join} join @param {number} come
+ * The text at a join: how many conditions it needs and, while it waits, how many are met.
+ * @param {Join} join @param {number} met
  */
-export function joinText({ need, conditions }, come) {
+export function joinText({ need, conditions }, met) {
   const all = conditions.length;
   const what = need < all ? `${need} of ${all}` : all === 2 ? "both" : `all ${all}`;
-  return come > 0 && come < need ? `${what}: ${come} of ${need}` : what;
+  return met > 0 && met < need ? `${what}: ${met} of ${need}` : what;
 }
 
 /**
- * The arrows of a container: its transitions, and what its rules make of its children's outcomes.
+ * The arrows of a container: its transitions, and those of its rules.
  * @param {StateNode} node
  * @returns {Link[]}
  */

@@ -1,5 +1,5 @@
-// The class of an outcome, by its name. The same table as in smachpy/outcome_classes.py:
-// tests/data/outcome_classes.json holds for both.
+// The class of an outcome, by its name. The same table as in smachpy/outcome_classes.py;
+// tests/data/outcome_classes.json has examples for both.
 
 const words = (/** @type {string} */ text) => text.split(" ");
 
@@ -13,7 +13,7 @@ export const FAILURE = words(
 export const PREEMPTED_PREFIXES = words("preempt cancel recall interrupt");
 
 /** @type {Map<unknown, OutcomeClass>} */
-const known = new Map(); // it is asked for at every event
+const known = new Map(); // a cache, as the class is needed at every event
 const MOST_KNOWN = 2000;
 
 /**
@@ -40,9 +40,9 @@ const WATCHING = ["monitor", "condition"];
 const FINDINGS = ["invalid", "false", "no"];
 
 /**
- * The class of a state's end: what a monitor finds, "invalid" too, is no failure.
+ * The class of a state's end; the outcome of a monitor or condition, even "invalid", is not a failure.
  * @param {StateNode | null | undefined} node
- * @param {string | null} outcome that it had; "exception" when it raised
+ * @param {string | null} outcome its outcome; "exception" if it raised one
  */
 export function endClass(node, outcome) {
   const isFinding = node && WATCHING.includes(node.kind) && FINDINGS.includes(String(outcome).toLowerCase());
@@ -50,7 +50,7 @@ export function endClass(node, outcome) {
 }
 
 /**
- * The class that all of some ends of a state share, else "other".
+ * The common class of several outcomes of a state; "other" if they differ.
  * @param {StateNode | null | undefined} node
  * @param {string[]} outcomes
  * @returns {OutcomeClass}

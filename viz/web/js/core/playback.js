@@ -1,8 +1,8 @@
-// Playing a run again: the instant at a moment, and the events that one may jump to.
+// Replay of a run: the instant to show at each moment, and the events that are targets of jumps.
 import { endClass, outcomeClass } from "#core/outcomes.js";
 
 export const RATES = [0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
-const MOST_KEYS = 200; // of userdata that are followed
+const MOST_KEYS = 200; // userdata keys whose changes are targets of jumps
 
 /** @typedef {"failure" | "preempt" | "goal"} Kind */
 /** @typedef {{ number: number, t: number, path: string, kind: string, outcome: string }} Mark by number of event */
@@ -17,17 +17,17 @@ export const instantAt = ({ t, since, rate }, moment) => t + (moment - since) * 
 /** @typedef {{ from: number, to: number }} Stretch of a run [ms] */
 
 /**
- * The instant of a loop over a stretch; before it, the way there is played.
+ * The instant in a loop over a stretch; playing may begin before it.
  * @param {number} t
  * @param {Stretch} stretch
  */
 export const loopedAt = (t, { from, to }) => (t < to ? t : from + ((t - from) % Math.max(1, to - from)));
 
-const FRAME_MS = 200; // between two pictures of a film, at least
+const FRAME_MS = 200; // shortest time between two frames of a film
 const MOST_FRAMES = 150;
 
 /**
- * The instants of a film of a stretch; a long one is told faster than it went.
+ * The instants of a film of a stretch; a long stretch is shown faster than real time.
  * @param {Stretch} stretch
  */
 export function framesOf({ from, to }) {
@@ -39,12 +39,12 @@ export function framesOf({ from, to }) {
 export const FILM_FRAME_MS = FRAME_MS;
 
 /**
- * Pixels that are as they were in the picture before become transparent: a film of a page that stands still is small.
+ * Make unchanged pixels transparent: a film in which little moves is small.
  * @param {Uint32Array} now
  * @param {Uint32Array} before
  * @param {Uint8Array} indexes of `now` in the palette
  * @param {number} transparent index
- * @returns {boolean} whether any pixel is another one
+ * @returns {boolean} whether any pixel has changed
  */
 export function keepUnchanged(now, before, indexes, transparent) {
   let isOther = false;
@@ -55,7 +55,7 @@ export function keepUnchanged(now, before, indexes, transparent) {
 }
 
 /**
- * Seconds since the beginning of what was typed, such as 32.5, 01:02 or 1:02:03.25; null: it is none.
+ * The seconds since the beginning from a text such as 32.5, 01:02 or 1:02:03.25; null if it is invalid.
  * @param {string} text
  */
 export function parseInstant(text) {
@@ -76,7 +76,7 @@ function kindOf(e) {
 export class Marks {
   /** @type {Map<string, Mark[]>} by kind, and by key of userdata */
   #marks = new Map();
-  #count = 0; // of events, those that were forgotten too
+  #count = 0; // number of events, including the dropped ones
   #gone = 0;
   /** @type {Set<string>} keys of userdata that were written */
   keys = new Set();
@@ -101,7 +101,7 @@ export class Marks {
     else this.#marks.set(name, [mark]);
   }
 
-  /** The oldest events of the run are forgotten. @param {number} count */
+  /** Drop the marks of the oldest events of the run. @param {number} count number of further dropped events */
   forget(count) {
     this.#gone += count;
     for (const marks of this.#marks.values()) {
@@ -111,10 +111,10 @@ export class Marks {
   }
 
   /**
-   * So many events have happened at the next mark, or the one before; null: there is none.
-   * Marks of one instant are one; of failures those count that began one.
+   * The number of events up to the next or previous mark; null if there is none. Marks at one instant count as one, and
+   * of failures only those that did not come from a state inside.
    * @param {string} name "kind failure", "kind preempt", "kind goal", or "key NAME"
-   * @param {number} shown so many of the kept events have happened by what is shown
+   * @param {number} shown number of kept events up to the instant shown
    * @param {number} step 1: after it, -1: before
    * @param {import("#core/model.js").Model | null} model
    */
@@ -136,7 +136,7 @@ export class Marks {
 }
 
 /**
- * Whether a state failed by itself: no monitor, and no container that hands on what failed in it.
+ * Whether a mark is an origin: not a monitor, nor a container that passes on the failure of a state inside.
  * @param {Mark} mark
  * @param {import("#core/model.js").Model | null} model
  */

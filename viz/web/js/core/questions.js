@@ -1,13 +1,13 @@
-// Questions of a mission to its operator: which to show, in which order their answers stand, how urgent they are.
+// Questions of a mission to its operator: which are shown, the order of their answers, how urgent they are.
 import { ms } from "#core/fold.js";
 
-const CLOSES_MS = 3000; // after an answer
-const URGENT_S = 10;
+const CLOSES_MS = 3000; // time for which an answered question is still shown
+const URGENT_S = 10; // time left from which a question is urgent
 
 /** @typedef {Question & { path: string, left: number, share: number, isOpen: boolean, ago: number }} ShownQuestion */
 
 /**
- * Those that wait for an answer, the oldest first, and those that were answered a moment ago.
+ * The unanswered and the just answered questions, the oldest first.
  * @param {RunState} data
  * @param {number} now [ms]
  * @returns {ShownQuestion[]}
@@ -30,7 +30,7 @@ export function questionsOf(data, now) {
 export const isUrgent = (/** @type {ShownQuestion} */ one) => one.isOpen && one.left <= URGENT_S;
 
 /**
- * The answers with the words of their buttons: first the safe one, which counts when nobody answers, else the last.
+ * The answers with the texts of their buttons: first the default, which is the safe one, otherwise the last one.
  * @param {Question} question
  */
 export function buttonsOf({ answers, words, default: otherwise }) {
@@ -39,17 +39,17 @@ export function buttonsOf({ answers, words, default: otherwise }) {
   return [...all.filter((one) => one.answer === safe), ...all.filter((one) => one.answer !== safe)];
 }
 
-/** What became of it. @param {ShownQuestion} question */
+/** The answer that a question got, as text. @param {ShownQuestion} question */
 export function answerText({ answer, by, ago }) {
   const seconds = `${Math.max(0, Math.round(ago / 1000))} s ago`;
   return by ? `answered ${answer} by ${by}, ${seconds}` : `nobody answered: ${answer}, ${seconds}`;
 }
 
 /**
- * The title of the page: how many questions wait, and every other second what the urgent one asks.
+ * The title of the page: the number of unanswered questions and, every other second, the urgent question.
  * @param {string} title
  * @param {ShownQuestion[]} shown
- * @param {number} elsewhere so many more wait, of other machines
+ * @param {number} elsewhere number of unanswered questions of other machines
  */
 export function titleOf(title, shown, elsewhere) {
   const waiting = shown.filter((one) => one.isOpen);
@@ -59,7 +59,7 @@ export function titleOf(title, shown, elsewhere) {
   return count ? `(${count}) ${title}` : title;
 }
 
-/** States that a breakpoint holds back: the operator decides how it goes on. @param {RunState} data */
+/** Paths of the states that wait at a breakpoint for the operator. @param {RunState} data */
 export const heldStates = (data) =>
   Object.entries(data.states)
     .filter(([, state]) => state.since != null || state.waits != null)

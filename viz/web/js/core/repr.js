@@ -1,4 +1,4 @@
-// What Python's repr() wrote, as a tree: missions tell values of their own classes so.
+// Parses the output of Python's repr() into a tree: values of a mission's own classes are sent in this form.
 
 /**
  * @typedef {{ name: string, items: [string | null, Tree][], end: string }} Branch such as Pose(x=1.0, y=2.0); of a
@@ -13,11 +13,11 @@ const WORD = /[^\s,()[\]{}=:'"]+/uy;
 const TEXT = /[bru]?('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")/uy;
 const LONG_FRACTION = /(?<![\w.])-?\d+\.\d{5,}(?:e[+-]?\d+)?(?![\w.])/gi;
 
-/** Numbers as people read them: 1.570800000000002 is 1.5708. @param {string} text */
+/** A text with its numbers rounded: 1.570800000000002 becomes 1.5708. @param {string} text */
 export const rounded = (text) => text.replace(LONG_FRACTION, (number) => String(Number(Number(number).toPrecision(5))));
 
 /**
- * The tree of a text; null when it is none, as when it was cut off or is a sentence.
+ * The tree of a text; null if it is not a complete repr with parts, but cut off or a sentence, for example.
  * @param {string} text
  * @returns {Branch | null}
  */

@@ -1,8 +1,8 @@
-// One machine's run: the newest state, every earlier one that the kept events give, the spans of
-// time in which states ran, and the preempts. Times in spans are milliseconds since the epoch.
+// One machine's run: its state now and after each kept event, the spans of time in which its states ran, and the
+// preempts. Times in spans are milliseconds since the epoch.
 import { emptyState, foldOne, ms, RAISED, requestOf } from "#core/fold.js";
 
-const KEYFRAME = 400; // events between two stored states
+const KEYFRAME = 400; // events between two stored states: an earlier state is folded from at most this many
 
 export class Run {
   /** @type {RunEvent[]} */
@@ -10,17 +10,17 @@ export class Run {
   /** @type {Span[]} */
   spans = [];
   /** @type {{ from: number, rows: PreemptedSpan[] }[]} */
-  preempts = []; // a row for every state that was asked to stop
+  preempts = []; // each with a row for every state that was asked to stop
   /** @type {string[]} */
   frames = []; // states as JSON, one before every KEYFRAME events
   /** @type {Map<string, Span>} */
-  open = new Map();
+  open = new Map(); // spans of the running states, by path
   /** @type {number | null} */
   begun = null;
-  forgotten = 0; // so many of the oldest events
+  forgotten = 0; // number of the oldest events that were dropped
 
   /**
-   * @param {RunState | null | undefined} base what happened before the events
+   * @param {RunState | null | undefined} base the state before the events
    * @param {RunEvent[]} events
    */
   constructor(base, events) {
@@ -42,7 +42,7 @@ export class Run {
   }
 
   /**
-   * Forget the oldest events where more than `limit` are kept; returns how many were forgotten.
+   * Drop the oldest events if there are more than `limit`, in whole blocks of KEYFRAME; returns their number.
    * @param {number} limit
    */
   trim(limit) {
@@ -62,7 +62,7 @@ export class Run {
     return gone;
   }
 
-  /** What the base says is under way: states that run, and the preempt of some of them. */
+  /** Open spans for the states that run in the base, and the preempt of some of them. */
   #resume() {
     const rows = [];
     for (const [path, state] of Object.entries(this.now.states)) {
@@ -99,7 +99,7 @@ export class Run {
     if (e.kind === "Recovered") this.#recover(e, t);
     if (e.kind === "Started" || e.kind === "Entered") {
       if (e.kind === "Started") {
-        for (const span of this.open.values()) span.to = t; // the run before was cut off
+        for (const span of this.open.values()) span.to = t; // left open by a run that was cut off
         this.open.clear();
       }
       this.#openSpan(e.path, t);
@@ -120,7 +120,8 @@ export class Run {
   }
 
   /**
-   * What was under way goes on, also what the end of the process had ended; how the rest ended is unknown.
+   * Continue the spans that the resumed mission is in, even if the end of its process had ended them. The outcome of
+   * the others is unknown.
    * @param {RunEvent} e @param {number} t
    */
   #recover(e, t) {
@@ -141,7 +142,7 @@ export class Run {
   }
 
   /**
-   * The newest preempt that had begun at the instant t [ms], as it was then; null: none.
+   * The newest preempt at the instant t [ms], as it was then; null if there is none.
    * `holds` are the innermost states that were asked and still run.
    * @param {number} t
    * @returns {Preempt | null}
@@ -201,8 +202,8 @@ export class Run {
   }
 
   /**
-   * What the last transition until then wrote, and the state before it.
-   * @param {number} count of events until then
+   * The userdata written during the last transition, and the state before it.
+   * @param {number} count number of events up to the instant shown
    */
   lastTransition(count) {
     const ends = ["Left", "Failed", "Finished", "Started", "Recovered"];

@@ -1,4 +1,4 @@
-// The list of runs: which of them are asked for, in which order, and how many there are of each sort.
+// The list of runs: filters, order and counts.
 import { outcomeClass } from "#core/outcomes.js";
 import { duration } from "#core/text.js";
 
@@ -34,7 +34,7 @@ export const SHOWN_NAMES = {
   cut: "without an end",
 };
 
-/** How a run stands: live, the class of its outcome, interrupted, queued, or cut. @param {RunRow} row */
+/** The status of a run: live, interrupted, queued, cut (no end is known) or the class of its outcome. @param {RunRow} row */
 export function standing(row) {
   const status = row.mission?.status ?? "";
   if (row.live || (status === "running" && row.outcome === null)) return "live";
@@ -42,7 +42,7 @@ export function standing(row) {
   return row.outcome === null ? "cut" : outcomeClass(row.outcome);
 }
 
-/** What names a run however it is found: a live one keeps its pin when it is a file. @param {RunRow} row */
+/** A name by which a live run and its recording are the same: the run keeps its pin. @param {RunRow} row */
 export const pinOf = (row) => row.run || (row.stamp === null ? row.id : `${row.machine} ${row.stamp}`);
 
 /** @param {RunRow} row @param {string} show @param {Set<string>} pins */
@@ -65,7 +65,7 @@ function hasText(row, text) {
 }
 
 /**
- * The runs that are asked for: pinned ones first, then as they came.
+ * The runs that match a filter: live ones first, then pinned ones, otherwise in the server's order.
  * @param {RunRow[]} rows @param {Filter} filter @param {Set<string>} pins
  */
 export function chosen(rows, { show, machine, robot, text }, pins) {
@@ -83,12 +83,12 @@ export function chosen(rows, { show, machine, robot, text }, pins) {
     .map(({ row }) => row);
 }
 
-/** How many runs each sort has. @param {RunRow[]} rows @param {Set<string>} pins */
+/** The number of runs for each choice of `SHOWN`. @param {RunRow[]} rows @param {Set<string>} pins */
 export const countsOf = (rows, pins) =>
   new Map(SHOWN.map((show) => [show, rows.filter((row) => isShown(row, show, pins)).length]));
 
 /**
- * Names and how many runs have them, most first.
+ * Names with the number of their runs, most frequent first.
  * @param {RunRow[]} rows
  * @param {(row: RunRow) => string[]} namesOf
  * @returns {[string, number][]}
@@ -100,7 +100,7 @@ export function tally(rows, namesOf) {
   return [...counts].sort((a, b) => b[1] - a[1] || (a[0] < b[0] ? -1 : 1));
 }
 
-/** The filter in words, for one that finds nothing. @param {Filter} filter */
+/** The filter as text, for a list without matches. @param {Filter} filter */
 export function filterText({ show, machine, robot, text }) {
   const parts = [
     show === "all" ? "" : SHOWN_NAMES[show].toLowerCase(),
@@ -111,7 +111,7 @@ export function filterText({ show, machine, robot, text }) {
   return parts.filter(Boolean).join(" and ");
 }
 
-/** How long a run took, or has been running [s]; null: nobody knows. @param {RunRow} row @param {number} now [ms] */
+/** The duration of a run so far [s]; null if it is unknown. @param {RunRow} row @param {number} now [ms] */
 export function secondsOf(row, now) {
   if (row.began === null) return null;
   const runs = standing(row) === "live";
@@ -119,7 +119,7 @@ export function secondsOf(row, now) {
   return end === null ? null : Math.max(0, (end - row.began) / 1e9);
 }
 
-/** When a run began, as people say it: today the hour, else the date. @param {number} ns @param {Date} today */
+/** The beginning of a run: today the time, otherwise the date. @param {number} ns @param {Date} today */
 export function beganText(ns, today) {
   const date = new Date(ns / 1e6);
   if (date.toDateString() === today.toDateString())
@@ -127,7 +127,7 @@ export function beganText(ns, today) {
   return date.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" });
 }
 
-/** How long no process ran it, in words; "" when there was always one. @param {RunRow} row */
+/** The outages of a mission as text; "" without any. @param {RunRow} row */
 export function outageText({ outages }) {
   if (outages.length === 0) return "";
   const gone = outages.reduce((sum, [from, to]) => sum + to - from, 0);

@@ -1,16 +1,16 @@
-// Where the robots are and were: their tracks by the visits that drove them, goals, scans, plans and maps.
-// From what their topics told (smachpy.network.observations), else from the feedback of their goals.
+// The robots' poses, tracks by the visits that drove them, goals, scans, plans and maps. They come from records of their
+// topics (smachpy.network.observations); poses also from feedback, as long as there are none from topics.
 // Times are milliseconds since the epoch; places are [m], angles [rad], in the map frame.
 import { own } from "#core/fold.js";
 
 export const COLOURS = 8; // of tracks; from the ninth state on they repeat, dashed
 const MOST_POSES = 60_000; // of one robot
-const MOST_SEEN = 4_000; // scans, and plans, of one robot; numbers of one topic
+const MOST_SEEN = 4_000; // scans, and plans, of one robot; values of one topic
 const MOST_SERIES = 400; // numbers of topics
 const NEAR = 0.3; // [m] a goal this near to a named place has its name
 const ENDED = { Left: 1, Failed: 1, Finished: 1 };
 
-/** What stands in front of an action's name: the robot's. @param {unknown} action */
+/** The name of the robot: the namespace of an action. @param {unknown} action */
 export const robotOf = (action) =>
   String(action ?? "")
     .replace(/^\//, "")
@@ -36,17 +36,17 @@ export function placeOf(stamped) {
   return /(^|\/)map$/.test(String(frame)) ? { x, y, yaw } : null;
 }
 
-/** The first place among the fields of a message that usually hold one. @param {any} message @param {string[]} names */
+/** The first place in some fields of a message. @param {any} message @param {string[]} names */
 const placeIn = (message, names) =>
   names.map((name) => placeOf(own(fields(message), name))).find((place) => place !== null) ?? null;
 const GOALS = ["target_pose", "pose", "goal_pose", "goal"];
 const FEEDBACK = ["base_position", "current_pose"];
 
-/** A place with a name that was written to userdata, as its text: Waypoint(name='dock', ...x=1.0, y=2.0...). */
+/** The repr of a named place in userdata: Waypoint(name='dock', ...x=1.0, y=2.0...). */
 const NAMED = /name='([^']{1,40})'.*?\bx=(-?[\d.e+-]+).*?\by=(-?[\d.e+-]+)/;
 
 /**
- * So many of some things, in order of their times, have happened by `t`.
+ * The number of entries up to the time `t`; they are in order of their times.
  * @param {{ t: number }[]} list
  * @param {number} t
  */
@@ -62,7 +62,7 @@ export function countUntil(list, t) {
 }
 
 /**
- * The newest of some goals, if it had been sent and had not ended by `t`.
+ * The newest goal sent by `t`, if it had not ended then.
  * @template {{ t: number, to: number | null }} G
  * @param {G[]} goals
  * @param {number} t
@@ -82,9 +82,9 @@ export class Scene {
   maps = [];
   /** @type {Map<string, Series>} values of topics, for plots */
   series = new Map();
-  /** @type {Map<string, number>} since when a state is active */
+  /** @type {Map<string, number>} beginning of the visit of each running state, by path */
   entered = new Map();
-  /** @type {string[]} paths of the states that drive, by first appearance: their colours */
+  /** @type {string[]} paths of the states that drive, in order of their first drive, which determines their colours */
   drivers = [];
   /** @type {{ t: number, name: string, x: number, y: number }[]} */
   names = [];
@@ -133,18 +133,19 @@ export class Scene {
     const from = this.entered.get(e.path) ?? t;
     if (!place) {
       robot.tasks.push({ id: e.goal_id, path: e.path, visit: from, t, to: null });
-      if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t) this.#again(robot);
+      if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t) this.#resetPieces(robot);
       return;
     }
     /** @type {DrivenGoal} */
     const goal = { id: e.goal_id, path: e.path, visit: from, t, to: null, status: "ACTIVE", text: "", ...place };
     robot.goals.push(goal);
     if (!this.drivers.includes(e.path)) this.drivers.push(e.path);
-    if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t) this.#again(robot); // it was heard late
+    // The event came after poses that are later: their pieces belong to this goal.
+    if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t) this.#resetPieces(robot);
   }
 
-  /** @param {Robot} robot its pieces are to be made anew */
-  #again(robot) {
+  /** Make the pieces of a robot's track anew. @param {Robot} robot */
+  #resetPieces(robot) {
     robot.pieces = [];
     robot.done = 0;
   }
@@ -153,19 +154,19 @@ export class Scene {
   #pose(name, pose, observed) {
     const robot = this.#robot(name);
     if (observed && robot.observed === null) {
-      robot.observed = pose.t; // what feedback told since then is told again
+      robot.observed = pose.t; // poses from feedback since then are replaced by those from the topic
       robot.poses.length = countUntil(robot.poses, pose.t);
-      this.#again(robot);
+      this.#resetPieces(robot);
     }
     if (!observed && robot.observed !== null && pose.t >= robot.observed) return;
     const last = robot.poses.at(-1);
     if (last && last.t > pose.t) {
       robot.poses.splice(countUntil(robot.poses, pose.t), 0, pose);
-      this.#again(robot);
+      this.#resetPieces(robot);
     } else if (!last || last.t < pose.t || last.x !== pose.x || last.y !== pose.y) robot.poses.push(pose);
     if (robot.poses.length > MOST_POSES) {
       robot.poses.splice(0, MOST_POSES / 4);
-      this.#again(robot);
+      this.#resetPieces(robot);
     }
   }
 
@@ -196,7 +197,7 @@ export class Scene {
   piecesOf(robot) {
     for (; robot.done < robot.poses.length; robot.done++) {
       const pose = robot.poses[robot.done];
-      // A goal that is a place drives; else what else the robot was sent may make it drive.
+      // The visit that drives: that of a goal with a place, otherwise that of any other goal.
       const goal = newestAt(robot.goals, pose.t) ?? newestAt(robot.tasks, pose.t);
       const path = goal?.path ?? null;
       const visit = goal?.visit ?? null;
@@ -212,13 +213,13 @@ export class Scene {
     return robot.pieces;
   }
 
-  /** The colour of a state's tracks, from 0 on; -1 when it has driven nowhere. @param {string} path */
+  /** The number of the colour of a state's tracks; -1 if it has not driven. @param {string} path */
   colourOf(path) {
     return this.drivers.indexOf(path);
   }
 
   /**
-   * Where a robot is at an instant; null: nobody knows yet.
+   * The pose of a robot at an instant; null if it is not known yet.
    * @param {Robot} robot
    * @param {number} t
    * @returns {Pose | null}
@@ -227,12 +228,12 @@ export class Scene {
     return robot.poses[countUntil(robot.poses, t) - 1] ?? null;
   }
 
-  /** The map at an instant: before the first one came, that one. @param {number} t */
+  /** The map at an instant; before the first one, the first one. @param {number} t */
   mapAt(t) {
     return (this.maps[countUntil(this.maps, t) - 1] ?? this.maps[0])?.map ?? null;
   }
 
-  /** What the place of a goal is called; "" when nobody said. @param {DrivenGoal} goal */
+  /** The name of a goal's place; "" if it has none. @param {DrivenGoal} goal */
   placeName(goal) {
     const near = (/** @type {{ x: number, y: number }} */ one) => Math.hypot(one.x - goal.x, one.y - goal.y) < NEAR;
     return this.names.findLast(near)?.name ?? "";
@@ -248,10 +249,10 @@ export class Scene {
   }
 
   /**
-   * The piece of a track nearest to a place, and when the robot was there.
+   * The piece of a track nearest to a place, and the time at which the robot was there.
    * @param {number} x @param {number} y
    * @param {number} within [m]
-   * @param {number} until what is later has not happened [ms]
+   * @param {number} until later poses are ignored [ms]
    * @returns {{ piece: Piece, t: number, far: number } | null}
    */
   nearest(x, y, within, until = Infinity) {
@@ -263,7 +264,7 @@ export class Scene {
           const a = piece.poses[Math.max(0, i - 1)];
           const b = piece.poses[i];
           const { far, part } = toSegment(x, y, a, b);
-          // Of places where it was several times the newest, and the visit rather than the way between.
+          // Where the robot was several times, the newest pass; the tolerance is for rounding.
           if (far > within || (best && far > best.far + 1e-6)) continue;
           best = { piece, t: a.t + part * (b.t - a.t), far };
         }
@@ -300,7 +301,7 @@ export class Scene {
   }
 }
 
-/** Where a point of a map's grid lies. @param {GridMap} map @param {number} u column @param {number} v row */
+/** The place of a point in a map's grid. @param {GridMap} map @param {number} u column @param {number} v row */
 export function cellAt({ resolution, origin: [x, y, yaw] }, u, v) {
   const [c, s] = [Math.cos(yaw) * resolution, Math.sin(yaw) * resolution];
   return { x: x + c * u - s * v, y: y + s * u + c * v };
@@ -344,7 +345,7 @@ const OBSERVERS = {
   },
 };
 
-/** The ends of a scan's rays that met something. @param {Scan} scan @returns {Point[]} */
+/** The points at which a scan's rays hit something. @param {Scan} scan @returns {Point[]} */
 export function scanPoints({ at: [x, y, yaw], first, step, ranges }) {
   /** @type {Point[]} */
   const points = [];

@@ -1,24 +1,24 @@
-// Numbers over time, for plots: fields of feedback, userdata and topics, and how far a goal has come.
-// A series is called by its id, in which it stands where its numbers come from; so an address can name it.
+// Numbers over time, for plots: fields of feedback, userdata and topics, and the progress of goals.
+// The id of a series says where its numbers come from, so that an address can name it.
 import { containerOf } from "#core/fold.js";
 import { parseRepr } from "#core/repr.js";
 import { countUntil } from "#core/scene.js";
 
 const MOST_POINTS = 20_000; // of one series
-const MOST_FIELDS = 60; // of one value that are offered
+const MOST_FIELDS = 60; // of one value, in the choice of series
 const MOST_ITEMS = 8; // of a list
 const MOST_DEPTH = 6;
 const MOST_CHOICES = 400;
 const LONGEST_ID = 400; // characters
 export const MOST_PLOTS = 6;
-const JUST_MS = 1e-3; // a line is broken so near to the instant of an event
-export const MOST_LINES = 8; // in one plot, as there are colours
+const JUST_MS = 1e-3; // time between an event and the break of a line before or after it
+export const MOST_LINES = 8; // in one plot: the number of colours
 
-/** @typedef {{ t: number, value: number | null }} Sample at an instant [ms]; null: nothing is known from there on */
+/** @typedef {{ t: number, value: number | null }} Sample at an instant [ms]; null: unknown from there on */
 /** @typedef {"feedback" | "progress" | "userdata" | "topic"} Source */
 /** @typedef {import("#core/repr.js").Tree} Tree */
 
-/** Where a series comes from: for userdata a container and a key, else an action or the name of a topic's value. */
+/** The origin of a series: `owner` is a container for userdata, otherwise an action or the name of a topic's value. */
 /** @typedef {{ source: Source, owner: string, path: string[] }} Origin */
 
 /** @type {Source[]} */
@@ -32,7 +32,7 @@ const PROGRESS = {
 /** @param {Origin} origin */
 export const idOf = ({ source, owner, path }) => [source, owner, ...path].map(encodeURIComponent).join(",");
 
-/** What an id names; null: it is none. @param {string} id @returns {Origin | null} */
+/** The origin of an id; null if it is invalid. @param {string} id @returns {Origin | null} */
 export function originOf(id) {
   if (id.length > LONGEST_ID) return null;
   try {
@@ -42,11 +42,11 @@ export function originOf(id) {
     if (!source || !owner || (needsPath && !path.length)) return null;
     return source === "progress" && !Object.hasOwn(PROGRESS, path[0]) ? null : { source, owner, path };
   } catch {
-    return null; // a % that stands for nothing
+    return null; // an invalid % sequence
   }
 }
 
-/** Plots as lists of ids, without what makes no sense. @param {unknown} plots @returns {string[][]} */
+/** Plots as lists of ids; invalid ones are left out. @param {unknown} plots @returns {string[][]} */
 export function knownPlots(plots) {
   if (!Array.isArray(plots)) return [];
   const lines = (/** @type {unknown} */ plot) =>
@@ -64,14 +64,14 @@ export function labelOf({ source, owner, path }) {
   return source === "userdata" ? path.join(".") : [owner, ...path].join(".");
 }
 
-/** What its label leaves out. @param {Origin} origin */
+/** The part of the origin that the label leaves out. @param {Origin} origin */
 export const ownerOf = ({ source, owner }) => (source === "topic" ? "" : owner);
 
 /** @param {Origin} origin */
 export const unitOf = ({ source, path }) => (source === "progress" ? PROGRESS[path[0]][1] : "");
 
 /**
- * The parts of a value that can be looked into; null: it has none.
+ * The named parts of a value; null if it has none.
  * @param {any} value
  * @returns {[string, any][] | null}
  */
@@ -90,10 +90,10 @@ function partsOf(value) {
 const partsOfTree = ({ items }) =>
   items.slice(0, MOST_FIELDS).map(([name, item], i) => [unquoted(name) ?? `${i}`, item]);
 
-/** @param {string | null} name of a dict's item as Python writes it */
+/** @param {string | null} name of a dict's item as in Python's repr */
 const unquoted = (name) => name?.replace(/^(['"])(.*)\1$/, "$2");
 
-/** A value as a number; true is 1. Null: it is none. @param {any} value */
+/** A value as a number; true is 1. Null if it is not a number. @param {any} value */
 function numberOf(value) {
   if (typeof value === "boolean" || value === "True" || value === "False")
     return value === true || value === "True" ? 1 : 0;
@@ -101,8 +101,8 @@ function numberOf(value) {
   return typeof number === "number" && Number.isFinite(number) ? number : null;
 }
 
-/** The number at a path within a value; null: there is none. @param {any} value @param {string[]} path */
-export function numberAt(value, path) {
+/** The number at a path within a value; null if there is none. @param {any} value @param {string[]} path */
+function numberAt(value, path) {
   for (const name of path) {
     const part = partsOf(value)?.find(([one]) => one === name);
     if (!part) return null;
@@ -129,7 +129,7 @@ export function numbersIn(value) {
 }
 
 /**
- * What can be plotted of a run: of the newest values.
+ * The series that can be plotted for a run, by its newest values.
  * @param {RunState} data
  * @param {Iterable<string>} topics names of topics' values
  * @returns {Origin[]}
@@ -153,7 +153,7 @@ export function originsIn(data, topics) {
 }
 
 /**
- * The plots of a run for which nobody has chosen any: batteries, and how far the goals have to go.
+ * The default plots of a run: batteries, and the remaining distances of goals.
  * @param {RunState} data
  * @param {Iterable<string>} topics names of topics' values
  * @returns {string[][]}
@@ -175,10 +175,10 @@ export function usualPlots(data, topics) {
 export class Samples {
   /** @type {Sample[]} */
   list = [];
-  #read = 0; // so many events of the run, those that were forgotten too
+  #read = 0; // number of events that were read, including those the run has dropped since
   /** @type {unknown} */
   #run = null;
-  #goal = ""; // id of the goal whose feedback came last
+  #goal = ""; // id of the goal with the newest feedback
 
   /** @param {string} id */
   constructor(id) {
@@ -232,7 +232,7 @@ export class Samples {
   }
 }
 
-/** The value that holds at an instant; null: none is known. @param {Sample[]} list @param {number} t */
+/** The value at an instant; null if it is unknown. @param {Sample[]} list @param {number} t */
 export const valueAt = (list, t) => list[countUntil(list, t) - 1]?.value ?? null;
 
 /** A number for people. @param {number} value */
@@ -244,16 +244,16 @@ export function numberText(value) {
 }
 
 /**
- * Several series on one axis of instants, as uPlot takes them: `undefined` where a series has no sample, null where
+ * Several series on one axis of instants, as uPlot needs them: `undefined` where a series has no sample, null where
  * its line is broken.
  * @param {Samples[]} all
  * @param {number} from [ms] @param {number} to
- * @param {number} now what is later has not happened [ms]
+ * @param {number} now the instant up to which values are known [ms]
  * @returns {[number[], ...(number | null | undefined)[][]]}
  */
 export function aligned(all, from, to, now) {
   const windows = all.map(({ list, isStep }) => {
-    // One sample before and after what is shown, so that lines leave the picture where they should.
+    // With one sample before and one after the range, so that lines continue to its edges.
     const shown = list.slice(Math.max(0, countUntil(list, from) - 1), countUntil(list, to) + 1);
     const last = shown.at(-1);
     return isStep && last && last.t < now ? [...shown, { t: now, value: last.value }] : shown;

@@ -1,11 +1,11 @@
-// Batches of simulated runs: what is asked for, and how far one is.
+// Batches of simulated runs: their start and progress.
 
 /** @typedef {{ mission: string, runs: string, vary: string, seed: string, limit: string, compare: string }} Form */
 
 const WHOLE = /^\s*-?\d{1,9}\s*$/;
 
 /**
- * What a form asks the server for, or what is wrong with it; the server checks all of it again.
+ * The request for a form's values, or the problems with them; the server checks everything again.
  * @param {Form} form
  */
 export function startOf({ mission, runs, vary, seed, limit, compare }) {
@@ -22,5 +22,5 @@ export function startOf({ mission, runs, vary, seed, limit, compare }) {
   return { asked: problems.length ? null : asked, problem: problems.join("; ") };
 }
 
-/** How many runs have ended. @param {Batch} batch */
+/** The number of ended runs. @param {Batch} batch */
 export const doneOf = ({ outcomes, failed }) => Object.values(outcomes).reduce((sum, count) => sum + count, failed);

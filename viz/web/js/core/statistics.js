@@ -1,5 +1,5 @@
-// Numbers on the graph: of the run shown, of recorded runs, or how they differ.
-// Counted as in viz/runs/statistics.py: tests/data/statistics.json holds for both.
+// Numbers in the diagram: of the run shown, of recorded runs, or of both compared.
+// Counted as in viz/runs/statistics.py; tests/data/statistics.json has examples for both.
 import { own } from "#core/fold.js";
 import { duration } from "#core/text.js";
 
@@ -25,7 +25,7 @@ const total = (outcomes) => Object.values(outcomes ?? {}).reduce((a, b) => a + b
  */
 
 /**
- * What `Diagram.showNumbers` needs for the chosen mode: counts of transitions and the heat of states.
+ * The counts of transitions and the heat of states for `Diagram.showNumbers` in a mode.
  * @param {string} mode
  * @param {Record<string, StateRun>} run the states of the run shown
  * @param {Statistics | null} statistics of recorded runs
@@ -59,7 +59,7 @@ export function numbersFor(mode, run, statistics, model) {
 }
 
 /**
- * The longest time that a state without states inside has taken [s].
+ * The longest time spent in a leaf [s].
  * @param {Record<string, StateRun>} run
  * @param {import("#core/model.js").Model | null} model
  */
@@ -69,7 +69,7 @@ function mostSeconds(run, model) {
 }
 
 /**
- * What the coldest and the hottest state mean in a mode, in words; null when it has no heat.
+ * The texts at the cold and the hot end of a mode's scale; null if it has no heat.
  * @param {string} mode
  * @param {Record<string, StateRun>} run
  * @param {import("#core/model.js").Model | null} model
@@ -89,7 +89,7 @@ export function heatScale(mode, run, model) {
 }
 
 /**
- * By how much a state took longer than it used to: 1 is twice as long, or longer.
+ * How much longer a state takes than the median of recorded runs: 0 not longer, 1 twice as long or more.
  * @param {StateRun | undefined} state
  * @param {StateStatistics | undefined} recorded
  */
@@ -100,7 +100,7 @@ function slower(state, recorded) {
 }
 
 /**
- * How many of the explicit transitions were taken.
+ * The number of explicit transitions that were taken, and of all.
  * @param {import("#core/model.js").Model | null} model
  * @param {Record<string, StateRun>} run
  */

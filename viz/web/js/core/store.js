@@ -1,4 +1,4 @@
-// What the page knows and what its user chose. Panels read signals; the diagram reads `shown()`.
+// The data of the page and the choices of its user. Panels read signals; the diagram reads `shown()`.
 import { batch, computed, signal } from "@preact/signals";
 import { arrangementOf, moved, PANELS, placeOf, usual as usualArrangement, wordOf } from "#core/arrangement.js";
 import { emptyState, ms, own } from "#core/fold.js";
@@ -18,7 +18,7 @@ function saved(name, fallback) {
   try {
     return JSON.parse(localStorage.getItem(`smachpy.${name}`) ?? "null") ?? fallback;
   } catch {
-    return fallback; // a file has no storage
+    return fallback; // a page in a file has no storage
   }
 }
 /** @param {string} name @param {unknown} value */
@@ -26,11 +26,11 @@ export function save(name, value) {
   try {
     localStorage.setItem(`smachpy.${name}`, JSON.stringify(value));
   } catch {
-    // a file has no storage
+    // a page in a file has no storage
   }
 }
 
-// -- what the server sends ----------------------------------------------------------------------
+// -- data from the server -----------------------------------------------------------------------
 
 /** @type {Signal<"connecting" | "live" | "lost" | "file">} */
 export const connection = signal("connecting");
@@ -47,15 +47,15 @@ export const model = signal(null);
 /** @type {Signal<Statistics | null>} */
 export const statistics = signal(null);
 /** @type {Signal<number | null>} */
-export const gap = signal(null); // so many events went by this page
+export const gap = signal(null); // number of events that this page missed
 /** @type {Signal<ActionsSeen>} */
 export const actions = signal({ actions: [], gone: [], goals: [], known: false });
 /** @type {Signal<Comparison | null>} */
 export const comparison = signal(null);
 /** @type {Signal<string | null>} */
-export const failure = signal(null); // why there is nothing to see
+export const failure = signal(null); // why nothing is shown
 
-// -- what the user chose ------------------------------------------------------------------------
+// -- choices of the user ------------------------------------------------------------------------
 
 export const wanted = signal(""); // name of the machine to show
 /** @type {Signal<string | null>} */
@@ -70,25 +70,25 @@ export const theme = signal(saved("theme", "system"));
 /** @type {Signal<Visit | null>} */
 export const hovered = signal(null);
 /** @type {Signal<number | null>} */
-export const pointed = signal(null); // the instant at which the pointer is, in the timeline or a plot [ms]
+export const pointed = signal(null); // the instant below the pointer in the timeline or a plot [ms]
 /** @type {Signal<Set<string>>} */
 export const opened = signal(new Set()); // paths of containers
 export const help = signal(false);
 /** @type {Signal<boolean>} */
-export const sound = signal(saved("sound", true)); // when a question comes
+export const sound = signal(saved("sound", true)); // whether a new question makes a sound
 /** @type {Signal<string>} */
 export const operator = signal(saved("operator", "")); // the name under which answers are given
-export const tokenAsked = signal(false); // the viewer does not take the token that this page has
+export const tokenAsked = signal(false); // whether the viewer refused this page's token
 /** @type {Signal<Why | null>} */
-export const why = signal(null); // why the run ended so, while that is shown
-/** The ends of states that led to it. */
+export const why = signal(null); // the causes of the run's end, while they are shown
+/** The ends of states that led to the outcome. */
 export const wayShown = computed(() => wayOf(why.value));
-export const treeOpen = signal(false); // on small screens, where it lies over the page
-export const overview = signal(false); // so many states are open that they are tiles, without arrows
+export const treeOpen = signal(false); // on small screens, where the tree covers the page
+export const overview = signal(false); // whether states are tiles without arrows, because many are open
 /** @type {Signal<{ done: number, all: number } | null>} */
-export const laidOut = signal(null); // so many states, while it takes a while
+export const laidOut = signal(null); // progress of a long layout [states]
 /** @type {Signal<string | null>} */
-export const dismissed = signal(null); // the run before whose notice was closed
+export const dismissed = signal(null); // the previous run whose notice was closed
 export const actionsOpen = signal(false);
 export const homeOpen = signal(false); // the list of runs
 /** @type {Signal<{ runs: RunRow[], folders: string[], journals: { name: string, problem: string }[] }>} */
@@ -98,7 +98,7 @@ export const simulateOpen = signal(false); // the dialog of simulated runs
 /** @type {Signal<{ missions: Record<string, string>, batches: Batch[] }>} */
 export const simulations = signal({ missions: {}, batches: [] });
 export const runsKnown = signal(false);
-export const runsProblem = signal(""); // why they cannot be listed
+export const runsProblem = signal(""); // why the runs cannot be listed
 /** @type {Signal<Set<string>>} */
 export const pins = signal(new Set(saved("pins", []))); // ids of runs
 /** @type {Signal<string | null>} */
@@ -114,13 +114,13 @@ export const slowTick = signal(0); // the same, for panels with much text
 /** @type {Signal<number | null>} */
 export const cursor = signal(null); // the instant shown [ms]; null: now
 /** @type {Signal<number | null>} */
-const position = signal(null); // so many events have happened there: several may share an instant
+const position = signal(null); // number of events up to there: several may have the same instant
 export const instant = computed(() => [cursor.value, position.value]);
 
 export let run = new Run(emptyState(), []);
 export let scene = new Scene();
-export let marks = new Marks(); // what one may jump to
-export const hasMap = signal(false); // whether there is anything to show on one
+export let marks = new Marks(); // targets of jumps
+export const hasMap = signal(false); // whether there is anything to show on a map
 /** @type {RunState | null} */
 let stateAtCursor = null;
 
@@ -129,12 +129,12 @@ export const rate = signal(saved("rate", 1)); // of playing
 /** @type {Signal<{ t: number, since: number, rate: number } | null>} */
 export const playing = signal(null);
 /** @type {Signal<import("#core/playback.js").Stretch | null>} */
-export const stretch = signal(null); // of the run, that is selected [ms]
+export const stretch = signal(null); // the selected part of the run [ms]
 /** @type {Signal<number | null>} */
-export const filmed = signal(null); // so much of a film is drawn [%]
-export const looping = signal(false); // whether playing stays in it
+export const filmed = signal(null); // progress of a film [%]
+export const looping = signal(false); // whether playing repeats the stretch
 /** @type {Signal<string | null>} */
-export const followedKey = signal(null); // whose changes one may jump to
+export const followedKey = signal(null); // the userdata key whose changes are targets of jumps
 
 /** @param {RunState | null} base @param {RunEvent[]} events */
 export function startRun(base, events) {
@@ -159,7 +159,7 @@ export function startRun(base, events) {
 export const shown = () => (cursor.value === null ? run.now : (stateAtCursor ?? run.now));
 
 /**
- * Take new events in; the oldest are forgotten when there are more than the server keeps.
+ * Add new events; drop the oldest if there are more than the server keeps.
  * @param {RunEvent[]} events
  */
 export function addEvents(events) {
@@ -171,10 +171,10 @@ export function addEvents(events) {
   if (gone && position.value !== null) position.value = Math.max(0, position.value - gone);
 }
 
-/** Take in what the robot's topics told. @param {Observed[]} records */
+/** Add records of robot topics. @param {Observed[]} records */
 export const addObserved = (records) => scene.addObserved(records);
 
-const SHORTEST_MS = 20; // stretch of a run that can be selected
+const SHORTEST_MS = 20; // the shortest stretch that can be selected
 
 /** @param {string} id of a run */
 export function togglePin(id) {
@@ -184,7 +184,7 @@ export function togglePin(id) {
   save("pins", [...next]);
 }
 
-/** The visit that the pointer is on, in the timeline or the map. @param {Visit | null} visit */
+/** Set the visit that the pointer is on, in the timeline or the map. @param {Visit | null} visit */
 export function hover(visit) {
   const before = hovered.value;
   if (before?.path !== visit?.path || before?.from !== visit?.from) hovered.value = visit;
@@ -201,7 +201,7 @@ function show(t, count) {
   });
 }
 
-/** Show the instant t [ms]; null: now. What plays goes on from there. @param {number | null} t */
+/** Show the instant t [ms]; null: now. Playing continues from there. @param {number | null} t */
 export function seek(t) {
   if (t === null) {
     playing.value = null;
@@ -213,21 +213,21 @@ export function seek(t) {
   show(within, run.indexAt(within));
 }
 
-/** Show what the first `count` events add up to. @param {number} count */
+/** Show the state after the first `count` events. @param {number} count */
 export function seekTo(count) {
   const event = run.events[count - 1];
   playing.value = null;
   if (event) show(event.stamp_ns / 1e6, count);
 }
 
-/** Go so many events on, or back. @param {number} step */
+/** Go forward or back by a number of events. @param {number} step */
 export function seekEvent(step) {
   const to = Math.max(1, eventsShown() + step);
   if (to >= run.events.length && step > 0) seek(null);
   else seekTo(Math.min(to, run.events.length));
 }
 
-/** Hold the picture, or let it go on: from the beginning when it stands at the end of a run that is over. */
+/** Pause or play; at the end of a run that is over, play from the beginning. */
 export function togglePlaying() {
   if (playing.value) playing.value = null;
   else if (goes.value) seek(nowMs());
@@ -239,7 +239,7 @@ export function togglePlaying() {
   }
 }
 
-/** Show the instant that has come while playing; at the end that is now. @param {number} moment [ms] */
+/** While playing, show the instant that is due, and finally now. @param {number} moment [ms] */
 export function playOn(moment) {
   if (!playing.value) return;
   let t = instantAt(playing.value, moment);
@@ -251,7 +251,7 @@ export function playOn(moment) {
   else show(t, run.indexAt(t));
 }
 
-/** Select a stretch of the run, from one instant to another [ms]; null: none. @param {number} a @param {number} [b] */
+/** Select a stretch of the run between two instants [ms]; none if it is too short. @param {number} a @param {number} [b] */
 export function selectStretch(a, b = a) {
   const inRun = (/** @type {number} */ t) => Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
   const [from, to] = [inRun(Math.min(a, b)), inRun(Math.max(a, b))];
@@ -259,7 +259,7 @@ export function selectStretch(a, b = a) {
   if (!stretch.value) looping.value = false;
 }
 
-/** Play a stretch again and again: what is selected, else the visit of the selected state, else the whole run. */
+/** Repeat the selected stretch, otherwise the visit of the selected state, otherwise the whole run. */
 export function toggleLoop() {
   looping.value = !looping.value;
   if (!looping.value) return;
@@ -279,7 +279,7 @@ export function toggleLoop() {
   seek(playing.value.t);
 }
 
-/** Let the selected stretch begin, or end, at the instant shown. @param {"from" | "to"} end */
+/** Move the beginning or end of the selected stretch to the instant shown. @param {"from" | "to"} end */
 export function moveStretch(end) {
   const at = nowMs();
   const other = end === "from" ? (stretch.value?.to ?? run.last()) : (stretch.value?.from ?? run.first());
@@ -296,39 +296,39 @@ export function setRate(factor) {
 }
 
 /**
- * So many events have happened at the next mark, or the one before; live, the newest one is the next.
+ * The number of events up to the next or previous mark; when live, the newest mark counts as the next one.
  * @param {string} name @param {number} step
  */
 export const jumpOf = (name, step) =>
   marks.find(name, eventsShown(), step, model.value) ??
   (step > 0 && cursor.value === null ? marks.find(name, run.events.length + 1, -1, model.value) : null);
 
-/** Go to a mark; where there is none, say so. @param {string} name of `Marks.find` @param {number} step */
+/** Go to a mark, or notify the user that there is none. @param {string} name of `Marks.find` @param {number} step */
 export function jump(name, step) {
   const count = jumpOf(name, step);
   if (count !== null) seekTo(count);
   else notify(`No ${name.replace(/^kind |^key /, "")} ${step > 0 ? "ahead" : "before"}`);
 }
 
-/** So many of the kept events have happened by what is shown. */
+/** The number of kept events up to the instant shown. */
 export const eventsShown = () => position.value ?? run.events.length;
 
 /** The newest visit of a state that had begun at an instant. @param {string} path @param {number} t [ms] */
-export const visitAt = (path, t) => run.spans.findLast((one) => one.path === path && one.from <= t) ?? null;
+const visitAt = (path, t) => run.spans.findLast((one) => one.path === path && one.from <= t) ?? null;
 
-/** The pointer is on something that a state did at an instant; null: on nothing. @param {string | null} path */
+/** Set what the pointer is on: the visit of a state at an instant, or nothing. @param {string | null} path */
 export function hoverAt(path, t = nowMs()) {
   const span = path === null ? null : visitAt(path, t);
   hover(span && { path: span.path, from: span.from });
 }
 
-/** Whether what a state did at an instant [ms] belongs to the visit that the pointer is on. @param {string} path */
+/** Whether the pointer is on the visit of a state at an instant [ms]. @param {string} path */
 export function isLit(path, /** @type {number} */ t) {
   const span = hoveredSpan();
   return span?.path === path && t >= span.from && t <= (span.to ?? Infinity);
 }
 
-/** Handlers for a row that tells of a state at an instant: hover and focus light its visit up. */
+/** Handlers for a row about a state at an instant: pointing at it or focusing it highlights the visit. */
 export const hoverHandlers = (/** @type {string} */ path, /** @type {number} */ t) => ({
   onPointerEnter: () => hoverAt(path, t),
   onPointerLeave: () => hover(null),
@@ -336,7 +336,7 @@ export const hoverHandlers = (/** @type {string} */ path, /** @type {number} */ 
   onFocusOut: () => hover(null),
 });
 
-/** The visit that the pointer is on, with its end. */
+/** The span of the visit that the pointer is on. */
 export function hoveredSpan() {
   const visit = hovered.value;
   return visit && run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
@@ -344,9 +344,9 @@ export function hoveredSpan() {
 
 // -- plots ------------------------------------------------------------------------------------
 
-const PLOTTED_MACHINES = 30; // whose plots are kept in the browser
+const PLOTTED_MACHINES = 30; // machines whose plots are kept in the browser
 
-/** @type {Signal<string[][] | null>} ids of series by plot; null: nobody has chosen any */
+/** @type {Signal<string[][] | null>} ids of series by plot; null: no choice was made */
 export const plotsChosen = signal(null);
 /** @type {string[][]} */
 let usual = [];
@@ -354,12 +354,12 @@ export const plotsShown = computed(() => {
   slowTick.value;
   if (plotsChosen.value) return plotsChosen.value;
   const found = usualPlots(shown(), scene.series.keys());
-  const isMore = found.flat().length > usual.flat().length; // none goes while the run goes on
+  const isMore = found.flat().length > usual.flat().length; // a plot never disappears during a run
   if (isMore) usual = found;
   return usual;
 });
 
-/** Take up the plots of the machine shown. */
+/** Load the plots of the machine shown. */
 export function loadPlots() {
   const kept = saved("plots", {});
   usual = [];
@@ -389,10 +389,10 @@ export const removeLine = (number, id) =>
 
 /** @type {Signal<import("#core/arrangement.js").Arrangement | null>} null: the usual one */
 export const arrangement = signal(arrangementOf(saved("panels", null)));
-export const isPhone = signal(false); // whether there is room for one part of the page only
-export const part = signal("machine"); // the one that is shown on a phone: machine, map, time or log
+export const isPhone = signal(false); // whether there is room for only one part of the page
+export const part = signal("machine"); // the part that a phone shows: machine, map, time or log
 
-/** A phone has its own; and a question is never hidden. */
+/** The arrangement in use: phones have a fixed one, and the panel with an open question is never hidden. */
 export const arrangementShown = computed(() => {
   const chosen = isPhone.value ? usualArrangement() : (arrangement.value ?? usualArrangement());
   return asksNow.value && !placeOf(chosen, "details") ? moved(chosen, "details", "right") : chosen;
@@ -412,7 +412,7 @@ export function arrange(next) {
 
 // -- notes ------------------------------------------------------------------------------------
 
-const NOTED_RUNS = 30; // so many programs' notes are kept in the browser
+const NOTED_RUNS = 30; // runs whose notes are kept in the browser
 
 /** @type {Signal<import("#core/links.js").Note[]>} */
 export const notes = signal([]);
@@ -429,7 +429,7 @@ const notedRuns = () => {
   return Array.isArray(all) ? all : [];
 };
 
-/** Take up the notes of the machine shown. */
+/** Load the notes of the machine shown. */
 export function loadNotes() {
   const { notes: kept } = notedRuns().find((one) => one?.epoch === facts.value?.epoch) ?? {};
   notes.value = Array.isArray(kept) ? kept : [];
@@ -452,19 +452,20 @@ export const removeNote = (note) => setNotes(notes.value.filter((one) => one !==
 
 // -- clocks -------------------------------------------------------------------------------------
 
-const LAG_WINDOW_MS = 30_000; // a clock that was set is believed after twice that at most
+const LAG_WINDOW_MS = 30_000; // after a change of the other clock, the lag is right after at most twice this time
 
-// How far another clock is behind this one [ms], transport included: the least of the newest lags.
+// How far another clock is behind this one [ms], transport included. It is the minimum over two windows of time,
+// because the message with the shortest delay shows the difference of the clocks best.
 class Lag {
   since = performance.now();
-  least = Infinity; // since then
-  before = Infinity; // in the time before that
+  least = Infinity; // in this window
+  before = Infinity; // in the previous window
   forget() {
     this.since = performance.now();
     this.least = Infinity;
     this.before = Infinity;
   }
-  /** @param {number} t time on that clock when it spoke [ms] */
+  /** @param {number} t time on that clock when the message was sent [ms] */
   measure(t) {
     if (performance.now() - this.since > LAG_WINDOW_MS) {
       this.since = performance.now();
@@ -484,7 +485,7 @@ export const viewerLag = new Lag();
 /** The instant shown, on the robot's clock [ms since the epoch]. */
 export const nowMs = () => cursor.value ?? liveMs();
 
-/** The newest instant there is, on the robot's clock [ms since the epoch]. */
+/** The present, or the end of a run that is over, on the robot's clock [ms since the epoch]. */
 export function liveMs() {
   const about = facts.value;
   const ended = run.now.ended != null || about?.recorded || about?.stale != null || connection.value === "file";
@@ -493,14 +494,14 @@ export function liveMs() {
   return ended ? (run.last() ?? robot) : Math.max(robot, run.last() ?? 0);
 }
 
-/** Whether the picture moves on by itself: it plays, or the run goes on and one looks at now. */
+/** Whether the instant shown moves by itself: a run is played, or a running one is shown live. */
 export const goes = computed(() => {
   tick.value;
   const isOver = run.now.ended != null || facts.value?.recorded || facts.value?.stale != null;
   return playing.value !== null || (cursor.value === null && !isOver && connection.value !== "file");
 });
 
-/** When the run that is shown began [ms]. */
+/** The beginning of the run shown [ms]. */
 export const began = () => ms(shown().started) ?? run.first();
 
 /** An instant as time since the run began, such as 00:32.0. @param {number} t [ms] */
@@ -513,12 +514,12 @@ export function instantText(t) {
   return `${seconds <= -0.05 ? "-" : ""}${hours ? `${hours}:` : ""}${minutes}`;
 }
 
-/** Why nothing can be commanded; null when it can. */
+/** Why commands are disabled; null if they are not. */
 export const whyDisarmed = computed(() =>
   cursor.value === null ? null : "You look at the past: back to live first (l)",
 );
 
-// -- what follows from it -----------------------------------------------------------------------
+// -- derived values -----------------------------------------------------------------------------
 
 export const activePaths = computed(() => {
   tick.value;
@@ -531,13 +532,13 @@ export const activeLeaves = computed(() => {
   return all.filter((path) => !all.some((other) => other.startsWith(`${path}/`)));
 });
 
-/** Where a run that has ended has ended: the innermost state that was left last; else what is active. */
+/** The running innermost states; after the end of a run, the innermost state that was left last. */
 export const lastLeaves = computed(() => {
   if (activeLeaves.value.length) return activeLeaves.value;
   const left = Object.entries(shown().states).filter(([, state]) => state.left != null);
   if (!left.length) return [];
   const depth = (/** @type {string} */ path) => path.split("/").length;
-  // Its containers were left at the same instant, or moments later.
+  // Containers are left after the state inside, so the last one left is a container around it.
   const [last] = left.reduce((a, b) => ((b[1].left ?? 0) > (a[1].left ?? 0) ? b : a));
   const isWithin = (/** @type {string} */ path, /** @type {string} */ top) => `${path}/`.startsWith(`${top}/`);
   const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered(last));
@@ -549,7 +550,7 @@ export const lastLeaves = computed(() => {
   return [newest[0]];
 });
 
-/** When a state was entered last [ns]. @param {string} path */
+/** The beginning of a state's newest visit [ns]. @param {string} path */
 function entered(path) {
   const span = run.spans.findLast((one) => one.path === path);
   return span ? span.from * 1e6 : 0;
@@ -573,17 +574,17 @@ export const runStatus = computed(() => {
   return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
 });
 
-/** Whether a state waits for an answer. @param {RunState} data */
+/** Whether a question is open. @param {RunState} data */
 const asks = (data) =>
   Object.values(data.states).some(({ since, question }) => since != null && question?.answered === null);
 
-/** Whether the machine waits for an answer now, whatever instant is looked at. */
+/** Whether a question is open now, independent of the instant shown. */
 export const asksNow = computed(() => {
   tick.value;
   return asks(run.now) && !facts.value?.recorded && facts.value?.stale == null;
 });
 
-/** What is held back, and why, in words. @param {RunState} data */
+/** The paused state and the reason, as text. @param {RunState} data */
 function pausedText(data) {
   const held = Object.entries(data.states).filter(([, state]) => state.waits != null);
   if (!held.length) return "paused";
@@ -593,7 +594,7 @@ function pausedText(data) {
 }
 
 /**
- * The name of a state, with that of its container where several have it.
+ * The name of a state, with that of its container if several states have it.
  * @param {string} path
  */
 export function nameOf(path) {
@@ -602,15 +603,15 @@ export function nameOf(path) {
   return node.isRepeated && node.parent?.parent ? `${node.parent.name} \u203a ${node.name}` : node.name;
 }
 
-// Names of the actions that have a server and of those that had one, as JSON, so that equal lists
-// are equal; null before the server has looked.
+// Names of the actions that have a server and of those that had one; null before they are known. As JSON text, so
+// that the signal does not change when a new list has the same names.
 export const serversSeen = computed(() => {
   const { actions: there, gone, known } = actions.value;
   return known ? JSON.stringify([there.map((one) => one.name), gone]) : null;
 });
 
 /**
- * Whether a goal seems to wait for a server. One behind a bridge shows no presence, only answers.
+ * Whether a goal seems to wait for a server. A server behind a bridge has no token and shows only by its answers.
  * @param {GoalRun | null | undefined} goal
  */
 export function hasNoServer(goal) {
@@ -627,11 +628,11 @@ export function hasNoServer(goal) {
   return !Object.values(run.now.goals).some(answered);
 }
 
-// -- the machine, and which of its containers are open ------------------------------------------
+// -- the machine and its open containers --------------------------------------------------------
 
-const AROUND = 60; // states to open around one of an overview
+const AROUND = 60; // states to open around a state of an overview
 
-let autoDepth = 0; // levels opened without the user; 0: the user has chosen
+let autoDepth = 0; // levels opened automatically; 0: the user has chosen
 
 /** @param {MachinePayload} payload */
 export function setModel(payload) {
@@ -653,7 +654,7 @@ export function setImplicit(on) {
   if (model.value) model.value = new Model(model.value.payload, on);
 }
 
-/** Open one level less, unless the user has chosen; false when there is no less. */
+/** Open one level less, unless the user has chosen; returns false if that is impossible. */
 export function openOneLevelLess() {
   if (autoDepth < 2 || !model.value) return false;
   autoDepth -= 1;
@@ -673,7 +674,7 @@ export function setOpened(paths) {
   if (model.value) save(`open.${model.value.root.label}`, [...paths]);
 }
 
-/** Open a state's container and what is in it as far as it can be read, and no other. @param {StateNode} node */
+/** Open only a state's container, with as many levels inside as are readable. @param {StateNode} node */
 export function openAround(node) {
   const top = node.children.length ? node : node.parent;
   if (!model.value || !top) return;
@@ -693,7 +694,7 @@ export function toggle(path) {
   setOpened(next);
 }
 
-/** Open the containers around a state; false when they are open. @param {string} path */
+/** Open the containers around a state; returns false if all are open. @param {string} path */
 export function reveal(path) {
   const closed = model.value?.ancestors(path).filter((node) => !opened.value.has(node.path)) ?? [];
   if (closed.length) setOpened(new Set([...opened.value, ...closed.map((node) => node.path)]));

@@ -1,18 +1,19 @@
-// Texts for people: one line of anything, spans of time, who asked for a preempt.
-// The same rules as viz/model/labels.py and smachpy/events: tests/data/texts.json holds for both.
+// Texts for people: shortened lines, durations, origins of preempts.
+// The same rules as in viz/model/labels.py and smachpy/events; tests/data/texts.json has examples for both.
 
 import { own } from "#core/fold.js";
 
-// What Python's str.split() takes for space, and str.isprintable() not for printable.
+// White space as in Python's str.split(), and characters for which Python's str.isprintable() is false.
 const SPACE = /[\t-\r\u0085\p{Z}]+/u;
 const UNPRINTABLE = /[\p{C}\p{Z}]/gu;
 
 /**
- * One line of at most `length` printable characters, whatever `text` holds.
+ * One line of at most `length` printable characters.
  * @param {unknown} text
  */
 export function shorten(text, length = 34) {
-  const start = [...String(text).slice(0, 8 * length)].slice(0, 4 * length).join(""); // whole characters
+  // Cut first, as texts can have megabytes, and by characters: a UTF-16 pair must not be divided.
+  const start = [...String(text).slice(0, 8 * length)].slice(0, 4 * length).join("");
   const words = start.split(SPACE).filter(Boolean);
   const line = [...words.map((word) => word.replace(UNPRINTABLE, "\ufffd")).join(" ")];
   return line.length <= length ? line.join("") : `${line.slice(0, length - 1).join("")}\u2026`;
@@ -45,7 +46,7 @@ const SOURCES = {
 };
 
 /**
- * Who asked for a preempt, in one phrase; null when an older recording does not say.
+ * The origin of a preempt as a phrase; null if it is unknown, as in older recordings.
  * @param {Partial<PreemptRequest> | null | undefined} asked
  */
 export function askerText(asked) {
@@ -55,7 +56,7 @@ export function askerText(asked) {
 }
 
 /**
- * How long a state has held a preempt up at the instant `now` [ms].
+ * How long a preempt has waited for a state at the instant `now` [ms].
  * @param {PreemptedSpan} row
  * @param {number} now
  */

@@ -2,7 +2,7 @@
 
 import { rounded } from "#core/repr.js";
 
-const MOST = 20_000; // characters that are written out
+const MOST = 20_000; // characters that are shown
 
 /** A message without its type. @param {string} _key @param {any} value */
 const withoutType = (_key, value) => (value?.$msg ? value.fields : value);
@@ -21,7 +21,7 @@ export function brief(value) {
 }
 
 /**
- * Whether a value was too long to be sent whole (`smachpy.events.to_record`).
- * @param {string} text as `brief` gives it
+ * Whether a value was shortened before it was sent (`smachpy.events.to_record`).
+ * @param {string} text as returned by `brief`
  */
 export const wasShortened = (text) => /\u2026$|\u2026"|<\S+ of \d+ elements>/.test(text);

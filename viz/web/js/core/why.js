@@ -1,4 +1,4 @@
-// Why a run ended so, as `viz.model.why` finds it: what of it is drawn.
+// The causes of a run's end, from `viz.model.why`, for the diagram.
 
 /**
  * The ends of states from the first cause to the outcome, each once.

@@ -1,4 +1,4 @@
-// The diagram: built once per layout, restyled by class when something happens.
+// The diagram: SVG elements are built once per layout; events only change their classes and texts.
 import { containerOf, ms, own } from "#core/fold.js";
 import { CHANGE_SIGNS, isPartOfNet, joinText, KIND_NAMES, signed } from "#core/model.js";
 import { commonClass, endClass, outcomeClass } from "#core/outcomes.js";
@@ -14,16 +14,16 @@ import { arrowHeads, el, icon, middleOfLongest, roundedLine } from "#drawing/svg
 const SEP = "\u0001";
 const FLASH_MS = 380;
 const FADE_MS = 5000;
-const BRIEF_MS = 400; // a state that has run for less shows no clock
-const MINIMAP_BELOW = 0.6; // the part of the machine in view from which there is no minimap
+const BRIEF_MS = 400; // a state shows its clock after this time
+const MINIMAP_BELOW = 0.6; // the minimap is shown if a smaller part of the machine is in view
 const CORNERS = ["bottom-right", "bottom-left", "top-right", "top-left"];
 const CLASSES = ["success", "failure", "preempted", "other"];
 /** @type {Record<string, string>} */
 const TAGS = { concurrence: "concurrent", iterator: "repeats", sequence: "sequence" };
 
 /**
- * The elements of a state that change while it runs. A text is laid out again whenever it is set,
- * so what was set last is kept.
+ * The elements of a state that change while it runs. Browsers lay a text out whenever it is set, even to the same
+ * value, so the last value is kept to skip that.
  * @typedef {{
  *   group: SVGElement, frame: SVGElement, badge: TextOf, glyph: TextOf, bar: SVGElement | null,
  *   part: number, label: string, node: StateNode,
@@ -48,13 +48,13 @@ export class Diagram {
   /** @type {Map<string, SVGElement>} */
   minimapRects = new Map();
   /** @type {Map<string, boolean>} */
-  minimapDue = new Map(); // what the minimap does not show yet: whether states are active
+  minimapDue = new Map(); // changes for the minimap: path -> whether the state is active
   /** @type {Map<SVGElement, number>} */
-  flashing = new Map(); // until when [ms]
+  flashing = new Map(); // end of the flash of each element [ms]
   /** @type {Map<string, Problem[]>} */
   problems = new Map();
   /** @type {import("#core/model.js").Model | null} */
-  model = null; // that is drawn
+  model = null; // the one that is drawn
   /** @type {Box | null} */
   size = null;
   /** @type {SVGElement | null} */
@@ -103,7 +103,7 @@ export class Diagram {
     const frame = el("rect", { class: "frame", x, y, width: box.w, height: box.h, rx: 9 });
     frame.style.fill = `var(--depth${Math.min(node.depth, 11)})`;
     const name = measure(node.shown, 11, true) + (TAGS[node.kind] ? 60 : 0);
-    const entry = layout.entry && layout.entry.y < 8 ? layout.entry.x : -1; // a line comes in there
+    const entry = layout.entry && layout.entry.y < 8 ? layout.entry.x : -1; // where a line enters at the top
     const isCrossed = entry > 4 && entry < 30 + name && entry + 26 + name < box.w;
     const left = isCrossed ? x + entry - 2 : x;
     const title = el("text", { x: left + 24, y: y + 16.5, class: "title" }, node.shown);
@@ -194,13 +194,13 @@ export class Diagram {
       group.append(el("circle", { class: `dot ${kind}`, cx: x + dot.x, cy: y + dot.y, r: 3.2 }));
       group.append(el("text", { class: `outcome ${kind}`, ...end }, shorten(dot.outcome)));
     }
-    const room = place.dots.length ? place.nameWidth : w; // its outcomes are right of that
+    const room = place.dots.length ? place.nameWidth : w; // the outcomes are right of the name
     this.#register(node, group, frame, bar, { x, y, w, h }, room);
     into.append(group);
   }
 
   /**
-   * Add the badges that appear when there is something to show, and keep what changes.
+   * Add the badges, which are empty at first, and keep the elements that change.
    * @param {StateNode} node
    * @param {SVGElement} group
    * @param {SVGElement} frame
@@ -278,7 +278,7 @@ export class Diagram {
     const { change, note } = edge.link;
     const text = [!edge.labels.length && change ? CHANGE_SIGNS[change] : "", note].filter(Boolean).join(" ");
     const middle = middleOfLongest(edge.points);
-    const right = !edge.labels.some((label) => label.x > middle.x); // not where the names are
+    const right = !edge.labels.some((label) => label.x > middle.x); // on the side without names
     const place = {
       x: x + middle.x + (right ? 4 : -4),
       y: y + middle.y - 3,
@@ -379,7 +379,7 @@ export class Diagram {
   }
 
   /**
-   * Show at the joins of a container what has come, since it was entered.
+   * Show at the joins of a container how many conditions were met in its visit.
    * @param {string} path
    * @param {Record<string, StateRun>} states
    */
@@ -399,7 +399,7 @@ export class Diagram {
   }
 
   /**
-   * Show the tokens of a plan where they are, and beside a transition that waits why it does not fire.
+   * Show the tokens of a plan and, beside a waiting transition, why it does not fire.
    * @param {string} path
    * @param {StateRun | undefined} state
    */
@@ -428,7 +428,7 @@ export class Diagram {
     }
   }
 
-  /** Show which arrows tokens have just gone along. @param {string} path @param {string} fired @param {number} now */
+  /** Flash the arrows along which tokens have just moved. @param {string} path @param {string} fired @param {number} now */
   flashFired(path, fired, now) {
     const transition = `${path}/${fired}`;
     const arrows = [...this.arrows.values()].flat();
@@ -439,14 +439,14 @@ export class Diagram {
       }
   }
 
-  /** The minimap follows a few times a second: drawing it at every event costs as much as the rest. */
+  /** Update the minimap; a few times a second, as doing it at every event costs as much as the rest. */
   paintMinimap() {
     for (const [path, active] of this.minimapDue) this.minimapRects.get(path)?.classList.toggle("active", active);
     this.minimapDue.clear();
   }
 
   /**
-   * Bring the clock of a state that runs up to date.
+   * Update the clock of a running state.
    * @param {string} path
    * @param {StateRun} state
    * @param {number} now
@@ -456,7 +456,7 @@ export class Diagram {
     if (view && state.since != null) write(view.badge, elapsed(state, now));
   }
 
-  /** Show that a transition was just taken. @param {string} path @param {string} outcome @param {number} now */
+  /** Flash a transition that was just taken. @param {string} path @param {string} outcome @param {number} now */
   flash(path, outcome, now) {
     for (const { line } of this.arrows.get(path + SEP + outcome) ?? []) {
       line.classList.add("taken");
@@ -464,7 +464,7 @@ export class Diagram {
     }
   }
 
-  /** End the flashes that are over; returns whether any is left. @param {number} now */
+  /** End the flashes whose time is over; returns whether any is left. @param {number} now */
   endFlashes(now) {
     for (const [line, until] of this.flashing)
       if (until < now) {
@@ -475,7 +475,7 @@ export class Diagram {
   }
 
   /**
-   * Draw the way thick that led to the end of a run, and no other.
+   * Highlight the transitions that led to the end of a run.
    * @param {{ path: string, outcome: string }[]} ends
    */
   showWay(ends) {
@@ -489,7 +489,7 @@ export class Diagram {
     }
   }
 
-  /** Give these states, and no others, a class. @param {string[]} paths @param {string} name */
+  /** Give these states a class, and remove it from all others. @param {string[]} paths @param {string} name */
   mark(paths, name) {
     for (const group of this.world.querySelectorAll(`.${name}`)) group.classList.remove(name);
     for (const path of paths) this.states.get(path)?.group.classList.add(name);
@@ -535,7 +535,7 @@ function outcomePill(node, pill, x, y) {
 }
 
 /**
- * How many tokens the places of a plan hold; those where an action runs, 1 while it does.
+ * The number of tokens in each place of a plan; an exec place has 1 while its action runs.
  * @param {StateNode} plan
  * @param {StateRun | undefined} state
  */
@@ -548,7 +548,7 @@ function tokensIn(plan, state) {
 }
 
 /**
- * Which places a transition lacks tokens in, in words; "" for none.
+ * The places in which a transition lacks tokens, as text; "" for none.
  * @param {StateNode} plan
  * @param {StateNode} transition
  * @param {(label: string) => number} tokensOf
@@ -591,7 +591,7 @@ function write(shown, text) {
   shown.element.textContent = text;
 }
 
-/** How long a state has run, and what else its badge shows. @param {StateRun} state @param {number} now */
+/** The text of a running state's badge: its time, attempt and so on. @param {StateRun} state @param {number} now */
 function elapsed(state, now) {
   const since = (/** @type {number | null | undefined} */ ns) => Math.max(0, now - (ms(ns) ?? now)) / 1000;
   const attempt = state.attempt ?? 1;

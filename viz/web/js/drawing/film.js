@@ -1,4 +1,4 @@
-// A stretch of the run as a GIF: the page is drawn at one instant after another, and each picture of it encoded.
+// Saves a stretch of the run as a GIF: shows one instant after another and encodes a picture of the page for each.
 import { applyPalette, GIFEncoder, quantize } from "gifenc";
 import { messageOf } from "#core/connection.js";
 import { FILM_FRAME_MS, framesOf, keepUnchanged } from "#core/playback.js";
@@ -7,16 +7,16 @@ import { isDark } from "#drawing/theme.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
-const LAST_MS = 20_000; // of the run, when no stretch is selected
+const LAST_MS = 20_000; // length of the film if no stretch is selected
 const WIDEST = 960; // [px]
-const HEAD = 32; // with the machine's name and the instant [px]
-const COLOURS = 255; // and one that is transparent
-const FONTS_MS = 150; // a picture that has just been made may not have its font yet
+const HEAD = 32; // height of the line with the machine's name and the instant [px]
+const COLOURS = 255; // a GIF has 256: one is transparent
+const FONTS_MS = 150; // until then the font of the first picture may not be loaded
 
-/** Save a film of the selected stretch, else of the last seconds before the instant shown. @param {Page} page */
+/** Save a film of the selected stretch, otherwise of the last seconds before the instant shown. @param {Page} page */
 export async function saveFilm(page) {
   const { run } = store;
-  store.playing.value = null; // it would go on between two pictures
+  store.playing.value = null; // playing would change the instant between two pictures
   const shown = store.cursor.value;
   const to = store.nowMs();
   const stretch = store.stretch.value ?? { from: Math.max(run.first() ?? to, to - LAST_MS), to };
@@ -37,7 +37,7 @@ export async function saveFilm(page) {
 /**
  * @param {Page} page
  * @param {import("#core/playback.js").Stretch} stretch
- * @param {() => boolean} isWanted still
+ * @param {() => boolean} isWanted whether the film is still wanted
  */
 async function draw(page, stretch, isWanted) {
   const instants = framesOf(stretch);
@@ -47,9 +47,9 @@ async function draw(page, stretch, isWanted) {
   const g = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
   /** @type {Uint32Array | null} */
   let before = null;
-  let due = 0; // frames since the one that was written last
+  let due = 0; // duration of the waiting frame [frames]
   /** @type {{ index: Uint8Array, options: object } | null} */
-  let waiting = null; // its time is known when the next one comes
+  let waiting = null; // the frame before; how long it is shown is known when the picture changes
   const write = () => {
     const { width, height } = canvas;
     if (waiting) gif.writeFrame(waiting.index, width, height, { ...waiting.options, delay: due * FILM_FRAME_MS });
@@ -80,7 +80,7 @@ async function draw(page, stretch, isWanted) {
 }
 
 /**
- * The diagram as it is seen, with the map beside it and the timeline below, as far as they are there.
+ * Paint the diagram as it is shown, with the map beside it and the timeline below, if they are shown.
  * @param {Page} page
  * @param {HTMLCanvasElement} canvas
  * @param {string} style
@@ -136,13 +136,13 @@ async function pictureOf(svg, style) {
   return image;
 }
 
-/** The page's style with the font of the diagram in it: a picture can fetch nothing. */
+/** The page's style with the diagram's font embedded: an SVG in an image cannot load files. */
 async function styleText() {
   const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules].map((rule) => rule.cssText));
   const wanted = rules.filter((rule) => !rule.startsWith("@font-face") || rule.includes("Inter"));
   const text = wanted.join("\n");
   const [, address] = /url\("([^"]+inter\.woff2)"\)/.exec(text) ?? [];
-  if (!address) return text; // it is in the page already
+  if (!address) return text; // a page in one file has the font embedded already
   const font = await (await fetch(address)).blob();
   const data = await new Promise((done) => {
     const reader = new FileReader();

@@ -1,23 +1,23 @@
-// Follow mode: what runs is open, the rest folds, and the view frames what can still be read.
+// Follow mode: opens the running containers, closes the others, and frames the running states as long as they are legible.
 import * as store from "#core/store.js";
 
 /** @typedef {import("#drawing/diagram.js").Diagram} Diagram */
 /** @typedef {import("#drawing/viewport.js").Viewport} Viewport */
 
-const SETTLED_MS = 450; // a container opens when it has run for so long
-const PAUSE_MS = 900; // between two rearrangements
+const SETTLED_MS = 450; // a container is opened after running for this time: brief ones would only flicker
+const PAUSE_MS = 900; // shortest time between two rearrangements
 const READABLE = 0.84; // a little above the scale at which names have 9 px
 let lastOpen = "";
 let rearrangedAt = -Infinity; // [ms]
 
-/** Paths of the containers that should be open, or null when nothing is to change. @param {number} now [ms] */
+/** Paths of the containers that should be open; null if nothing is to change. @param {number} now [ms] */
 export function containersToOpen(now) {
   const model = store.model.value;
   const moment = performance.now();
   if (!model || moment - rearrangedAt < PAUSE_MS) return null;
   const states = store.shown().states;
   const open = new Set([model.root.path]);
-  const ended = store.activePaths.value.length === 0; // then where it ended is open
+  const ended = store.activePaths.value.length === 0; // then the containers in which it ended are open
   for (const path of ended ? store.lastLeaves.value.flatMap(around) : store.activePaths.value) {
     const since = ended ? 0 : states[path]?.since;
     if (model.get(path)?.children.length && since != null && now - since / 1e6 > SETTLED_MS) open.add(path);
@@ -32,14 +32,14 @@ export function containersToOpen(now) {
 /** The containers around a state. @param {string} path */
 const around = (path) => store.model.value?.ancestors(path).map((node) => node.path) ?? [];
 
-/** Forget what was open, so that the next answer is given at once. */
+/** Forget the open containers, so that the next call answers at once. */
 export function restart() {
   lastOpen = "";
   rearrangedAt = -Infinity;
 }
 
 /**
- * The box around all that runs; what is folded away is where the container is that holds it.
+ * The box around all running states; a state in a closed container counts as that container.
  * @param {Map<string, Box>} boxes
  * @returns {Box | null}
  */
@@ -57,13 +57,13 @@ function boxOfActive(boxes) {
   return { x, y, w: right - x, h: bottom - y };
 }
 
-/** Whether all that runs is legible at once. @param {Map<string, Box>} boxes @param {Viewport} view */
+/** Whether all running states are legible at once. @param {Map<string, Box>} boxes @param {Viewport} view */
 export function isLegible(boxes, view) {
   const box = boxOfActive(boxes);
   return !box || view.scaleFor(box) >= READABLE;
 }
 
-/** Without the deepest of these containers; null when only the outermost is left. @param {Set<string>} open */
+/** These containers without the deepest ones; null if only the root is left. @param {Set<string>} open */
 export function oneLevelLess(open) {
   const depth = (/** @type {string} */ path) => path.split("/").length;
   const deepest = Math.max(...[...open].map(depth));
@@ -72,7 +72,7 @@ export function oneLevelLess(open) {
 }
 
 /**
- * The largest box around all that runs whose text is legible when it fills the view.
+ * The largest box around all running states that is legible when it fills the view.
  * @param {Diagram} diagram
  * @param {Viewport} view
  * @param {Box} whole the whole diagram
@@ -88,7 +88,7 @@ export function boxToFrame(diagram, view, whole) {
     if (box && view.scaleFor(box) >= READABLE) return atLeast(box, view);
   }
   if (view.scaleFor(active) >= READABLE) return atLeast(active, view);
-  // More runs than can be read at once, with all folded: what began last is in the middle
+  // Not all are legible at once, even with everything closed: the state that began last is in the middle.
   const states = store.shown().states;
   const newest = leaves.reduce((a, b) => ((states[b]?.since ?? 0) > (states[a]?.since ?? 0) ? b : a));
   const at = boxOfOne(diagram, newest) ?? active;
@@ -105,7 +105,7 @@ function boxOfOne(diagram, path) {
   return null;
 }
 
-/** Something small is shown with what is around it, not enlarged. @param {Box} box @param {Viewport} view */
+/** The box, made at least as large as the view: small states are not enlarged. @param {Box} box @param {Viewport} view */
 function atLeast(box, view) {
   const w = Math.max(box.w, view.width * 0.9);
   const h = Math.max(box.h, view.height * 0.9);

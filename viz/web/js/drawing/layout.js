@@ -1,11 +1,11 @@
-// Where things are: one ELK graph per open container, bottom-up, in a worker, and cached.
-// Opening or closing a container lays out itself and its ancestors only.
+// The layout of the diagram: one ELK graph per open container, from the innermost out, in a worker. Results are cached,
+// so that opening or closing a container lays out only this container and those around it.
 import { joinText } from "#core/model.js";
 import { shorten } from "#core/text.js";
 import { measure } from "#drawing/measure.js";
 
 /**
- * @typedef {{ id: string, [property: string]: any }} ElkElement what ELK knows; see its JSON format
+ * @typedef {{ id: string, [property: string]: any }} ElkElement an element of ELK's JSON format
  * @typedef {Box & { entry: boolean, outcome: string }} PlacedPort
  * @typedef {Box & { outcome: string }} PlacedPill
  * @typedef {Box & {
@@ -21,9 +21,9 @@ import { measure } from "#drawing/measure.js";
  *   node: StateNode, shape: Shape, w: number, h: number, boxes: PlacedBox[],
  *   pills: PlacedPill[], joins: PlacedJoin[], ports: PlacedPort[], edges: PlacedEdge[], entry: Point | null,
  *   isOverview?: boolean, head?: number,
- * }} ContainerLayout where things are in a container, relative to its corner
+ * }} ContainerLayout places of the parts of a container, relative to its corner
  * @typedef {{ dir: Direction, columns?: number, folded?: boolean }} Shape how a container is laid out: along a
- *   direction, in a grid of so many columns, or folded as a long line of text is
+ *   direction, in a grid with a number of columns, or folded like a long line of text
  * @typedef {{ entry: string, out: (outcome?: string) => string, split: boolean }} Ends ids to connect a state by
  */
 
@@ -34,16 +34,16 @@ const PILL_H = 15;
 const ENTRY = 10;
 const BAR = 6; // thickness of a join
 const MOST_CACHED = 2000; // layouts of containers
-const GRID_FROM = 4; // children of a concurrence
-const FOLD_FROM = 7; // children of another container
-const FOLD_COST = 1.3; // its lines are longer
-const OVERVIEW_FROM = 150; // states that are seen
+const GRID_FROM = 4; // children of a concurrence from which a grid is tried
+const FOLD_FROM = 7; // children of another container from which folding is tried
+const FOLD_COST = 1.3; // factor on the cost of a folded shape, because its lines are longer
+const OVERVIEW_FROM = 150; // visible states from which they are drawn as tiles
 const TILE_GAP = 6;
 const HEAD = 24; // height of the name of a tile
-const HEAD_GROWS = 1.7; // by every level around it
+const HEAD_GROWS = 1.7; // factor for the name of each further level out
 const MOST_COLUMNS = 60;
 const ASPECTS = { least: 0.6, most: 2.4 };
-const SAME_ASPECT = 0.15; // difference of their logarithms
+const SAME_ASPECT = 0.15; // difference of logarithms below which two aspects count as equal
 const within = (/** @type {number} */ aspect) => Math.max(ASPECTS.least, Math.min(ASPECTS.most, aspect));
 /** @type {Direction[]} */
 const DIRECTIONS = ["DOWN", "RIGHT"];
@@ -82,7 +82,7 @@ class Elk {
       this.#calls.clear();
     };
     this.ready = this.#ask({ cmd: "register", algorithms: ["layered"] });
-    this.ready.catch(() => {}); // `layout` raises it
+    this.ready.catch(() => {}); // `layout` awaits it and throws the error
   }
 
   /** @param {ElkElement} graph @returns {Promise<ElkElement>} */
@@ -102,22 +102,22 @@ class Elk {
 }
 
 /** @param {string} outcome */
-export const pillWidth = (outcome) => measure(shorten(outcome), 9, true) + 15;
+const pillWidth = (outcome) => measure(shorten(outcome), 9, true) + 15;
 
 /** @param {StateNode} node */
-export function leafWidth(node) {
+function leafWidth(node) {
   const closed = node.children.length ? 20 + measure(String(node.total - 1), 9) : 0;
   return Math.max(56, 44 + measure(node.shown, 11, true) + closed);
 }
 
 export class Layout {
   /** @type {Map<string, ContainerLayout>} */
-  cache = new Map(); // by container, what is open in it, its direction and that around it
+  cache = new Map(); // by container, open containers in it, its direction and that of the container around it
   /** @type {Map<string, string>} */
-  chosen = new Map(); // shapes of the containers shown, kept so that nothing jumps about
+  chosen = new Map(); // shapes of the containers shown, kept so that the picture stays stable
   /** @type {Map<string, string[]>} */
-  tried = new Map(); // names of the shapes of a container, by what is open in it
-  aspect = 1.6; // width of the view by its height
+  tried = new Map(); // names of the shapes of a container, by the open containers in it
+  aspect = 1.6; // width of the view divided by its height
 
   /** @param {Worker} worker */
   constructor(worker) {
@@ -133,7 +133,7 @@ export class Layout {
   choose(aspect) {
     this.chosen.clear();
     const next = within(aspect);
-    if (Math.abs(next - this.aspect) > 0.1 * this.aspect) this.forget(); // grids and folds go by it
+    if (Math.abs(next - this.aspect) > 0.1 * this.aspect) this.forget(); // grids and folds depend on it
     this.aspect = next;
   }
 
@@ -153,7 +153,7 @@ export class Layout {
    * @param {StateNode} root
    * @param {Set<string>} open
    * @param {(done: number, all: number) => void} [onProgress] told of the states that are laid out
-   * @throws {Error} ELK fails at the outermost container; one within at which it fails is shown closed
+   * @throws {Error} ELK fails for the root; a container inside for which it fails is shown closed
    */
   async run(root, open, onProgress) {
     const all = countOf(root, open);
@@ -210,7 +210,7 @@ export class Layout {
     if (!plans.length) return;
     const isComplete = await this.#place(plans);
     if (isComplete) return;
-    // Where the shape that was chosen has failed, any other will do.
+    // If ELK failed for the chosen shape, any other is used.
     const laid = new Set(plans.filter(({ key }) => this.cache.has(key)).map(({ plan }) => plan.node));
     const stuck = level.filter((node) => this.chosen.has(node.path) && !laid.has(node));
     for (const node of stuck) this.chosen.delete(node.path);
@@ -218,7 +218,7 @@ export class Layout {
   }
 
   /**
-   * Have ELK lay out some plans; it fails at some graphs, and those are left out. Returns whether none was.
+   * Let ELK lay out some plans. It fails for some graphs, which are left out. Returns whether it did all of them.
    * @param {{ key: string, plan: Plan }[]} plans
    */
   async #place(plans) {
@@ -271,20 +271,20 @@ export class Layout {
     return best;
   }
 
-  /** Keep the shapes of what is shown. @param {ContainerLayout} result */
+  /** Keep the shapes of the containers shown. @param {ContainerLayout} result */
   #settle(result) {
     this.chosen.set(result.node.path, nameOf(result.shape));
     for (const child of result.boxes) if (child.inner) this.#settle(child.inner);
   }
 }
 
-/** So many states are seen. @param {StateNode} node @param {Set<string>} open @returns {number} */
+/** The number of visible states. @param {StateNode} node @param {Set<string>} open @returns {number} */
 const countOf = (node, open) =>
   isOpen(node, open) ? node.children.reduce((sum, child) => sum + countOf(child, open), 1) : 1;
 
 /**
- * What is too much for arrows: tiles by nesting, in the order of the machine, so that a state is always at the same
- * place.
+ * The layout of a machine with too many open states for arrows: nested tiles in the order of the machine, so that a
+ * state is always at the same place.
  * @param {StateNode} node
  * @param {Set<string>} open
  * @param {number} aspect
@@ -295,7 +295,7 @@ export function overview(node, open, aspect) {
     const inner = isOpen(child, open) ? overview(child, open, aspect) : null;
     return { node: child, inner, w: inner?.w ?? leafWidth(child), h: inner?.h ?? LEAF_H };
   });
-  // What is further out has a larger name: it is still legible when all is in view.
+  // Outer containers have larger names, which are legible when the whole machine is in view.
   const head = HEAD_GROWS * Math.max(HEAD / HEAD_GROWS, ...tiles.map((tile) => tile.inner?.head ?? 0));
   const least = measure(node.shown, 11, true) * (head / HEAD) + 40;
   const tried = tiles.slice(0, MOST_COLUMNS).map((_, i) => inRows(tiles, i + 1, head, least));
@@ -326,7 +326,7 @@ function inRows(tiles, columns, head, least) {
   return { boxes, w, h: y };
 }
 
-/** Where every state that is drawn is. @param {ContainerLayout} layout @param {number} x @param {number} y */
+/** The boxes of all drawn states, by path. @param {ContainerLayout} layout @param {number} x @param {number} y */
 export function boxesOf(layout, x = 0, y = 0, found = /** @type {Map<string, Box>} */ (new Map())) {
   found.set(layout.node.path, { x, y, w: layout.w, h: layout.h });
   for (const { node, inner, ...box } of layout.boxes)
@@ -345,7 +345,7 @@ const nameOf = ({ dir, columns, folded }) => `${dir}${columns ?? ""}${folded ? "
  * @param {number} aspect
  * @returns {Shape[]}
  */
-export function shapesOf(node, inner, aspect) {
+function shapesOf(node, inner, aspect) {
   /** @type {Shape[]} */
   const shapes = DIRECTIONS.map((dir) => ({ dir }));
   const { children } = node;
@@ -382,7 +382,7 @@ function keyOf(node, open, keys) {
   return `${node.path}(${inner.join(SEP)})`;
 }
 
-// One container as an ELK graph, with what every id in it means.
+// One container as an ELK graph, with the meaning of each id in it.
 class Plan {
   /** @type {Map<string, any>} */
   meanings = new Map();
@@ -391,7 +391,7 @@ class Plan {
   /**
    * @param {StateNode} node
    * @param {Shape} shape its own
-   * @param {Direction | null} outer direction of the container around it; null: it is the outermost
+   * @param {Direction | null} outer direction of the container around it; null for the root
    * @param {string} id
    * @param {Map<string, ContainerLayout>} inner by label
    * @param {number} aspect of what is folded
@@ -410,7 +410,7 @@ class Plan {
     if (shape.columns)
       Object.assign(this.graph.layoutOptions, {
         "elk.partitioning.activate": "true",
-        "elk.layered.nodePlacement.strategy": "SIMPLE", // rows stand under each other
+        "elk.layered.nodePlacement.strategy": "SIMPLE", // rows are placed below each other
         "elk.separateConnectedComponents": "false",
       });
     if (shape.folded)
@@ -437,7 +437,7 @@ class Plan {
   #shownOutcomes() {
     const used = new Set(this.node.links.filter((link) => link.to_outcome).map((link) => link.target));
     if (this.outer !== null) {
-      // the outermost shows only what something leads to
+      // the root shows only outcomes to which something leads
       for (const pill of this.node.pills) used.add(pill.outcome);
       for (const outcome of this.node.wired ?? []) used.add(outcome);
     }
@@ -450,7 +450,7 @@ class Plan {
     const tag = { concurrence: 66, iterator: 52, sequence: 60 }[node.kind] ?? 8;
     const pill = Math.max(0, ...this.outcomes.map(pillWidth));
     const name = measure(node.shown, 11, true) + tag + 30;
-    const title = outer === "DOWN" ? 2 * name - 20 : name; // beside the line that comes in at the top
+    const title = outer === "DOWN" ? 2 * name - 20 : name; // beside the line that enters at the top
     const right = outer === "RIGHT" ? 14 + pill / 2 : 14;
     const bottom = outer === "DOWN" ? 20 : 14;
     return {
@@ -470,7 +470,7 @@ class Plan {
         "elk.layered.nodePlacement.strategy": "NETWORK_SIMPLEX",
         "elk.layered.nodePlacement.favorStraightEdges": "true",
         "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
-        // In a plan all places stand before all transitions: half its arcs would count as going back.
+        // A plan lists all places before all transitions: in that order half of its arcs would point back.
         "elk.layered.cycleBreaking.strategy": node.kind === "plan" ? "DEPTH_FIRST" : "MODEL_ORDER",
         "elk.layered.edgeLabels.sideSelection": "SMART_DOWN",
         "elk.nodeLabels.placement": "[H_CENTER, V_TOP, INSIDE]",
@@ -595,7 +595,7 @@ class Plan {
     return id;
   }
 
-  /** Put children into rows, and what follows from them below. @param {number} columns */
+  /** Arrange children in rows, with entry above and joins and outcomes below. @param {number} columns */
   #makeRows(columns) {
     const rows = Math.ceil(this.node.children.length / columns);
     let i = 0;
@@ -623,7 +623,7 @@ class Plan {
     for (const label of node.initial) {
       const kind = node.kind === "concurrence" ? "fork" : "initial";
       const target = this.ends.get(label);
-      // In a grid its tag says that all of them begin; lines to all of them would hide it.
+      // In a grid the tag says that all children begin at once; lines to all of them would hide the children.
       if (target && !this.shape.columns) this.#edge({ kind, source: "", outcomes: [] }, this.entry, target.entry);
     }
     for (const link of node.links) {
@@ -644,13 +644,13 @@ class Plan {
     for (const [i, join] of node.joins.entries()) {
       const target = this.targets.get(join.outcome);
       const meaning = { kind: "link", join, source: node.path, outcomes: [join.outcome] };
-      // As wide as what stands there while it waits
+      // wide enough for its longest text, while it waits
       if (target) this.#edge(meaning, this.bars[i], target, [joinText(join, join.need - 1)]);
     }
     if (this.shape.folded && this.outer !== null) this.#reachOutcomes();
   }
 
-  /** ELK cannot fold a container with a port that no line leads to: lead one there that is not drawn. */
+  /** Lead an invisible line to each port without one: ELK cannot fold a container with an unconnected port. */
   #reachOutcomes() {
     const reached = new Set(this.graph.edges.map((/** @type {ElkElement} */ edge) => edge.targets[0]));
     const last = this.graph.children[this.graph.children.length - 1];
@@ -674,17 +674,17 @@ class Plan {
   }
 }
 
-/** @param {ContainerLayout} layout @param {number} aspect */
+/** The cost by which shapes are compared. @param {ContainerLayout} layout @param {number} aspect */
 const badness = (layout, aspect) => cost(layout, aspect) * (layout.shape.folded ? FOLD_COST : 1);
 
 /**
- * How badly something fills a view of that aspect.
+ * How badly a layout fills a view of an aspect: the smaller, the better.
  * @param {{ w: number, h: number }} size @param {number} aspect
  */
 const cost = ({ w, h }, aspect) => Math.max(w, aspect * h) + 0.15 * Math.sqrt(w * h);
 
 /**
- * What ELK found, in the page's terms.
+ * ELK's result in the page's types.
  * @param {Plan} plan
  * @param {ElkElement} found
  * @returns {ContainerLayout}

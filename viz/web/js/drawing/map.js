@@ -1,5 +1,5 @@
 // The map: floor, tracks in the colours of the states that drove them, goals, plans, scans, robots.
-// A press on a track goes to the instant at which the robot was there.
+// A click on a track goes to the instant at which the robot was there.
 import { bytesOf } from "#core/connection.js";
 import { outcomeClass } from "#core/outcomes.js";
 import { COLOURS, cellAt, countUntil, scanPoints } from "#core/scene.js";
@@ -7,9 +7,9 @@ import * as store from "#core/store.js";
 import { Colours, fitted } from "#drawing/theme.js";
 import { grab } from "#drawing/viewport.js";
 
-const MARGIN = 10; // around what is shown [px]
-const ROBOT_M = 8; // so much is shown around a robot
-const REACH = 9; // a pointer this near to a track is on it [px]
+const MARGIN = 10; // around the map [px]
+const ROBOT_M = 8; // shown around a followed robot [m]
+const REACH = 9; // greatest distance of the pointer from a track that it is on [px]
 const SCAN_MS = 1500; // an older scan is not shown
 const RADIUS_M = 0.25; // of a robot
 const SMALLEST = 6; // of a robot [px]
@@ -20,11 +20,11 @@ const FONT = "11px Inter, Arial, sans-serif";
 /** @typedef {import("#core/scene.js").Scene} Scene */
 
 export class MapView {
-  /** @type {string | null} the robot that stays in the middle; null: the whole map */
+  /** @type {string | null} the robot that is kept in the middle; null: the whole map */
   followed = null;
   /** @type {{ k: number, x: number, y: number } | null} px per metre, and the place in the middle [m]; null: all */
   view = null;
-  /** @type {{ scene: Scene, now: number } | null} shown in place of the page's own run; nothing is linked then */
+  /** @type {{ scene: Scene, now: number } | null} shown in place of the page's run, without links to it */
   given = null;
   /** @type {Map<string, HTMLCanvasElement>} pictures of maps, by their cells and colours */
   #pictures = new Map();
@@ -56,7 +56,7 @@ export class MapView {
     this.#pictures.clear();
   }
 
-  /** Begin anew with another machine. */
+  /** Reset the view for another machine. */
   reset() {
     this.view = null;
     this.followed = null;
@@ -70,7 +70,7 @@ export class MapView {
     this.draw();
   }
 
-  /** Where a place is drawn. @param {Point} place [m] @returns {[number, number]} [px] */
+  /** The pixel of a place. @param {Point} place [m] @returns {[number, number]} [px] */
   at({ x, y }) {
     const { k, left, bottom } = this.#scale;
     return [left + x * k, bottom - y * k];
@@ -147,11 +147,11 @@ export class MapView {
     if (known) return known.width ? known : null;
     const made = document.createElement("canvas");
     made.width = 0;
-    this.#pictures.clear(); // of an older map
+    this.#pictures.clear(); // older maps are not needed any more
     this.#pictures.set(key, made);
     bytesOf(map.cells)
       .then((cells) => {
-        if (cells.length !== map.width * map.height) return; // a recording that was written by hand
+        if (cells.length !== map.width * map.height) return; // a recording that was edited by hand
         Object.assign(made, { width: map.width, height: map.height });
         const g = /** @type {CanvasRenderingContext2D} */ (made.getContext("2d"));
         const image = g.createImageData(map.width, map.height);
@@ -163,11 +163,11 @@ export class MapView {
         g.putImageData(image, 0, 0);
         this.draw();
       })
-      .catch(() => {}); // it is no map: poses are shown without one
+      .catch(() => {}); // an invalid map: poses are shown without one
     return null;
   }
 
-  /** A metre's grid, where there is no map. @param {number} width @param {number} height */
+  /** A grid of 1 m, if there is no map. @param {number} width @param {number} height */
   #grid(width, height) {
     const g = this.context;
     const { k } = this.#scale;
@@ -191,7 +191,7 @@ export class MapView {
   }
 
   /**
-   * What a robot sees and plans.
+   * The scan and the plan of a robot.
    * @param {Scene} scene @param {Robot} robot @param {number} now @param {number} until
    */
   #seen(scene, robot, now, until) {
@@ -224,7 +224,7 @@ export class MapView {
     const g = this.context;
     g.lineCap = g.lineJoin = "round";
     g.beginPath();
-    for (const point of points) g.lineTo(...this.at(point)); // the first one only begins
+    for (const point of points) g.lineTo(...this.at(point)); // the first call acts as moveTo
     g.stroke();
   }
 
@@ -260,7 +260,7 @@ export class MapView {
     }
   }
 
-  /** Each place once, as its newest goal left it. @param {Scene} scene @param {number} until */
+  /** Draw each goal's place once, with the status of the newest goal there. @param {Scene} scene @param {number} until */
   #goals(scene, until) {
     const g = this.context;
     /** @type {Map<string, DrivenGoal>} */
@@ -310,7 +310,7 @@ export class MapView {
   }
 
   /**
-   * A name beside a place, on a side where no other name is.
+   * Write a name beside a place, on a side without another name.
    * @param {string} text @param {number} x @param {number} y @param {boolean} [strong]
    */
   #label(text, x, y, strong = false) {
@@ -366,7 +366,7 @@ export class MapView {
     if (scene.robots.size > 1) this.#label(name, x, y - r - 7, true);
   }
 
-  /** Where the scale is, at the bottom right. @param {number} width @param {number} height */
+  /** The box of the scale, at the bottom right. @param {number} width @param {number} height */
   #scaleBox(width, height) {
     const metres = SCALES_M.find((m) => m * this.#scale.k >= 44) ?? 1000;
     const long = metres * this.#scale.k;
@@ -397,7 +397,7 @@ export class MapView {
     g.fillText(`${metres} m`, x + long / 2, y - 9);
   }
 
-  // -- what the user does -------------------------------------------------------------------------
+  // -- input --------------------------------------------------------------------------------------
 
   /** @param {PointerEvent | MouseEvent} e */
   #nearest(e) {
@@ -414,7 +414,7 @@ export class MapView {
     store.hover(path === null || visit === null ? null : { path, from: visit });
   }
 
-  /** Go to the instant at which a robot was here. @param {PointerEvent} e */
+  /** Go to the instant at which a robot was at the pointer. @param {PointerEvent} e */
   #goTo(e) {
     const found = this.#nearest(e);
     if (!found) return;
@@ -463,7 +463,7 @@ function wordOf(hex) {
   return ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 }
 
-/** The map in words. @param {Scene} scene @param {number} now */
+/** The map as text, for screen readers. @param {Scene} scene @param {number} now */
 function describe(scene, now) {
   const parts = [...scene.robots].flatMap(([name, robot]) => {
     const pose = scene.poseAt(robot, now);

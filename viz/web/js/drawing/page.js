@@ -1,5 +1,5 @@
-// The drawing as a whole: what happens reaches the diagram and the timeline, and the panels at
-// their own pace. What the user does comes in by the methods below.
+// Controls the drawing: passes events to the diagram and timeline at once, and to the panels at a slower pace; carries
+// out the user's actions on the view.
 import { connect, isFile, makeLayoutWorker, messageOf, readToken } from "#core/connection.js";
 import { containerOf } from "#core/fold.js";
 import { fragmentOf, viewOf } from "#core/links.js";
@@ -13,49 +13,49 @@ import { applyTheme, systemIsDark } from "#drawing/theme.js";
 import { Timeline } from "#drawing/timeline.js";
 import { drag, Viewport } from "#drawing/viewport.js";
 
-const PANELS_MS = 160; // the panels are drawn again at most so often
+const PANELS_MS = 160; // shortest time between two updates of the panels
 const SLOWEST_PANELS_MS = 800;
-const IN_TIME_MS = 25; // a frame that comes so soon after it was asked for is in time
-const PANELS_PER_LATE = 8; // longer pause between panels for each ms that frames are late
-const LATE_PART = 0.1; // of the newest frame in the average
-const TEXT_MS = 400; // and those with much text
-const BEAT_MS = 200; // between two looks at what changes without events
-const BUSY = 15; // events in a second from which transitions do not fade one by one
+const IN_TIME_MS = 25; // a frame that comes within this time after its request is not late
+const PANELS_PER_LATE = 8; // added to the time between updates of the panels, per ms of lateness [ms]
+const LATE_PART = 0.1; // weight of the newest frame in the average lateness
+const TEXT_MS = 400; // shortest time between two updates of panels with much text
+const BEAT_MS = 200; // time between two updates of what changes without events
+const BUSY = 15; // events per second from which transitions do not fade one by one
 const ANNOUNCE_MS = 1000;
-const OPENING_MS = 15_000; // so long after a machine came its panels may still come
-const READABLE = 0.55; // the scale below which fewer levels are opened at first
-const SLOW_MS = 300; // a layout that takes longer shows how far it is
-const PLAY_MS = 45; // between two pictures of a run that is played
-const ADDRESS_MS = 300; // from a change to the address that says so
-const BURST = 500; // so many events at once are a snapshot, whose delay is not measured
+const OPENING_MS = 15_000; // time after the arrival of a machine in which panels may still appear
+const READABLE = 0.55; // scale below which fewer levels are opened at first
+const SLOW_MS = 300; // a layout that takes longer shows its progress
+const PLAY_MS = 45; // time between two pictures while playing
+const ADDRESS_MS = 300; // delay between a change and the update of the address
+const BURST = 500; // this many events at once come from a snapshot: their latency is not measured
 
 export class Page {
   /** @type {Set<string>} */
   changed = new Set(); // paths to paint
   /** @type {RunEvent[]} */
   flashes = []; // transitions to flash
-  frame = 0; // of the browser, that is asked for
-  askedAt = 0; // for that frame [ms]
-  late = 0; // so much later it came, on average [ms]
-  playFrame = 0; // the same while a run is played
+  frame = 0; // the requested animation frame
+  askedAt = 0; // time of that request [ms]
+  late = 0; // average lateness of frames [ms]
+  playFrame = 0; // the requested animation frame while playing
   playedAt = 0; // [ms]
   /** @type {Promise<void> | null} */
-  drawing = null; // the layout that is under way
+  drawing = null; // the running layout
   drawAgain = false;
   /** @type {{ frame: boolean | "follow", focus: string | null }} */
-  afterLayout = { frame: false, focus: null }; // what to show then
+  afterLayout = { frame: false, focus: null }; // what to show after it
   /** @type {string | null} */
-  toggled = null; // path of the container that is opened or closed
+  toggled = null; // path of the container that is being opened or closed
   /** @type {import("#drawing/viewport.js").View | null} */
   fitted = null; // the view that showed everything
   /** @type {string | null} */
   hovered = null; // path of the state in the diagram that the pointer is on
   followIsSet = false;
   /** @type {import("#core/links.js").LinkedView | null} */
-  linked = viewOf(location.hash); // what the address asked for, until it is shown
+  linked = viewOf(location.hash); // the view in the address, until it is shown
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   addressDue;
-  panelsAt = 0; // when they were drawn [ms]
+  panelsAt = 0; // time of their last update [ms]
   textAt = 0;
   announcedAt = 0;
   newestSeq = 0;
@@ -63,8 +63,8 @@ export class Page {
   panelsDue = 0;
   /** @type {ReturnType<typeof setTimeout> | 0} */
   mapsDue = 0;
-  openedAt = 0; // when the machine came [ms]
-  layoutMs = 0; // the last layout took
+  openedAt = 0; // time of the machine's arrival [ms]
+  layoutMs = 0; // duration of the last layout
   /** @type {number[]} */
   latencies = []; // from the event to the paint [ms], for benchmarks
   /** @type {number[]} */
@@ -103,7 +103,8 @@ export class Page {
     minimap.addEventListener("pointerdown", (e) => this.#jump(e));
     new ResizeObserver(() => {
       if (this.fitted && this.view.is(this.fitted)) {
-        // Who saw all sees all again; panels that come while the page opens leave another shape to lay out for.
+        // A view that showed everything does so again. Panels that appear while the page opens change its aspect, so
+        // the machine is laid out for the new one.
         if (this.#isOtherShape()) this.refit();
         else this.fit({ animate: false });
       }
@@ -147,7 +148,7 @@ export class Page {
     store.wayShown.subscribe(() => this.#showWay());
   }
 
-  /** Begin when the elements are in the document, so that their fonts are loading. */
+  /** Begin; the elements must be in the document, so that the browser loads their fonts. */
   async start() {
     setInterval(() => this.#beat(), BEAT_MS);
     this.layout = new Layout(await makeLayoutWorker());
@@ -159,9 +160,9 @@ export class Page {
     });
   }
 
-  // -- what happens -------------------------------------------------------------------------------
+  // -- events -------------------------------------------------------------------------------------
 
-  /** Show the machine that has come into the store. */
+  /** Show the machine in the store. */
   showMachine() {
     this.openedAt = performance.now();
     store.selected.value = null;
@@ -182,7 +183,7 @@ export class Page {
 
   // -- the address ------------------------------------------------------------------------------
 
-  /** The address of what is shown. */
+  /** The address of the view. */
   address() {
     const address = new URL(location.href);
     const name = store.facts.value?.name;
@@ -191,12 +192,12 @@ export class Page {
     return String(address);
   }
 
-  /** What is shown, for a picture's head. */
+  /** The title of the view, for a picture. */
   title() {
     return store.facts.value?.label ?? "";
   }
 
-  /** A name for a file of what is shown. */
+  /** A file name for the view, without an extension. */
   fileName() {
     return `${this.title()} ${store.instantText(store.nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
   }
@@ -214,7 +215,7 @@ export class Page {
     });
   }
 
-  /** Let the address say what is shown, a moment after the last change. */
+  /** Write the view into the address, a moment after the last change. */
   #writeAddress() {
     clearTimeout(this.addressDue);
     this.addressDue = setTimeout(() => {
@@ -222,7 +223,7 @@ export class Page {
     }, ADDRESS_MS);
   }
 
-  /** Show what the address asks for, as far as it is there. */
+  /** Show the view of the address, as far as it exists. */
   #showLinked() {
     const model = store.model.value;
     const view = this.linked;
@@ -272,7 +273,7 @@ export class Page {
     this.frame = requestAnimationFrame(() => this.#draw());
   }
 
-  /** Time between two pictures of the panels [ms]: longer where the browser is behind, for the diagram comes first. */
+  /** Time between two updates of the panels [ms]; longer on a slow browser, as the diagram has priority. */
   get #panelsPause() {
     return Math.min(SLOWEST_PANELS_MS, PANELS_MS + PANELS_PER_LATE * Math.max(0, this.late - IN_TIME_MS));
   }
@@ -281,7 +282,7 @@ export class Page {
     this.frame = 0;
     const moment = performance.now();
     this.late += LATE_PART * (moment - this.askedAt - this.late);
-    // What came just before one looked back is not shown late, when one is back.
+    // Changes from before a look back must not be painted after the return to live.
     const flashes = this.flashes.splice(0);
     const arrived = this.arrived.splice(0);
     if (store.cursor.value === null) {
@@ -333,7 +334,7 @@ export class Page {
       this.newestSeq = newest;
       this.diagram.svg.classList.toggle("busy", isBusy);
     }
-    // Not all in one long task
+    // Not in one long task, which would block input.
     this.mapsDue ||= setTimeout(() => {
       this.mapsDue = 0;
       this.timeline.draw();
@@ -344,7 +345,7 @@ export class Page {
     this.#follow();
   }
 
-  /** What changes without events: clocks, the stale badge, folded containers. */
+  /** Update what changes without events: clocks, the stale badge, closed containers. */
   #beat() {
     const data = store.shown();
     const now = store.nowMs();
@@ -357,7 +358,7 @@ export class Page {
     this.#panels(performance.now());
   }
 
-  /** Tell screen readers what runs. @param {number} moment */
+  /** Announce the running states to screen readers. @param {number} moment */
   #announce(moment) {
     const region = document.getElementById("announced");
     if (!region || moment - this.announcedAt < ANNOUNCE_MS) return;
@@ -399,7 +400,7 @@ export class Page {
     this.#showNumbers();
   }
 
-  /** Open what is on the way that led to the end of the run, and draw that thick. */
+  /** Open the containers on the way to the end of the run, and highlight that way. */
   #showWay() {
     const closed = store.wayShown.value.map(({ path }) => store.reveal(path)).some(Boolean);
     if (closed) this.relayout({ frame: true });
@@ -415,7 +416,7 @@ export class Page {
   // -- layout -------------------------------------------------------------------------------------
 
   /**
-   * Lay the machine out, and draw it; then show all of it, what runs, or one state.
+   * Lay out and draw the machine; then show all of it, the running states, or one state.
    * @param {{ frame?: boolean | "follow", focus?: string | null }} [then]
    */
   relayout({ frame = false, focus = null } = {}) {
@@ -446,7 +447,7 @@ export class Page {
     } catch (error) {
       const text = `This machine could not be laid out: ${messageOf(error)}`;
       if (this.diagram.size)
-        store.notify(text, "error"); // what was drawn stays
+        store.notify(text, "error"); // the old drawing stays
       else store.failure.value = text;
       console.error(error);
     } finally {
@@ -485,7 +486,7 @@ export class Page {
     if (this.afterLayout.frame === true && tooSmall && store.openOneLevelLess()) this.drawAgain = true;
   }
 
-  /** What is in the middle of the view stays where it is when things around it move. */
+  /** Keep the state in the middle of the view at its place while a layout moves the others. */
   #anchor() {
     const { view, diagram } = this;
     if (!diagram.size) return null;
@@ -520,13 +521,13 @@ export class Page {
     this.relayout({ frame: "follow" });
   }
 
-  /** Whether the page is just opening, and its view has become much wider or higher than what was laid out for it. */
+  /** Whether the page is just opening and the aspect of its view has changed much since the layout. */
   #isOtherShape() {
     const isOpening = performance.now() - this.openedAt < OPENING_MS;
     return isOpening && this.layout !== null && !this.layout.suits(this.view.width / this.view.height);
   }
 
-  /** Show everything, laid out for the view as it is now. */
+  /** Show everything, with a layout for the present size of the view. */
   refit() {
     this.relayout({ frame: true });
   }
@@ -535,9 +536,9 @@ export class Page {
     if (this.diagram.size) this.fitted = this.view.frame(this.diagram.size, { animate, most: 1.5 });
   }
 
-  // -- what the user does -------------------------------------------------------------------------
+  // -- input --------------------------------------------------------------------------------------
 
-  /** The pointer is on a state of the diagram: its visit lights up elsewhere, too. @param {string | null} path */
+  /** Set the state of the diagram that the pointer is on: its visit is highlighted everywhere. @param {string | null} path */
   #hover(path) {
     if (path !== this.hovered) store.hoverAt(path);
     this.hovered = path;
@@ -581,7 +582,7 @@ export class Page {
     this.#toggle(store.model.value?.get(store.selected.value));
   }
 
-  /** Open or close a container, unless it is the outermost. @param {StateNode | undefined} node */
+  /** Open or close a container, unless it is the root. @param {StateNode | undefined} node */
   #toggle(node) {
     if (store.overview.value && node) {
       store.openAround(node);
@@ -655,7 +656,7 @@ export class Page {
     this.diagram.mark(paths, "hit");
   }
 
-  /** Show what the minimap is pressed on. @param {PointerEvent} pressed */
+  /** Show the place in the minimap that is pressed. @param {PointerEvent} pressed */
   #jump(pressed) {
     const move = (/** @type {PointerEvent} */ e) => {
       const matrix = this.diagram.minimap.getScreenCTM();

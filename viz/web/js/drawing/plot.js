@@ -5,11 +5,11 @@ import * as store from "#core/store.js";
 import { Colours } from "#drawing/theme.js";
 import { drag } from "#drawing/viewport.js";
 
-const SCALE = 44; // room for the numbers of the scale [px]
+const SCALE = 44; // width of the scale's numbers [px]
 const FONT = "11px Inter, Arial, sans-serif";
-export const RIGHT = 14; // as the timeline has it
+export const RIGHT = 14; // margin, as in the timeline [px]
 
-/** @typedef {{ from: number, to: number }} Range what is shown [ms] */
+/** @typedef {{ from: number, to: number }} Range the range shown [ms] */
 
 export class Plot {
   /** @type {Range} */
@@ -87,7 +87,7 @@ export class Plot {
     });
   }
 
-  /** The instant shown and the one at the pointer; what the hovered visit took; what is later is pale. */
+  /** Mark the instants shown and at the pointer and the hovered visit; the time after the instant shown is pale. */
   #marks() {
     const { ctx: g, bbox } = this.chart;
     const at = (/** @type {number} */ t) =>
@@ -129,7 +129,7 @@ export class Plot {
 }
 
 /**
- * Where a line is broken, wide enough to be seen: uPlot draws over breaks that are narrower than a pixel.
+ * The breaks of a line, at least one pixel wide: uPlot draws over narrower ones.
  * @param {uPlot} chart @param {number} number of the series @param {number} first @param {number} last index shown
  * @returns {[number, number][]}
  */

@@ -40,7 +40,7 @@ export const icon = (kind, x, y) =>
     class: `icon ${STROKED.has(kind) ? "stroked" : ""}`,
   });
 
-/** The path of a line whose corners are rounded. @param {Point[]} points */
+/** The path of a line with rounded corners. @param {Point[]} points */
 export function roundedLine(points, radius = 6) {
   const at = (/** @type {Point} */ p) => `${p.x.toFixed(1)} ${p.y.toFixed(1)}`;
   let d = `M${at(points[0])}`;

@@ -1,4 +1,4 @@
-// Light or dark: as the system, or as the user chose.
+// Light or dark, by the system's setting or the user's choice.
 import * as store from "#core/store.js";
 
 export const systemIsDark = matchMedia("(prefers-color-scheme: dark)");
@@ -11,7 +11,7 @@ export function applyTheme() {
   store.save("theme", store.theme.value);
 }
 
-/** The colours that the page has now, by their names; read once. */
+/** The page's present colours by name; read once, as getComputedStyle is slow. */
 export class Colours {
   /** @type {Map<string, string>} */
   #known = new Map();
@@ -32,7 +32,7 @@ export class Colours {
 }
 
 /**
- * Let a canvas have as many pixels as its place, and one unit a CSS pixel; null where it is not shown.
+ * Give a canvas the device pixels of its size, with CSS pixels as its unit; returns null if it is not shown.
  * @param {CanvasRenderingContext2D} g
  */
 export function fitted(g) {

@@ -1,4 +1,4 @@
-// The run over time: a lane per container, in it a row for each child of a concurrence; drag to seek.
+// The timeline: a lane for each container, with a row for each branch of a concurrence.
 import { ms } from "#core/fold.js";
 import { endClass } from "#core/outcomes.js";
 import { COLOURS } from "#core/scene.js";
@@ -8,17 +8,17 @@ import { Colours, fitted } from "#drawing/theme.js";
 import { drag } from "#drawing/viewport.js";
 
 // Sizes in CSS pixels
-const NAMES = 168; // for the names of the lanes
+const NAMES = 168; // width of the lanes' names
 const NAMES_NARROW = 84; // on a narrow page
 const RIGHT = 14;
-const FOOT = 26; // the axis, with the buttons at its left
+const FOOT = 26; // height of the axis and its buttons
 const LANE = 19;
 const ROW = 13;
-const MOST_ROWS = 8; // of a concurrence that are given room
-const NOTE = 130; // the text of a note at most
+const MOST_ROWS = 8; // rows of a concurrence
+const NOTE = 130; // width of a note's text
 const THINNEST = 0.5;
 const LIVE_MS = 30_000; // shown at first
-const SHORTEST_MS = 200; // that can be zoomed to
+const SHORTEST_MS = 200; // the shortest time that can fill the timeline
 const LONGEST_MS = 30 * 86_400_000;
 const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14_400];
 
@@ -29,12 +29,12 @@ const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 36
 export class Timeline {
   length = LIVE_MS; // shown [ms]
   /** @type {number | null} */
-  end = null; // [ms]; null: follows now
-  top = 0; // scrolled by [px]
+  end = null; // of the range shown [ms]; null: now
+  top = 0; // vertical scroll [px]
   names = NAMES;
   /** @type {Scale | null} */
-  scale = null; // that was drawn last
-  tallest = 0; // all lanes and the axis [px]
+  scale = null; // of the last drawing
+  tallest = 0; // height of all lanes and the axis [px]
   /** @type {StateNode[]} */
   lanes = []; // in the order of the tree
   /** @type {Map<string, Span[]>} */
@@ -43,11 +43,11 @@ export class Timeline {
   model = null;
   /** @type {Span[] | null} */
   spans = null;
-  sorted = 0; // so many spans have been put into lanes
+  sorted = 0; // number of spans that are in lanes
   /** @type {Hit[]} */
   hits = [];
   /** @type {[number, number][]} */
-  gaps = []; // where no process ran the mission [px]
+  gaps = []; // outages [px]
   #colours = new Colours();
 
   /**
@@ -99,7 +99,7 @@ export class Timeline {
     this.end = last + this.length * 0.02;
   }
 
-  /** Show a visit, with a little around it. @param {number} from @param {number} to [ms] */
+  /** Show a visit with some time around it. @param {number} from @param {number} to [ms] */
   #show(from, to) {
     const length = Math.max(SHORTEST_MS, (to - from) * 1.1);
     this.end = (from + to) / 2 + length / 2;
@@ -107,24 +107,24 @@ export class Timeline {
     this.draw();
   }
 
-  /** Follow now. */
+  /** Follow the present. */
   live() {
     this.end = null;
     store.seek(null);
   }
 
-  /** What is shown [ms]. @returns {[number, number]} */
+  /** The range shown [ms]. @returns {[number, number]} */
   #range() {
     const now = store.nowMs();
     let end = this.end ?? now + this.length * 0.01;
     if (this.end === null && store.cursor.value !== null) end = now + this.length / 2;
-    const first = store.run.first(); // a young run begins at the left and grows
+    const first = store.run.first(); // a run shorter than the range begins at the left
     if (this.end === null && store.cursor.value === null && first != null)
       end = Math.max(end, first + this.length * 0.98);
     return [end - this.length, end];
   }
 
-  /** What is played stays in view. */
+  /** Keep the played instant in view. */
   #keepInView() {
     const at = store.cursor.value;
     if (this.end === null || at === null || !store.playing.value) return;
@@ -139,13 +139,13 @@ export class Timeline {
   }
 
   /**
-   * Put new spans into lanes; a container has a lane when something in it has run.
+   * Put new spans into lanes; a container gets a lane when a state in it has run.
    * @param {Model} model
    * @param {Span[]} spans
    */
   #makeLanes(model, spans) {
     if (this.model !== model || this.spans !== spans) {
-      // another machine, another run, or spans were forgotten
+      // another machine, another run, or spans were dropped
       this.spansOf.clear();
       this.sorted = 0;
       this.lanes = [];
@@ -183,7 +183,7 @@ export class Timeline {
     this.#grid(scale, width, height);
     const tallest = this.lanes.reduce((sum, lane) => sum + laneHeight(lane), 3) + FOOT;
     if (tallest !== this.tallest) {
-      this.tallest = tallest; // no higher than its lanes: plots need the room
+      this.tallest = tallest; // not higher than its lanes, to leave room for the plots
       document.documentElement.style.setProperty("--lanes", `${tallest}px`);
     }
     const room = height - FOOT;
@@ -206,7 +206,7 @@ export class Timeline {
     this.onDraw({ from, to });
   }
 
-  /** The selected stretch of the run. @param {(t: number) => number} x @param {number} height */
+  /** Draw the selected stretch. @param {(t: number) => number} x @param {number} height */
   #stretch(x, height) {
     const found = store.stretch.value;
     if (!found) return;
@@ -220,7 +220,7 @@ export class Timeline {
     g.fillRect(left, height - FOOT, right - left, store.looping.value ? 4 : 2);
   }
 
-  /** Gaps where no process ran the mission. @param {Scale} scale @param {number} width @param {number} height */
+  /** Draw the outages. @param {Scale} scale @param {number} width @param {number} height */
   #outages({ from, to, x }, width, height) {
     const g = this.context;
     this.gaps = [];
@@ -251,7 +251,7 @@ export class Timeline {
   }
 
   /**
-   * A pin at each note, with its text.
+   * Draw a pin at each note, with its text.
    * @param {(t: number) => number} x @param {number} width @param {number} height
    */
   #notes(x, width, height) {
@@ -284,7 +284,7 @@ export class Timeline {
     g.restore();
   }
 
-  /** All lanes where there is room, else those with something in them. @param {Scale} scale @param {number} room */
+  /** All lanes if there is room, otherwise those with spans in the range. @param {Scale} scale @param {number} room */
   #lanesToShow({ from, to }, room) {
     const tall = this.lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
     if (tall <= room) return this.lanes;
@@ -332,7 +332,7 @@ export class Timeline {
     for (let i = firstAfter(spans, from); i < spans.length; i++) {
       const span = spans[i];
       if (span.from > to) break;
-      const later = span.from > now; // than the instant shown
+      const later = span.from > now; // after the instant shown
       const ended = span.to !== null && (later || span.to <= now);
       const until = span.to ?? Math.max(now, store.run.last() ?? now);
       const node = this.model?.get(span.path);
@@ -381,7 +381,7 @@ export class Timeline {
     }
     g.stroke();
     if (store.selected.value === span.path) {
-      g.strokeStyle = this.#colours.of("ink"); // as in the diagram: not what running looks like
+      g.strokeStyle = this.#colours.of("ink"); // as in the diagram, and different from a running state
       g.lineWidth = 2;
       g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
     }
@@ -402,7 +402,7 @@ export class Timeline {
     g.font = "11px Inter, Arial, sans-serif";
   }
 
-  /** A ring around what the pointer is on here or in the map. @param {Omit<Hit, "span">} bar */
+  /** Draw a ring around the visit that the pointer is on here or in the map. @param {Omit<Hit, "span">} bar */
   #halo({ left, right, top, bottom }) {
     const g = this.context;
     for (const [name, wide] of /** @type {[string, number][]} */ ([
@@ -418,7 +418,7 @@ export class Timeline {
   }
 
   /**
-   * Mark the instant at which a preempt was serviced, or the state abandoned.
+   * Mark the instant at which a preempt was serviced or the state was abandoned.
    * @param {number | null} t
    * @param {string} colour
    * @param {(t: number) => number} x
@@ -443,19 +443,19 @@ export class Timeline {
     store.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
   }
 
-  /** The instant at the pointer, and the one that is shown. @param {(t: number) => number} x @param {number} height */
+  /** Draw the instants at the pointer and shown. @param {(t: number) => number} x @param {number} height */
   #cursor(x, height) {
     const at = store.cursor.value;
     const pointed = store.pointed.value;
     if (pointed !== null && x(pointed) >= this.names) this.#flag(x(pointed), pointed, height, "muted", 1);
     if (at === null) return;
     const last = this.canvas.clientWidth - RIGHT;
-    const px = Math.max(this.names, Math.min(last, x(at))); // beside what is shown it stays at the edge
+    const px = Math.max(this.names, Math.min(last, x(at))); // outside the range it is drawn at the edge
     this.#flag(px, at, height, "active", 2);
   }
 
   /**
-   * A line through the lanes with its instant at the axis.
+   * Draw a line through the lanes, with its instant at the axis.
    * @param {number} px @param {number} t @param {number} height @param {string} colour @param {number} wide
    */
   #flag(px, t, height, colour, wide) {
@@ -488,7 +488,7 @@ export class Timeline {
     const { left, bottom } = this.canvas.getBoundingClientRect();
     const from = e.clientX - left;
     if (e.button !== 0 || from < this.names) return;
-    const selects = e.pointerType === "mouse" && e.clientY < bottom - FOOT; // else a drag moves the instant
+    const selects = e.pointerType === "mouse" && e.clientY < bottom - FOOT; // other drags move the instant shown
     const begin = this.#timeAt(from);
     const span = this.#spanAt(e);
     let dragged = false;
@@ -547,7 +547,7 @@ const laneHeight = (lane) =>
   lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(lane.children.length, MOST_ROWS) + 3) : LANE;
 
 /**
- * Number of the first span to draw; spans begin in order, but may end in any.
+ * The index of the first span to draw; spans are in order of their beginnings, but not of their ends.
  * @param {Span[]} spans
  * @param {number} t
  */

@@ -1,8 +1,8 @@
-// Pan and zoom: at the pointer, by keys, by animation; events never move the view.
+// Pan and zoom by pointer, keys and animation.
 
 const LEAST_SCALE = 0.04;
 const MOST_SCALE = 4;
-const HEAD = 18; // [px] that a banner covers
+const HEAD = 18; // height that a banner covers [px]
 
 /** @typedef {{ x: number, y: number, k: number }} View translation [px] and scale */
 
@@ -82,7 +82,8 @@ export class Viewport {
     const from = { x: this.x, y: this.y, k: this.k };
     const begun = performance.now();
     const step = (/** @type {number} */ now) => {
-      const part = Math.max(0, Math.min(1, (now - begun) / time)); // a frame may have begun before
+      // The time of a frame can be before the call that began the animation.
+      const part = Math.max(0, Math.min(1, (now - begun) / time));
       const ease = 1 - (1 - part) ** 3;
       this.set(from.x + (x - from.x) * ease, from.y + (y - from.y) * ease, from.k + (k - from.k) * ease);
       if (part < 1) this.#animation = requestAnimationFrame(step);
@@ -118,7 +119,7 @@ export class Viewport {
 }
 
 /**
- * Follow the pointer until it is let go, or taken away.
+ * Follow the pointer until it is released or cancelled.
  * @param {(e: PointerEvent) => void} onMove
  * @param {(e: PointerEvent) => void} [onEnd]
  * @param {(e: PointerEvent) => boolean} [isMine] of several pointers
@@ -136,18 +137,18 @@ export function drag(onMove, onEnd, isMine = () => true) {
   addEventListener("pointercancel", end);
 }
 
-const STILL = 4; // a pointer that moves less than so far moves nothing [px]
+const STILL = 4; // a press with less movement is a tap [px]
 
 /**
- * One pointer moves what an element shows, two zoom it as well.
+ * Pan an element's content with one pointer, pan and zoom it with two.
  * @param {Element} element
  * @param {{ onPress?: () => void, onPan: (dx: number, dy: number) => void,
  *   onZoom: (factor: number, px: number, py: number) => void, onTap?: (pressed: PointerEvent) => void }} handlers
- *   `onTap`: it was pressed, and nothing moved
+ *   `onTap`: pressed and released without movement
  */
 export function grab(element, { onPress, onPan, onZoom, onTap }) {
   /** @type {Map<number, Point>} */
-  const pointers = new Map(); // that are down, by their number
+  const pointers = new Map(); // the pressed pointers, by id
   let moved = false;
   const grip = () => {
     const [a, b] = pointers.values();

@@ -1,4 +1,4 @@
-// The actions on the network: send a goal from a form or as YAML, see its feedback and result, cancel it.
+// The page for the actions on the network: sends goals from a form or as YAML, shows feedback and results, cancels goals.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { ask, askAction, encoded, hasToken, isFile, showActions } from "#core/connection.js";
 import { problemsWithoutField, toState, toYaml } from "#core/goal_values.js";
@@ -10,14 +10,14 @@ import { ProgressBar } from "#panels/goals.js";
 import { fieldValue, html } from "#panels/html.js";
 
 /**
- * What the server knows of an action's goal.
+ * The server's description of an action's goal.
  * @typedef {{ type: string, about: string, fields: FormField[], values: Record<string, any>, yaml: string }} Definition
  */
 
 /** @type {Record<string, string>} */
 const CANCELLING = { WAITING_FOR_CANCEL_ACK: "asked to cancel", PREEMPTING: "stopping", RECALLING: "stopping" };
 const TABS = ["form", "yaml"];
-const MOST_LINES = 40; // of the YAML that are shown without scrolling
+const MOST_LINES = 40; // lines of YAML that are shown without scrolling
 
 export function ActionsButton() {
   if (isFile()) return null;
@@ -69,7 +69,7 @@ function Choice({ one, on }) {
 /** Why this page may not send goals, or null. */
 function refusal() {
   if (!store.settings.value.control)
-    return html`This viewer only looks. To send goals, start it with <code>smachpy view --control</code>${" "}
+    return html`This viewer sends no commands. To send goals, start it with <code>smachpy view --control</code>${" "}
       and open the address that it prints.`;
   if (!hasToken())
     return html`The address of this page has no token. To send goals, open the address that${" "}
@@ -129,7 +129,7 @@ function GoalForm({ name, server }) {
   const turnTo = async (/** @type {string} */ other) => {
     if (other === tab) return;
     if (!why && server) {
-      // the server translates, and says what is wrong
+      // the server converts between form and YAML, and finds the problems
       const answer = await askAction({ command: "check", name, yaml: text() });
       if (!answer.ok) {
         refuse(answer);

@@ -1,4 +1,4 @@
-// Two machines, or two runs, in one drawing: what was added, removed, changed.
+// Two machines, or two runs, in one drawing, with what was added, removed and changed.
 import { useState } from "preact/hooks";
 import { ask, encoded, isFile, link } from "#core/connection.js";
 import { CHANGE_SIGNS } from "#core/model.js";
@@ -10,7 +10,7 @@ import { fieldValue, html, More, StateLink } from "#panels/html.js";
 
 const MOST = 60; // differences that are listed at first
 
-/** Show this machine together with the one of that name; "": alone again. @param {Page} page @param {string} name */
+/** Compare the machine shown with another one; "" ends the comparison. @param {Page} page @param {string} name */
 async function compare(page, name) {
   if (!name) {
     if (!store.comparison.value) return;
@@ -22,7 +22,7 @@ async function compare(page, name) {
   const asked = store.facts.value?.name;
   const found = await ask(link("compare", `&with=${encoded(name)}`));
   const model = store.model.value;
-  if (!model || asked !== store.facts.value?.name) return; // another machine has been chosen
+  if (!model || asked !== store.facts.value?.name) return; // another machine was chosen meanwhile
   if (!found.model) {
     store.notify(found.text ?? "cannot be compared", "error");
     return;

@@ -1,4 +1,4 @@
-// The operator's commands; there only when the server was started with --control.
+// The operator's commands; only shown if the server was started with --control.
 import { useState } from "preact/hooks";
 import { command, control } from "#core/connection.js";
 import { isPartOfNet } from "#core/model.js";
@@ -6,7 +6,7 @@ import * as store from "#core/store.js";
 import { fieldValue, html } from "#panels/html.js";
 
 /**
- * A button that commands: while the past is shown it is there, says why it does nothing, and does nothing.
+ * A button for a command; disabled, with the reason, while the past is shown.
  * @param {{ onClick: () => unknown, children?: any, title?: string, [attribute: string]: any }} props
  */
 function Command({ onClick, children, title, ...more }) {
@@ -17,7 +17,7 @@ function Command({ onClick, children, title, ...more }) {
 }
 
 /**
- * A button that asks once more before it does something that cannot be taken back.
+ * A button that asks for confirmation, for commands that cannot be undone.
  * @param {{
  *   text: string, question: string, onConfirm: () => unknown, className?: string, id?: string, title?: string,
  * }} props

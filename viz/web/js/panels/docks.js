@@ -1,4 +1,4 @@
-// The panels around the diagram: each in a dock, to be moved to another one, resized and hidden.
+// The panels around the diagram, in docks: they can be moved, resized and hidden.
 import { signal } from "@preact/signals";
 import { DOCKS, dropAt, moved, placeOf, resized, widened } from "#core/arrangement.js";
 import * as store from "#core/store.js";
@@ -8,14 +8,14 @@ import { fieldValue, html } from "#panels/html.js";
 /** @typedef {import("#core/arrangement.js").PanelName} PanelName */
 /** @typedef {import("#core/arrangement.js").DockName} DockName */
 
-const STEP = 24; // by a key [px]
+const STEP = 24; // of an arrow key [px]
 /** @type {Record<PanelName, string>} */
 const TITLES = { tree: "States", map: "Map", details: "Details", time: "Timeline", plots: "Plots" };
 /** @type {Record<string, DockName | null>} */
 const KEYS = { ArrowLeft: "left", ArrowRight: "right", ArrowDown: "bottom", Delete: null };
 
 /** @type {import("@preact/signals").Signal<{ dock: DockName, index: number } | null>} */
-const dropped = signal(null); // where the panel that is dragged would come to
+const dropped = signal(null); // place at which the dragged panel would be dropped
 
 /** @param {{ name: DockName, panels: Record<PanelName, () => any> }} props what draws each panel */
 export function Dock({ name, panels }) {
@@ -37,7 +37,7 @@ export function Dock({ name, panels }) {
     })}</div>`;
 }
 
-/** Moves a panel: by dragging, or by arrow keys. @param {{ name: PanelName }} props */
+/** The handle that moves a panel, by dragging or arrow keys. @param {{ name: PanelName }} props */
 function Grip({ name }) {
   const put = (/** @type {DockName | null} */ dock, /** @type {number} */ index = Infinity) =>
     store.arrange(moved(store.arrangementShown.value, name, dock, index));
@@ -67,7 +67,7 @@ function Grip({ name }) {
     else return;
     e.preventDefault();
     e.stopPropagation();
-    // The panel was made anew in another dock.
+    // In another dock the panel is a new element: focus its handle again.
     requestAnimationFrame(() => gripOf(name)?.focus());
   };
   const title = `${TITLES[name]}: drag it to another side; arrow keys move it, Delete hides it, View shows it again`;
@@ -78,7 +78,7 @@ function Grip({ name }) {
 /** @param {PanelName} name @returns {HTMLElement | null} */
 const gripOf = (name) => document.querySelector(`[data-panel=${name}] > .grip`);
 
-/** Names of the panels that are seen in a dock. @param {DockName} name */
+/** Names of the visible panels in a dock. @param {DockName} name */
 const docked = (name) =>
   store.arrangementShown.value[name].map((one) => one.name).filter((one) => store.panelsThere.value.has(one));
 
@@ -95,7 +95,7 @@ function boxesOfDocks() {
 }
 
 /**
- * A border that is moved, by dragging or by arrow keys.
+ * A border that can be moved, by dragging or arrow keys.
  * @param {{ label: string, vertical: boolean, size: () => number, resize: (size: number) => void, sign: 1 | -1 }} props
  */
 function Handle({ label, vertical, size, resize, sign }) {
@@ -130,7 +130,7 @@ const HeightHandle = ({ dock, name }) =>
     size=${() => document.querySelector(`[data-panel=${name}]`)?.clientHeight ?? 0}
     resize=${(/** @type {number} */ size) => store.arrange(resized(store.arrangementShown.value, name, size))} />`;
 
-/** Where each panel is, to choose. */
+/** The choice of a dock for each panel. */
 export function PanelLines() {
   const all = store.arrangementShown.value;
   const choose = (/** @type {PanelName} */ name) => (/** @type {Event} */ e) => {
@@ -148,7 +148,7 @@ export function PanelLines() {
       <button onClick=${() => store.arrange(null)}>reset</button></div></details>`;
 }
 
-/** On a phone one part of the page is seen at a time. */
+/** The choice of the part that is shown on a phone. */
 export function Parts() {
   const part = (/** @type {[string, string, string]} */ [name, title, path]) => {
     const isShown = store.part.value === name;

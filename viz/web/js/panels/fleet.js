@@ -1,4 +1,4 @@
-// Several live runs together: a card for each, one map, and a lane for each on one axis of time.
+// Several live runs together: a card and a lane for each, and a common map.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { askFleet, openRun } from "#core/connection.js";
 import { lanesOf, nameOfRow, sceneOf } from "#core/fleet.js";

@@ -1,12 +1,12 @@
-// The fields of a goal as a form; core/goal_values.js has their values.
+// The fields of a goal as a form; core/goal_values.js converts their values.
 import { isOneText, problemOf, problemText, toState } from "#core/goal_values.js";
 import { fieldValue, html } from "#panels/html.js";
 
 const MOST_ROWS = 200; // of an array
-const FEW = 4; // numbers that share a line
+const FEW = 4; // numbers that can share a line
 
 /**
- * What all parts of the form are given; `state` is changed in place.
+ * The properties of all parts of the form; `state` is changed in place.
  * @typedef {{
  *   path: string, problems: FieldProblem[], disabled: boolean, onChange: () => void,
  * }} Shared
@@ -78,7 +78,7 @@ function Input({ field, path, value, put, bad, disabled, label }) {
 }
 
 /**
- * The constants of the definition that a field can take.
+ * A choice of the constants that are meant for a field.
  * @param {{ field: FormField, value: any, put: (value: any) => void, disabled: boolean }} props
  */
 function Constants({ field, value, put, disabled }) {
@@ -99,7 +99,7 @@ function Constants({ field, value, put, disabled }) {
 }
 
 /**
- * A message inside the goal; a few numbers, a point for example, share a line.
+ * A message inside the goal; a few numbers, such as a point, share a line.
  * @param {Shared & { field: FormField, name: string, state: Record<string, any>, after?: any }} props
  */
 function Group({ field, name, state, after, ...shared }) {
@@ -114,7 +114,7 @@ function Group({ field, name, state, after, ...shared }) {
 }
 
 /**
- * An array of texts or messages: a row for each.
+ * An array of texts or messages, with a row for each.
  * @param {Shared & { field: FormField, value: any[], put: (value: any[]) => void }} props
  */
 function Rows({ field, value, put, ...shared }) {

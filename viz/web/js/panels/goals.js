@@ -1,4 +1,4 @@
-// The goals that the machine has sent.
+// The goals sent by the machine.
 import { useState } from "preact/hooks";
 import { outcomeClass } from "#core/outcomes.js";
 import * as store from "#core/store.js";
@@ -8,8 +8,8 @@ import { html, Pill, Section, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
-const RECENT_MS = 60_000; // a goal that has ended is shown so long
-const MOST = 6; // that run
+const RECENT_MS = 60_000; // time for which an ended goal is shown
+const MOST = 6; // running goals that are shown
 const MOST_ENDED = 3;
 /** @type {Record<string, string>} */
 const MARKS = { success: "\u2713", failure: "\u2715", preempted: "\u25a0", other: "\u2022" };
@@ -30,7 +30,7 @@ export function Goals({ page, data, now }) {
   <//>`;
 }
 
-/** On one line, until it is opened. @param {{ id: string, goal: GoalRun, page: Page }} props */
+/** An ended goal on one line, which can be opened. @param {{ id: string, goal: GoalRun, page: Page }} props */
 function EndedGoal({ id, goal, page }) {
   const [open, setOpen] = useState(false);
   const kind = outcomeClass(goal.status);
@@ -65,7 +65,7 @@ function Goal({ id, goal, now, page }) {
     <${Foldable} label="goal" value=${goal.goal} /></div>`;
 }
 
-/** Attributes of a row that lights up with the visit that sent its goal. @param {GoalRun} goal @param {string} kind */
+/** Attributes of a row that is highlighted with the visit that sent its goal. @param {GoalRun} goal @param {string} kind */
 const linked = (goal, kind) => ({
   ...store.hoverHandlers(goal.path, goal.since / 1e6),
   class: `${kind} ${store.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`,
@@ -85,7 +85,7 @@ export function ProgressBar({ part, ended }) {
     <i style=${{ width: `${percent}%` }}></i></div>`;
 }
 
-/** A value that is written out only when it is looked at. @param {{ label: string, value: unknown }} props */
+/** A value that is formatted only when it is opened. @param {{ label: string, value: unknown }} props */
 function Foldable({ label, value }) {
   const [open, setOpen] = useState(false);
   if (value == null) return null;

@@ -1,4 +1,4 @@
-// The home page: live and past runs of all machines that were found, with filters and pins.
+// The home page: a list of live and past runs, with filters and pins.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { commandMission, hasToken, openRun, refreshRuns, showHome } from "#core/connection.js";
 import {
@@ -33,8 +33,8 @@ const SIGNS = {
 };
 /** @type {Record<string, string>} */
 const WORDS = { live: "running", interrupted: "interrupted", queued: "queued" };
-const REFRESH_MS = 5000; // journals say nothing by themselves
-/** Others are called as their colours are. @type {Record<string, string>} */
+const REFRESH_MS = 5000; // changes in journals are found only by asking again
+/** The others have the names of their colours. @type {Record<string, string>} */
 const KINDS = { live: "active", cut: "waiting", interrupted: "waiting", queued: "waiting" };
 
 export const HomePage = () => (store.homeOpen.value ? html`<${OpenHome} />` : null);
@@ -210,7 +210,7 @@ function MissionButtons({ mission }) {
   });
 }
 
-/** The states of a run in the colours of their outcomes. @param {{ row: RunRow, seconds: number | null }} props */
+/** The strip of a run's states in the colours of their outcomes. @param {{ row: RunRow, seconds: number | null }} props */
 function Strip({ row, seconds }) {
   if (!seconds) return null;
   const rows = row.strip.reduce((most, [at]) => Math.max(most, at + 1), 1);

@@ -1,4 +1,4 @@
-// Templates, and the small parts that several panels are made of.
+// Templates, and small components that several panels use.
 import htm from "htm";
 import { h } from "preact";
 import { nameOf } from "#core/store.js";
@@ -15,11 +15,11 @@ export const Section = ({ title, count, children }) =>
     ${children}
   </section>`;
 
-/** The name of a state; a click goes to it. @param {{ path: string, page: Page }} props */
+/** The name of a state as a link to it. @param {{ path: string, page: Page }} props */
 export const StateLink = ({ path, page }) =>
   html`<button class="link" title=${shorten(path, 400)} onClick=${() => page.goTo(path)}>${nameOf(path)}</button>`;
 
-/** Below a list that is cut: shows more of it. @param {{ left: number, onMore: () => void }} props */
+/** A button below a shortened list that shows more of it. @param {{ left: number, onMore: () => void }} props */
 export const More = ({ left, onMore }) =>
   left > 0 ? html`<button class="small" onClick=${onMore}>and ${left.toLocaleString("en")} more</button>` : null;
 

@@ -1,4 +1,4 @@
-// The panel beside the diagram: the selected state, preempts, goals, userdata, numbers, problems, the log.
+// The panel beside the diagram: questions, the selected state, preempts, goals, userdata, numbers, problems and the log.
 import * as store from "#core/store.js";
 import { countOfEvents, shorten } from "#core/text.js";
 import { Differences } from "#panels/comparison.js";
@@ -19,7 +19,7 @@ const MOST_PROBLEMS = 30;
 
 /** @param {{ page: Page }} props */
 export function Inspector({ page }) {
-  store.slowTick.value; // components that read signals are drawn again only when those change
+  store.slowTick.value; // read, so that this component is drawn again when the signal changes
   const model = store.model.value;
   if (!model) return html`<aside class="inspector"><${Questions} page=${page} /></aside>`;
   const shared = { page, data: store.shown(), now: store.nowMs() };

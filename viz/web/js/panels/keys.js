@@ -1,4 +1,4 @@
-// The keyboard: everything the pointer can do.
+// The keyboard shortcuts: everything that the pointer can do.
 import { command, control, isFile, showActions, showHome, showWhy } from "#core/connection.js";
 import * as store from "#core/store.js";
 import { isDark } from "#drawing/theme.js";
@@ -7,11 +7,11 @@ import { isDark } from "#drawing/theme.js";
 
 const STEP = 80; // [px]
 const PRESSED = "a[href], button, summary, tr[tabindex]"; // Enter and Space press these
-const ON_ACTIONS = ["a", "d", "h", "?", "Escape"]; // the keys that work while actions or runs are shown
+const ON_ACTIONS = ["a", "d", "h", "?", "Escape"]; // keys that work while actions or runs cover the diagram
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** Go to a change of the key of userdata that is chosen. @param {number} step */
+/** Go to a change of the chosen userdata key. @param {number} step */
 function jumpToChange(step) {
   const key = store.followedKey.value ?? [...store.marks.keys].sort()[0];
   if (key !== undefined) store.jump(`key ${key}`, step);
@@ -79,7 +79,8 @@ export function listenToKeys(page) {
     },
     s: () => control() && command("step"),
   };
-  // A button that was clicked is not pressed by a later Space, which pauses; one that Tab has reached is.
+  // After a click a button loses the focus: otherwise the next Space, meant to pause, would press it again. A button
+  // reached by Tab keeps it.
   document.addEventListener("click", (e) => {
     const pressed = e.target instanceof Element ? e.target.closest("button") : null;
     if (e.detail > 0 && pressed === document.activeElement) pressed?.blur();

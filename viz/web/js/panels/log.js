@@ -1,4 +1,4 @@
-// The events as lines, newest first; a click at an earlier instant goes there.
+// The log: events as lines, newest first; a click on a line goes to its instant.
 import { useState } from "preact/hooks";
 import { ms } from "#core/fold.js";
 import { KINDS_OF, lineOf } from "#core/log_lines.js";
@@ -8,8 +8,8 @@ import { fieldValue, html, Section, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
-const LINES = 70; // so many more at each "older"
-const LOOKED_AT = 6000; // events, as LINES
+const LINES = 70; // lines at first, and further ones with each click on "older"
+const LOOKED_AT = 6000; // events that are searched for these lines
 const LONGEST = 200; // characters
 
 /** @param {{ page: Page }} props */
@@ -65,7 +65,7 @@ const chooseKinds = (e) => {
   store.logFilter.value = fieldValue(e);
 };
 
-/** Where a transition led to, unless its outcome has that name. @param {RunEvent} e */
+/** The target of a transition, unless its outcome has the same name. @param {RunEvent} e */
 function targetOf(e) {
   const node = e.kind === "Left" ? store.model.value?.get(e.path) : undefined;
   const link = node && store.model.value?.linkOf(node, e.outcome);

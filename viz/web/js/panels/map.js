@@ -1,4 +1,4 @@
-// The map beside the diagram, where any robot has told where it is; and what is linked by a hover.
+// The map beside the diagram, shown if the pose of any robot is known, with the facts of the visit at the pointer.
 import * as store from "#core/store.js";
 import { shorten } from "#core/text.js";
 import { html } from "#panels/html.js";
@@ -6,7 +6,7 @@ import { html } from "#panels/html.js";
 /** @typedef {import("#drawing/page.js").Page} Page */
 
 const NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the topic map.";
-const MOST_ROBOTS = 5; // with a button of their own
+const MOST_ROBOTS = 5; // robots with a button of their own
 
 /** @param {{ page: Page, children?: any }} props */
 export function MapPanel({ page, children }) {
@@ -33,7 +33,7 @@ export function MapPanel({ page, children }) {
   </section>`;
 }
 
-/** What the pointer is on: a visit's state, place, outcome and times. */
+/** The visit that the pointer is on: state, place, outcome and times. */
 function Tip() {
   const visit = store.hovered.value;
   if (!visit) return null;

@@ -1,4 +1,4 @@
-// What lies over the diagram: why there is nothing to see, banners, the legend, notices, help.
+// Everything over the diagram: why nothing is shown, banners, the legend, notices, help.
 import { useState } from "preact/hooks";
 import { choose, isFile, takeToken } from "#core/connection.js";
 import { CHANGE_SIGNS } from "#core/model.js";
@@ -9,8 +9,8 @@ import { fieldValue, html, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
-const MOST_NAMES = 12; // of machines
-const MOST_HOLDS = 3; // states that hold a preempt up, in the banner
+const MOST_NAMES = 12; // machines
+const MOST_HOLDS = 3; // states in the banner for which a preempt waits
 /** @type {[string, string][]} */
 const LEGEND = [
   ["active", "running"],
@@ -72,7 +72,7 @@ export function Overlay({ page }) {
   return html`<${PreemptBanner} page=${page} />`;
 }
 
-/** The program was started again; what it did before is kept. @param {{ before: string }} props */
+/** A notice that the program was started again, with a link to its previous run. @param {{ before: string }} props */
 function RestartBanner({ before }) {
   const dismiss = () => {
     store.dismissed.value = before;
@@ -82,7 +82,7 @@ function RestartBanner({ before }) {
     <button aria-label="dismiss" onClick=${dismiss}>\u2715</button></div>`;
 }
 
-/** A preempt under way: who asked, and what holds it up. @param {{ page: Page }} props */
+/** The banner of a running preempt: its origin, and the states for which it waits. @param {{ page: Page }} props */
 function PreemptBanner({ page }) {
   store.tick.value;
   const now = store.nowMs();
@@ -106,7 +106,7 @@ function Empty() {
   if (store.connection.value === "lost")
     return html`<div class="empty"><p>The viewer's server does not answer. This page keeps trying.</p></div>`;
   const missing = name && !list.some((machine) => machine.name === name);
-  if (!missing && list.length) return null; // it comes
+  if (!missing && list.length) return null; // the machine is being loaded
   const text = missing ? `No machine is called \u201c${shorten(name, 80)}\u201d.` : "No machine on the network yet.";
   const others = list.slice(0, MOST_NAMES);
   const more = list.length - others.length;
@@ -121,7 +121,7 @@ function Empty() {
     }</div>`;
 }
 
-/** How far a layout is that takes a while. */
+/** The progress of a long layout. */
 export function Laying() {
   const laid = store.laidOut.value;
   if (!laid) return null;
@@ -163,7 +163,7 @@ export function Help() {
     <dl>${KEYS.map(([key, text]) => html`<dt><kbd>${key}</kbd></dt><dd>${text}</dd>`)}</dl></div></div>`;
 }
 
-/** An old tab after a restart of the viewer: it asks for the new token. */
+/** Asks for the new token, in an old tab after a restart of the viewer. */
 export function TokenDialog() {
   const [text, setText] = useState("");
   const [wrong, setWrong] = useState(false);

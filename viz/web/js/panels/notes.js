@@ -1,4 +1,4 @@
-// Notes at instants of the run, and the link that shows somebody else what is seen here.
+// Notes at instants of the run, and the link that shows this view to somebody else.
 import { useState } from "preact/hooks";
 import { isFile } from "#core/connection.js";
 import * as store from "#core/store.js";
@@ -50,7 +50,7 @@ export function NoteDialog() {
       <button type="button" onClick=${close}>Cancel</button></p></form></div>`;
 }
 
-/** The notes of the run; a click goes to their instant. */
+/** The notes of the run; a click on one goes to its instant. */
 export function Notes() {
   const notes = store.notes.value;
   if (!notes.length) return null;

@@ -1,4 +1,4 @@
-// What the numbers on the graph add up to.
+// The totals of the numbers in the diagram.
 import { outcomeClass } from "#core/outcomes.js";
 import { coverage } from "#core/statistics.js";
 import * as store from "#core/store.js";

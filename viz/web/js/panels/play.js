@@ -1,4 +1,4 @@
-// The play bar: where in the run one looks, how fast it is played, and what one may jump to.
+// The play bar: the instant shown, the speed of playing, and jumps.
 import { useState } from "preact/hooks";
 import { isFile } from "#core/connection.js";
 import { parseInstant, RATES } from "#core/playback.js";
@@ -68,11 +68,11 @@ function LoopButton() {
     title=${`loop ${what} (r)`} onClick=${() => store.toggleLoop()} />`;
 }
 
-/** The instant shown, to read and to type. */
+/** The instant shown, as a text field. */
 function Clock() {
-  store.tick.value; // it has no properties, so it is drawn again only when this changes
+  store.tick.value; // read, so that this component without properties is drawn again when the signal changes
   const last = store.run.last() ?? 0;
-  // What is being typed stays, whatever the run does meanwhile.
+  // The run must not overwrite what is being typed.
   const [typed, setTyped] = useState(/** @type {string | null} */ (null));
   const onChange = (/** @type {Event} */ e) => {
     const seconds = parseInstant(fieldValue(e));

@@ -1,4 +1,4 @@
-// Plots below the timeline, on its axis: what is plotted, its values at the instant shown, and what could be.
+// Plots below the timeline, on its axis, with the values at the instant shown and a choice of further series.
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { idOf, labelOf, numberText, originOf, originsIn, ownerOf, Samples, unitOf, valueAt } from "#core/series.js";
 import * as store from "#core/store.js";
@@ -50,7 +50,7 @@ function PlotRow({ page, ids, number }) {
     <div class="plot-area" ref=${place}></div></div>`;
 }
 
-/** What the lines of a plot are called; equal labels say whose they are. @param {Origin[]} origins */
+/** The names of a plot's lines; equal labels get their owners' names. @param {Origin[]} origins */
 function namesOf(origins) {
   const labels = origins.map(labelOf);
   const isRepeated = (/** @type {string} */ label) => labels.indexOf(label) < labels.lastIndexOf(label);
@@ -74,7 +74,8 @@ function Line({ origin, label, colour, onRemove }) {
 }
 
 /**
- * What is not plotted yet, to choose from; looked for when somebody comes near.
+ * A choice of the series that are not plotted yet. They are searched only when the pointer or focus comes, since that
+ * looks into all values.
  * @param {{ label: string, text: string, onPick: (id: string) => void }} props
  */
 export function AddLine({ label, text, onPick }) {

@@ -1,4 +1,4 @@
-// A preempt as something that takes time: who asked, what has serviced it, what holds it up.
+// The course of a preempt: its origin, the states that have serviced it, and those for which it waits.
 import { ms } from "#core/fold.js";
 import * as store from "#core/store.js";
 import { askerText, duration, holdText } from "#core/text.js";
@@ -6,11 +6,11 @@ import { html, Section, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
-const RECENT_MS = 30_000; // a preempt that is over is shown so long while the mission runs
+const RECENT_MS = 30_000; // time for which a finished preempt is shown while the mission runs
 const ORDINARY_MS = 1000;
 const MOST_ROWS = 24;
 
-/** Whether it is how a concurrence ends: asked by it, and soon over. @param {Preempt} found */
+/** Whether it is only the normal end of a concurrence: requested by it, and soon over. @param {Preempt} found */
 const isOrdinary = ({ from, to, rows }) =>
   to !== null &&
   to - from < ORDINARY_MS &&
@@ -41,7 +41,7 @@ export function Preempts({ page, data, now }) {
       <span><i class="asked"></i> until serviced</span> <span><i class="success"></i> cleaning up</span></p></div><//>`;
 }
 
-/** How long it takes, or took. @param {{ found: Preempt, now: number, page: Page }} props */
+/** The duration of a preempt. @param {{ found: Preempt, now: number, page: Page }} props */
 function Length({ found, now, page }) {
   if (found.to === null)
     return html`<dt>held up by</dt><dd>${found.holds.map(
@@ -53,7 +53,7 @@ function Length({ found, now, page }) {
 }
 
 /**
- * A state that was asked, and its part of the time.
+ * A state that was asked to stop, and its part of the time.
  * @param {{ row: PreemptedSpan, found: Preempt, now: number, page: Page }} props
  */
 function Row({ row, found, now, page }) {
@@ -83,7 +83,7 @@ function rowText(row, found, now) {
   return found.holds.some((one) => one.path === row.path) ? `\u25a0 ${since(row.preempt)}` : "waits for children";
 }
 
-/** The innermost state that took longest. @param {PreemptedSpan[]} rows */
+/** The innermost state that took the longest time. @param {PreemptedSpan[]} rows */
 function longest(rows) {
   const leaves = rows.filter((row) => !rows.some((other) => other.path.startsWith(`${row.path}/`)));
   const length = (/** @type {PreemptedSpan} */ row) => (row.to ?? row.preempt) - row.preempt;

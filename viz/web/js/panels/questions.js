@@ -1,4 +1,4 @@
-// What the mission asks its operator, and what a breakpoint lets them decide: a card each, above all other panels.
+// Cards above all panels: questions of the mission to its operator, and states that wait at a breakpoint.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { canAnswer, command, control, encoded, isFile, link } from "#core/connection.js";
 import { answerText, buttonsOf, heldStates, isUrgent, questionsOf, titleOf } from "#core/questions.js";
@@ -15,10 +15,10 @@ const LONGEST = 600; // characters of a question
 const TONES = [880, 1175]; // [Hz]
 const TONE_S = 0.16;
 
-/** When the questions that have sounded were asked: an older one that still waits is not new. */
+/** Instants of the questions for which a sound was played: an older question that is still open is not new. */
 const heard = new Set();
 
-/** The questions of a live machine are those of now, whatever instant is looked at. */
+/** The questions to show; those of a live machine are the present ones, independent of the instant shown. */
 function questionsShown() {
   const isOver = isFile() || store.facts.value?.recorded;
   if (isOver) return questionsOf(store.shown(), store.cursor.value ?? store.nowMs()).filter((one) => one.isOpen);
@@ -63,7 +63,7 @@ function Card({ one, page }) {
     const by = store.operator.value.trim() || undefined;
     if (!(await command("answer", { path: one.path, answer, by }))) setSent(false);
   };
-  const id = `question-${encoded(one.path)}`; // a list of ids has spaces in between
+  const id = `question-${encoded(one.path)}`; // without spaces, which separate ids in aria-labelledby
   return html`<article class=${`question ${one.isOpen ? "" : "over"}`} role="alertdialog" aria-labelledby=${id}>
     <header><div><h3 id=${id} ref=${text} tabindex="-1">${shorten(one.text, LONGEST)}</h3>
       <${StateLink} path=${one.path} page=${page} /></div>
@@ -88,10 +88,10 @@ function Buttons({ one, sent, give, page }) {
     html`<button class=${`answer ${isFirst ? "primary" : ""}`} disabled=${!may || sent} title=${answer}
       onClick=${() => give(answer)}>${shorten(text, 60)}</button>`;
   return html`<div class="answers">${buttonsOf(one).map(button)}</div>
-    ${!may && html`<p class="hint">This page only looks. In a terminal: <code>smachpy answer ANSWER</code></p>`}`;
+    ${!may && html`<p class="hint">This page cannot answer. In a terminal: <code>smachpy answer ANSWER</code></p>`}`;
 }
 
-/** What is left of its time. @param {{ one: ShownQuestion }} props */
+/** The time left for an answer. @param {{ one: ShownQuestion }} props */
 const Ring = ({ one }) =>
   html`<svg class=${`ring ${isUrgent(one) ? "urgent" : ""}`} viewBox="0 0 44 44" aria-hidden="true">
     <circle cx="22" cy="22" r=${RADIUS} />
@@ -115,7 +115,7 @@ const HeldCard = ({ path, page }) =>
     <div class="answers"><button class="answer" onClick=${() => command("step")}>Step</button>
       <button class="answer primary" onClick=${() => command("resume")}>Resume</button></div></article>`;
 
-/** Two short tones; a page that nobody has clicked in yet may be silent. */
+/** Play two short tones; browsers may forbid sound until the user has clicked in the page. */
 function chime() {
   if (typeof AudioContext === "undefined") return;
   const audio = new AudioContext();

@@ -1,4 +1,4 @@
-// The selected state: what it is, how it has run, where its outcomes lead, and commands for it.
+// The selected state: its kind, visits, userdata keys, transitions and commands.
 import { own } from "#core/fold.js";
 import { KIND_NAMES } from "#core/model.js";
 import { endClass } from "#core/outcomes.js";
@@ -55,7 +55,7 @@ function recordedText({ median, p95, failures, visits }) {
 }
 
 /**
- * The userdata keys of a state, and what they are called outside.
+ * The userdata keys of a state, with their names in the container if remapped.
  * @param {{ keys: MachinePayload["keys"][string] | undefined }} props
  */
 function Keys({ keys }) {

@@ -1,4 +1,4 @@
-// Many simulated runs from the page: what to start, how batches stand, and their reports.
+// The dialog for simulated runs: starts batches, shows their progress and reports.
 import { useEffect, useState } from "preact/hooks";
 import { askSimulation, encoded, hasToken, refreshSimulations } from "#core/connection.js";
 import { outcomeClass } from "#core/outcomes.js";
@@ -41,7 +41,7 @@ function OpenDialog() {
   const earlier = batches.filter((one) => one.mission === mission && !one.running && one.report);
   const onKeyDown = (/** @type {KeyboardEvent} */ e) => {
     if (e.key === "Escape") close();
-    e.stopPropagation(); // keys are for the form
+    e.stopPropagation(); // no shortcuts while typing in the form
   };
   return html`<div class="veil" onKeyDown=${onKeyDown}>
     <div class="card simulate" role="dialog" aria-label="simulated runs">

@@ -1,4 +1,4 @@
-// Above the diagram: which machine, how it runs, the way to the state shown, search, the view, commands.
+// The bar above the diagram: machine, status, breadcrumb, search, view and commands.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { choose, encoded, isFile, link, showHome, showWhy } from "#core/connection.js";
 import { KIND_NAMES } from "#core/model.js";
@@ -15,9 +15,9 @@ import { fieldValue, html } from "#panels/html.js";
 /** @typedef {import("#drawing/page.js").Page} Page */
 
 const MOST_FOUND = 12;
-const MOST_LEVELS = 9; // with a button of their own
+const MOST_LEVELS = 9; // levels with a button of their own
 const ALL_LEVELS = 99;
-const MOST_ACTIVE = 200; // in an address
+const MOST_ACTIVE = 200; // active states in the address of a picture
 
 /** @param {{ page: Page }} props */
 export function TopBar({ page }) {
@@ -57,7 +57,7 @@ function RunsButton() {
     onClick=${() => showHome(!open || !store.model.value)}>Runs</button>`;
 }
 
-/** When the run is over: it has ended, or nobody tells of it any more. */
+/** Whether the run is over: it has ended, or its program is gone. */
 function canAskWhy() {
   store.tick.value;
   const { now } = store.run;
@@ -94,7 +94,7 @@ function statusOf({ recorded, stale, ended, outcome, questions }) {
   return stale != null ? "stale" : "running";
 }
 
-/** The way to the state that is selected, or active. @param {{ page: Page }} props */
+/** The breadcrumb of the selected state, otherwise of the running one. @param {{ page: Page }} props */
 function Crumbs({ page }) {
   const model = store.model.value;
   const selected = store.selected.value;
@@ -200,7 +200,7 @@ function ViewMenu({ page }) {
   </div>`;
 }
 
-/** How a question makes itself heard, and the name under which it is answered. */
+/** Settings for questions: sound, and the name under which they are answered. */
 function AboutQuestions() {
   const onSound = (/** @type {Event} */ e) => {
     store.sound.value = /** @type {HTMLInputElement} */ (e.target).checked;
@@ -235,7 +235,7 @@ function NumbersLine({ page }) {
     </select></label>`;
 }
 
-/** The whole machine in the page's colours, with what is active at the instant shown; and the run. */
+/** Downloads: pictures of the whole machine with the states active at the instant shown, and the run. */
 function Downloads() {
   const active = store.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded(path)}`);
   const looks = `&theme=${isDark() ? "dark" : "light"}${active.join("")}`;

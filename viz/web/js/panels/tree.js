@@ -1,4 +1,4 @@
-// The states as a tree; it draws only the rows that are in view.
+// The states as a tree. Only the rows in view are drawn, as machines can have thousands of states.
 import { useRef, useState } from "preact/hooks";
 import { own } from "#core/fold.js";
 import { endClass } from "#core/outcomes.js";
@@ -31,7 +31,7 @@ export function Tree({ page }) {
   const [folded, setFolded] = useState(() => /** @type {Map<string, boolean>} */ (new Map())); // by the user
   const [chosen, setChosen] = useState(/** @type {string | null} */ (null));
   const box = useRef(/** @type {HTMLElement | null} */ (null));
-  store.tick.value; // components that read signals are drawn again only when those change
+  store.tick.value; // read, so that this component is drawn again when the signal changes
   const model = store.model.value;
   if (!model) return html`<aside class="tree"></aside>`;
   const states = store.shown().states;

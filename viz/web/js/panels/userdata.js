@@ -1,4 +1,4 @@
-// The userdata of all containers, and what a transition changed of it.
+// The userdata of all containers, and the changes by a transition.
 import { signal } from "@preact/signals";
 import { useState } from "preact/hooks";
 import { ask, encoded, isFile, link } from "#core/connection.js";
@@ -11,10 +11,10 @@ import { html, More, Section, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
 
-const FRESH_MS = 900; // what was written is highlighted so long
+const FRESH_MS = 900; // time for which a written value is highlighted
 const MOST_VALUES = 60;
 const MOST_CHANGES = 8;
-const SHORT = 160; // characters; the browser takes minutes to break lines of thousands
+const SHORT = 160; // characters; browsers take minutes to break lines with thousands of them
 const CHANGE = 60;
 const MOST_ITEMS = 100; // of a list
 const LONGEST = 2000; // characters
@@ -41,7 +41,7 @@ export function Userdata({ page, data, now }) {
     <${More} left=${entries.length - most} onMore=${() => setMost(most + 4 * MOST_VALUES)} /><//>`;
 }
 
-/** Containers that run come first, then those written to last. @param {RunState} data */
+/** The containers: running ones first, then by their newest written value. @param {RunState} data */
 function sorted(data) {
   const rank = new Map();
   for (const { container, at } of Object.values(data.userdata)) {
@@ -80,7 +80,7 @@ function Row({ entry, open, onClick, data, now, page }) {
     </td></tr>`;
 }
 
-/** A value in full: a repr as a tree. @param {{ value: any }} props */
+/** A complete value; a repr is shown as a tree. @param {{ value: any }} props */
 function Whole({ value }) {
   const tree = typeof value === "string" ? parseRepr(value) : null;
   return tree ? html`<${Branch} tree=${tree} />` : html`<pre>${pretty(value)}</pre>`;
@@ -98,7 +98,7 @@ function Branch({ tree }) {
       ${left > 0 && html`<li>and ${left} more</li>`}</ul>`;
 }
 
-/** Enter and Space on a row do what a click does. @param {KeyboardEvent} e */
+/** Handle Enter and Space on a row like a click. @param {KeyboardEvent} e */
 function pressAsClick(e) {
   if (e.target !== e.currentTarget || (e.key !== "Enter" && e.key !== " ")) return;
   e.preventDefault();
@@ -106,11 +106,11 @@ function pressAsClick(e) {
 }
 
 /** @type {import("@preact/signals").Signal<Record<string, Answer>>} */
-const wholeValues = signal({}); // what has been fetched, by container and key; rows come and go
+const wholeValues = signal({}); // fetched values by container and key; kept here, as rows come and go
 
-/** Events hold only the beginning of long values; the mission has the rest. @param {{ entry: UserdataEntry }} props */
+/** Fetches a complete value from the mission: events contain only the beginning of a long one. @param {{ entry: UserdataEntry }} props */
 function WholeValue({ entry }) {
-  // Labels may hold slashes, so the path alone does not show what the container is.
+  // Labels can contain slashes, so the container cannot be found in the path.
   const container = store.model.value?.get(entry.writer)?.parent?.path ?? entry.container;
   const id = `${store.facts.value?.epoch} ${container} ${entry.key}`;
   const found = wholeValues.value[id];
@@ -135,7 +135,7 @@ function WholeValue({ entry }) {
   }</div>`;
 }
 
-/** What the transition at the cursor changed. @param {{ page: Page }} props */
+/** The changes by the transition at the instant shown. @param {{ page: Page }} props */
 export function Changes({ page }) {
   const [whole, setWhole] = useState(false);
   if (store.cursor.value === null) return null;

@@ -1,4 +1,4 @@
-// Why the run ended so: from the first cause to the outcome; a click on a step goes there.
+// The causes of the run's end, from the first one to the outcome; a click on a step goes to its instant.
 import { showWhy } from "#core/connection.js";
 import * as store from "#core/store.js";
 import { html, Section } from "#panels/html.js";
