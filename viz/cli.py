@@ -94,6 +94,7 @@ def _run(args: argparse.Namespace) -> int:
             "smachpy render: got neither -o nor --atlas; expected one of them. "
             f"Try -o {Path(args.target).stem or 'machine'}.svg"
         )
+    # Atlas and picture can be asked for together; they share the record and the statistics.
     record = read_record(args.target, args)
     looks: dict[str, Any] = {"theme": args.theme, "show_implicit": args.show_implicit}
     if args.runs:

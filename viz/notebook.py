@@ -160,5 +160,5 @@ def _status(history: History) -> str:
     visits = history.visits()
     if not visits:
         return "not started"
-    root = min(visits, key=len)
+    root = min(visits, key=len)  # the shortest path
     return f"ended: {shorten(visits[root].outcome or RAISED)} after {history.seconds or 0.0:.1f} s"

@@ -76,7 +76,7 @@ class SentAction:
     status: str = "PENDING"
     text: str = ""
     ended_ns: int | None = None
-    heard: int = 0  # number of feedback messages
+    feedback_count: int = 0
     first: Any = None  # first feedback: progress of a distance is measured from it
     feedback: Any = None
     result: Any = None
@@ -85,6 +85,7 @@ class SentAction:
 
     def to_json(self) -> dict[str, Any]:
         """Return the goal for the page."""
+        # The messages themselves stay here: the page gets their texts and the progress.
         progress = progress_of(self.goal, self.feedback, self.first)
         return {
             "id": self.id,
@@ -95,7 +96,7 @@ class SentAction:
             "text": self.text,
             "sent": self.sent_ns,
             "ended": self.ended_ns,
-            "heard": self.heard,
+            "feedback_count": self.feedback_count,
             "cancelled": self.cancelled,
             "fraction": progress.fraction,
             "distance": progress.distance,
@@ -138,6 +139,7 @@ class Actions:
 
         Blocks: until the networks of the robots are joined.
         """
+        # Servers of this network announce themselves by tokens; those of ROS 2 have other means.
         pattern, on_presence = token_pattern(Kind.ACTION_SERVER), partial(self._on_presence, node)
         self._watches[node] = [node.transport.watch_alive(pattern, on_presence)]
         if node.config.ros2:
@@ -153,6 +155,7 @@ class Actions:
             for name in [name for name, owner in self._nodes.items() if owner is node]:
                 del self._nodes[name], self._servers[name]
             clients = [self._clients.pop(key) for key in list(self._clients) if key[0] is node]
+        # Outside the lock, which the clients' callbacks need.
         for client in clients:
             client.stop()
         self._changed()
@@ -293,7 +296,7 @@ class Actions:
 
     def _on_feedback(self, sent: SentAction, feedback: Any) -> None:
         with self._lock:
-            sent.heard += 1
+            sent.feedback_count += 1
             sent.feedback = feedback
             if sent.first is None:
                 sent.first = feedback
@@ -301,6 +304,7 @@ class Actions:
         self._changed()
 
     def _forget_old(self) -> None:
+        # Running goals are kept however many there are: the page must be able to cancel them.
         ended = [one.id for one in self._goals.values() if one.ended_ns is not None]
         for goal_id in ended[: max(0, len(self._goals) - KEPT_GOALS)]:
             del self._goals[goal_id]
@@ -350,7 +354,7 @@ class Actions:
             return self._ros2_class(name, end)
         try:
             spec = get_action(end.type)
-        except InterfaceError:
+        except InterfaceError:  # importing packages takes time, so only for an unknown type
             self._search()
             try:
                 spec = get_action(end.type)
@@ -359,6 +363,7 @@ class Actions:
                     f"{error} Name the folder with its definition in SMACHPY_INTERFACE_PATH "
                     "where `smachpy view` starts."
                 ) from error
+        # The server would misread the bytes of another version of the definition.
         if spec._md5sum != end.md5:
             raise GoalRefusedError(
                 f"{end.type}: got md5 {spec._md5sum} of the definition here; expected that of the "
@@ -393,6 +398,7 @@ class Actions:
             node = self._nodes.get(name)
             if node is None:
                 raise GoalRefusedError(_gone(name))
+            # One client for all goals of an action; by md5, as a restarted server can have another.
             client = self._clients.get((node, end.name, end.md5))
             if client is None:
                 client = ActionClient(f"/{end.name}", spec, node=node)

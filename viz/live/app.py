@@ -30,6 +30,8 @@ them, and a page that is too far behind gets a snapshot instead.
 
 from __future__ import annotations
 
+# Handlers run in the event loop. What can block (files, the network, drawing, long runs) goes to a
+# thread by `run_in_threadpool`, so that other pages are served meanwhile.
 import asyncio
 import contextlib
 import json
@@ -157,8 +159,8 @@ class Viewer:
         self._statistics = statistics
         self._pages: set[_Page] = set()
         self._drawing = asyncio.Semaphore(1)  # one `dot` at a time, whatever pages ask for
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._woken = False
+        self._loop: asyncio.AbstractEventLoop | None = None  # while the server runs
+        self._woken = False  # whether a wake-up of the pages is pending
         machines.listen(lambda _machine: self._on_change())
         if actions is not None:
             actions.listen(self._on_change)
@@ -186,7 +188,7 @@ class Viewer:
                 Route("/api/simulate", self._simulate, methods=["POST"]),
                 Route("/api/action", self._action, methods=["GET"]),
                 Route("/api/action", self._command_action, methods=["POST"]),
-                Route("/{name:path}", self._file),
+                Route("/{name:path}", self._file),  # last: it matches every path
             ],
             middleware=[Middleware(Guard, hosts=hosts)],
             lifespan=self._life,
@@ -356,6 +358,7 @@ class Viewer:
 
     async def _control(self, request: Request) -> Response:
         reason = refuse_command(request, self._token)
+        # Refused before the body is read: it may be large, and its sender is not trusted.
         if reason is not None or self._send is None:
             return _refused(reason)
         name = request.query_params.get("machine", "")
@@ -517,6 +520,7 @@ class _Page:
                 for text in (*self._update(machine), *self._robot_texts(machine, loop.time())):
                     yield text
             # `due` becomes the longest time until something must be sent without a change.
+            # The list is sent when it has changed; it is compared as text, which is needed anyway.
             due = self._listed + LIST_S - loop.time()
             if due <= 0:
                 self._listed = loop.time()
@@ -535,6 +539,7 @@ class _Page:
                     yield self._actions_text(self._actions, loop.time())
                 else:
                     due = min(due, wait)
+            # Wait for a change or until something is due; after a change, a little for others.
             try:
                 async with asyncio.timeout(max(due, COALESCE_S)):
                     await self.news.wait()
@@ -682,6 +687,7 @@ def _unknown(request: Request) -> Response:
 
 def _file_name(machine: Machine) -> str:
     label = machine.record.label if machine.record else machine.name
+    # ASCII letters and digits only: the name goes into a header, and labels are not trusted.
     return "".join(c if c.isalnum() and c.isascii() else "_" for c in label)[:60] or "machine"
 
 

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from smachpy.introspection import StateRecord
     from viz.model.machine import Node
 
+# The files that are served are listed once, when this module is imported: a name in a request is
+# only compared with that list, so it cannot lead to any other file.
 WEB = Path(__file__).resolve().parent.parent / "web"
-ALL_LEVELS = 1_000_000
+ALL_LEVELS = 1_000_000  # the page opens and closes containers itself
 
 ROOMS = ("core", "drawing", "panels")
 """Folders of the page's modules; each imports only from itself and those before it."""

@@ -126,6 +126,7 @@ def _run(args: argparse.Namespace) -> int:
     from viz.runs.floor import read_floor
     from viz.runs.statistics import StatisticsOfFiles
 
+    # Files first: errors in them should not wait for the network.
     machines = Machines(None if args.map is None else read_floor(args.map))
     _load(machines, args.files)
     runs = StatisticsOfFiles(args.runs)
@@ -177,6 +178,7 @@ def _serve(
         home=not args.child and not args.files,
         simulations=simulations,
     )
+    # The server already listens when the address is printed, so it can be opened at once.
     server = PageServer(viewer, args.host, args.port)
     # Behind "#", a browser keeps the token to itself: it is in no request and no server's log.
     address = server.address + (f"#token={token}" if token else "")
@@ -211,7 +213,7 @@ def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[Non
     if network_is_chosen():
         yield
         return
-    joined: dict[int, Node] = {}
+    joined: dict[int, Node] = {}  # by domain; only used in the executor's thread
     executor = SerialExecutor(node.clock, "private networks")
 
     def on_network(domain: int, alive: bool) -> None:
@@ -220,7 +222,7 @@ def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[Non
             for part in parts:
                 part.join(joined[domain])
         elif not alive and domain in joined:
-            for part in parts:
+            for part in parts:  # before its node closes, which they use
                 part.leave(joined[domain])
             joined.pop(domain).close()
 
@@ -239,6 +241,7 @@ def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[Non
 def _load(machines: Machines, files: list[str]) -> None:
     from smachpy.events.recording import find_recordings, read_recording
 
+    # Files of the same name in several folders are shown by their paths.
     paths = list(dict.fromkeys(find_recordings(files)))
     names = [path.name for path in paths]
     for path in paths:

@@ -113,7 +113,7 @@ def values_of(message: Message) -> dict[str, Any]:
     Raises:
         FieldError: values do not fit their fields.
     """
-    plain = message.to_dict()
+    plain = message.to_dict()  # checks the values, too
     return {one.name: _texts(plain[one.name], one.type.base) for one in message._definition.fields}
 
 
@@ -178,6 +178,7 @@ def _entry(head: str, value: Any, base: str, indent: str, words: str) -> Iterato
     elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
         yield from _commented(head, words, indent)
         for item in value:
+            # "- " takes the place of the first line's indentation.
             first, *others = _lines(_class_of(base), item, f"{inner}  ")
             yield f"{inner}- {first.lstrip()}"
             yield from others

@@ -120,7 +120,7 @@ class Journals:
             store = self._open(found)
             if store is None:
                 raise MissionError(found.problem or f"{journal}: there is no such journal.")
-            row = store.mission(mission)
+            row = store.mission(mission)  # raises for an unknown mission
             self._failures.pop((found.where, mission), None)
             self._known.pop((found.where, mission), None)
             if command == "cancel":
@@ -208,11 +208,12 @@ class Journals:
 
     def _log_file(self, mission: str) -> Any:
         assert self._logs is not None
+        # An id is chosen by a user or program and must not lead out of the folder.
         word = "".join(c if c.isalnum() or c in "_.-" else "_" for c in mission)[:80]
         try:
             self._logs.mkdir(parents=True, exist_ok=True)
             return (self._logs / f"{word}.log").open("ab")
-        except OSError:
+        except OSError:  # without its log a mission can still be resumed
             return subprocess.DEVNULL
 
     def _follow(self, process: subprocess.Popen[bytes], where: str, mission: str) -> None:
@@ -235,6 +236,7 @@ def mission_row(facts: dict[str, Any], journal: str) -> dict[str, Any]:
         facts: The mission's `smachpy.durable.overview.overview`.
         journal: Name of its store.
     """
+    # The store has seconds as float; events, and so the rows, have nanoseconds.
     began, last, status = facts["began_ns"], facts["last_ns"], facts["status"]
     ended = round(facts["changed"] * 1e9) if status in OVER else None
     outcome = facts["outcome"] or ("cancelled" if status == CANCELLED else None)

@@ -201,7 +201,7 @@ class Machine:
         """
         with self._lock:
             for record in map(self._shifted, records):
-                if record["seq"] <= self._seq:
+                if record["seq"] <= self._seq:  # came with the history as well
                     continue
                 if record["seq"] - record.get("dropped", 0) > self._seq + 1:
                     return False
@@ -234,6 +234,7 @@ class Machine:
 
     def observed_since(self, seq: int) -> list[str]:
         """Return the kept records of robot topics after number `seq`, as JSON texts."""
+        # From the end: a page usually lacks only the newest records of thousands.
         with self._lock:
             if seq <= 0:
                 return [text for _, _, text in self._all_observed()]
@@ -422,6 +423,7 @@ class Machines:
             for name in earlier[: max(0, len(earlier) - KEPT_RUNS + 1)]:
                 del self._machines[name]
             first = f"{machine.name}, run of {began:%H:%M:%S}"
+            # Programs can be started twice in a second.
             names = (f"{first} ({n})" if n > 1 else first for n in itertools.count(1))
             machine.name = next(name for name in names if name not in self._machines)
             self._machines[machine.name] = machine
@@ -443,5 +445,5 @@ class Machines:
         self._listeners.append(listener)
 
     def _changed(self, machine: Machine) -> None:
-        for listener in list(self._listeners):
+        for listener in list(self._listeners):  # a copy: others may be added meanwhile
             listener(machine)

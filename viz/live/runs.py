@@ -83,8 +83,10 @@ class Runs:
                 if name not in self._opened
             ]
             files = self._files()
+            # Reading a recording takes long: rows of unchanged files are kept, others dropped.
             self._rows = {path: self._rows[path] for path in files if path in self._rows}
             recorded = [self._row_of_file(path) for path in files]
+            # A live run is usually recorded as well: the live row stays.
             rows += [row for row in recorded if not any(_is_same(row, one) for one in rows)]
             rows = with_missions(rows, missions)
         rows.sort(key=lambda row: (row["live"], row["began"] or 0), reverse=True)
@@ -183,6 +185,8 @@ class Runs:
         row = run_row(machine.record, machine.events())
         live = not machine.recorded and machine.stale is None
         behind = machine.behind or 0
+        # A recording says when it was made; of a live machine only the difference of clocks shows
+        # that its time is virtual.
         virtual = machine.date_shift or (behind if abs(behind) > DAY_NS else 0)
         return {
             **_dated(row, virtual),

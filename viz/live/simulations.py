@@ -107,6 +107,7 @@ class Simulations:
     def rows(self) -> list[dict[str, Any]]:
         """Return the batches, newest first: the fields of `Batch`, and whether it has `report`."""
         with self._lock:
+            # Batches of earlier viewers, each read once; this viewer knows its own.
             for path in self._folder.glob(f"*/{_FACTS}") if self._folder.is_dir() else ():
                 name = path.parent.name
                 if name not in self._batches and (read := _read(path)) is not None:
@@ -127,7 +128,7 @@ class Simulations:
             SimulationError: the arguments are invalid, with all problems; or too many batches run.
         """
         batch = self._checked(asked)
-        with self._lock:
+        with self._lock:  # held until the process is listed, so that the limit holds
             if sum(one.running for one in self._batches.values()) >= MOST_RUNNING:
                 raise SimulationError(
                     f"batches: got {MOST_RUNNING} running ones; expected fewer. Stop one, or wait."
@@ -240,6 +241,7 @@ class Simulations:
             problems.append(f"compare: got {compare!r}; expected an earlier batch.")
         if problems:
             raise SimulationError("\n".join(problems))
+        # Like all names in the folder, it matches _ID; the time makes it unique.
         now = self._clock.time_ns()
         word = re.sub(r"[^A-Za-z0-9_]", "_", Path(str(mission)).stem)[:60]
         return Batch(
@@ -259,7 +261,7 @@ class Simulations:
         assert process.stdout is not None
         with process.stdout:
             for line in process.stdout:
-                with contextlib.suppress(ValueError):
+                with contextlib.suppress(ValueError):  # a line that a mission printed
                     self._count(batch, json.loads(line))
         code = process.wait()
         with self._lock:
@@ -298,7 +300,7 @@ def _read(path: Path) -> Batch | None:
         batch = Batch(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
-    if batch.id != path.parent.name or type(batch.began_ns) is not int:
+    if batch.id != path.parent.name or type(batch.began_ns) is not int:  # edited or copied
         return None
     if batch.running:
         batch.running, batch.problem = False, "the viewer ended before the batch"

@@ -128,17 +128,18 @@ class MissionApp(App[None]):
 
     def on_resize(self) -> None:
         """Write the log again: it keeps lines wrapped for the old width."""
-        self.call_after_refresh(self._wrap_anew)
+        self.call_after_refresh(self._rewrap)
 
-    def _wrap_anew(self) -> None:
+    def _rewrap(self) -> None:
         if self._machine is not None and self.query(RichLog):
             events = [e for e in self._machine.events() if e["seq"] <= self._seq]
-            self._write_anew(events, LOGGED_LINES if self._until is None else LOGGED_BACK)
+            self._rewrite(events, LOGGED_LINES if self._until is None else LOGGED_BACK)
 
     def refresh_view(self) -> None:
         """Draw the changes since the last update."""
         if not self.query("#status"):  # at the end, widgets are removed before the timer
             return
+        # Called by a timer: what has changed is folded and drawn here, in textual's thread.
         machine = self._machine or self._machines.first()
         self._machine = machine
         if machine is None or machine.record is None:
@@ -174,16 +175,16 @@ class MissionApp(App[None]):
         }
         self._grow(tree.root, record)
         tree.root.expand()
-        self._fold_anew(machine)
+        self._refold(machine)
 
-    def _fold_anew(self, machine: Machine) -> None:
+    def _refold(self, machine: Machine) -> None:
         """Fold all events of the machine from the beginning."""
         base, events = machine.history()
         self._state, self._seq = RunState(base), 0
         self._mark = 0, ""
         self._fold(events)
         self._draw_userdata()
-        self._write_anew(events, LOGGED_LINES)
+        self._rewrite(events, LOGGED_LINES)
 
     def _look_back(self, machine: Machine, until: int) -> None:
         """Show the state after event `until`; fold from the mark if it is before that event."""
@@ -202,7 +203,7 @@ class MissionApp(App[None]):
         self._fold(events[at:])
         self._seq = until
         self._draw_userdata()
-        self._write_anew(events, LOGGED_BACK)
+        self._rewrite(events, LOGGED_BACK)
 
     def _grow(self, node: TreeNode[Any], record: StateRecord) -> None:
         for child in record.children:
@@ -215,7 +216,7 @@ class MissionApp(App[None]):
             return
         texts = machine.since(self._seq)
         if texts is None:  # some are no longer kept, or the machine was reset
-            self._fold_anew(machine)
+            self._refold(machine)
         else:
             self._add([json.loads(text) for text in texts])
 
@@ -238,7 +239,7 @@ class MissionApp(App[None]):
             target = self._targets.get((event["path"], event.get("outcome") or ""), "")
             log.write(_line(event, target if event["kind"] == "Left" else ""))
 
-    def _write_anew(self, events: list[dict[str, Any]], most: int) -> None:
+    def _rewrite(self, events: list[dict[str, Any]], most: int) -> None:
         self.query_one(RichLog).clear()
         self._write(events, most)
 
@@ -285,6 +286,7 @@ class MissionApp(App[None]):
         widget.display = bool(holds)
         if not holds:
             return
+        # A request passes from a container to the states inside: the first one has its origin.
         first = min((states[p] for p in states if _asked(states[p])), key=lambda s: s["preempt"])
         lines = Text.assemble(
             ("preempt", f"bold {STYLES['preempted']}"),
@@ -307,12 +309,13 @@ class MissionApp(App[None]):
     def _draw_question(self, machine: Machine, now: int) -> None:
         """Draw the question, the answers with their keys, and the time left."""
         widget = self.query_one("#question", Static)
+        # Nobody waits for an answer in a recording, or when the program is gone.
         found = None if machine.recorded or machine.stale is not None else self._question()
         widget.display = found is not None
         if found is None:
             return
         path, question = found
-        if question["service"] not in self._rung:
+        if question["service"] not in self._rung:  # each question has a service of its own
             self._rung.add(question["service"])
             self.bell()
         left = max(0.0, question["patience"] - (now - question["asked"]) / 1e9)
@@ -380,6 +383,7 @@ class MissionApp(App[None]):
         here = self._seq if self._until is None else self._until
         events = machine.events()
         numbers = [event["seq"] for event in events]
+        # The neighbour by number, as numbers have gaps where events were dropped.
         to = (
             [n for n in numbers if n < here][-1:]
             if step < 0
@@ -387,9 +391,9 @@ class MissionApp(App[None]):
         )
         if not to:
             return
-        self._until = None if to[0] == numbers[-1] else to[0]
+        self._until = None if to[0] == numbers[-1] else to[0]  # the newest event is live again
         if self._until is None:
-            self._fold_anew(machine)
+            self._refold(machine)
         elif step > 0 and machine.since(here) is not None:
             self._add([events[numbers.index(to[0])]])
         else:
@@ -399,7 +403,7 @@ class MissionApp(App[None]):
         """Return to the present."""
         if self._machine is not None and self._until is not None:
             self._until = None
-            self._fold_anew(self._machine)
+            self._refold(self._machine)
 
     def action_follow(self) -> None:
         """Switch opening of running containers on or off."""
@@ -421,6 +425,7 @@ class MissionApp(App[None]):
         wanted = event.value.lower()
         for path, node in self._places.items():
             if wanted and wanted in path.rpartition("/")[2].lower():
+                # Scroll after the refresh: only then do the opened rows have their places.
                 above = node.parent
                 while above is not None:
                     above.expand()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.output import printable
 from smachpy.command import UsageError
 
+# Most imports are inside functions: every `smachpy` command loads this module for its options.
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Iterable, Iterator
@@ -50,6 +51,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     actions = parser.add_subparsers(metavar="ACTION", required=True)
+    # One subcommand after the other; `run` is the function that carries it out.
     one = actions.add_parser("list", help="one line per run")
     one.add_argument("places", nargs="*", default=["."], metavar="FILE|DIR")
     one.add_argument("--json", action="store_true", help="one JSON object per line, for programs")
@@ -113,6 +115,7 @@ def _list(args: argparse.Namespace) -> int:
     table = Table(box=None, pad_edge=False)
     for title in ("file", "machine", "began", "time", "outcome", "outages", "events"):
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
+    # As Text, because rich would read "[...]" in a name as markup.
     for recording in each_recording(args.places):
         table.add_row(*(Text(printable(word)) for word in _line(recording)))
     console().print(table)
@@ -123,6 +126,7 @@ def _facts(recording: Recording) -> dict[str, Any]:
     """The facts for `runs list`; `outcome` is None if none is recorded, `outages` are in ns."""
     from smachpy.events.run_state import RunState
 
+    # A file can hold several runs, one after the other: the facts are those of the newest.
     events = recording.events
     newest = RunState()
     for event in events:
@@ -289,6 +293,7 @@ def _draw_both(args: argparse.Namespace, old: Side, new: Side) -> None:
     from viz.runs.compare import drawing as drawn
     from viz.runs.compare import unite
 
+    # A picture can be binary, so it goes to the buffer below standard output.
     form = "svg" if args.output == "-" else Path(args.output).suffix.lstrip(".").lower()
     diagram = drawn(unite(old, new), old, new, depth=args.depth)
     content = drawing.draw(diagram, form, theme=args.theme)
@@ -374,6 +379,7 @@ def _write(recording: Recording, output: Path, runs: list[str], floor: Path | No
         from viz.model.history import History
         from viz.pictures.drawing import render
 
+        # The picture of the machine with what the run did, as `viz.render(..., run=history)`.
         history = History()
         for event in recording.events:
             history.on_event(from_record(event))

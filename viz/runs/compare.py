@@ -96,6 +96,7 @@ class Union:
     def _parts(self, container: str, edge: Edge) -> Iterator[Edge]:
         """Split an edge of several outcomes into one per kind of change."""
         path = f"{container}/{edge.source}"
+        # An edge carries all outcomes that lead from one state to the same target.
         by: dict[tuple[str, str], list[str]] = {}
         for outcome in edge.outcomes:
             change = self.arrows.get((path, outcome, edge.target), SAME)
@@ -108,6 +109,7 @@ class Union:
             self.arrows.get((f"{container}/{label}", outcome, rule.outcome), SAME)
             for label, outcome in rule.conditions
         }
+        # Marked only if all of its conditions are; its single arrows have marks of their own.
         return changes.pop() if len(changes) == 1 else SAME
 
 
@@ -115,6 +117,7 @@ def unite(old: Side, new: Side) -> Union:
     """Return the union of both, with the paths of `new`."""
     union = Union(new.record)
     union.record = _merged(union, old.record, new.record, new.record.path)
+    # A moved state is drawn twice, as removed and as added; the reasons link the two.
     for before, after in moved_states(old.record, new.record):
         here, there = new.record.path + before, new.record.path + after
         union.reasons.setdefault(here, []).append(f"moved to {there}")
@@ -128,6 +131,7 @@ def _merged(
     union: Union, old: StateRecord | None, new: StateRecord | None, path: str
 ) -> StateRecord:
     """Merge a state of one side or both with all descendants; record the changes in `union`."""
+    # First the arrows inside this container, then its children, then the state itself.
     before, after = set(_triples(old)), set(_triples(new))
     for change, triples in ((ADDED, after - before), (REMOVED, before - after)):
         for source, outcome, target in sorted(triples):
@@ -178,6 +182,7 @@ def _ordered(old: list[str], new: list[str]) -> list[str]:
 
 
 def _reasons(old: StateRecord, new: StateRecord) -> Iterator[str]:
+    # As sets where the order has no meaning: a reordering is no change.
     pairs: dict[str, tuple[Any, Any]] = {
         "kind": (old.kind, new.kind),
         "class": (old.type_name, new.type_name),
@@ -207,8 +212,10 @@ def _words(value: Any) -> str:
 
 
 def _compare_numbers(union: Union, old: Side, before: Statistics, after: Statistics) -> None:
+    # Everything is compared per run, as the sides may have different numbers of runs.
     runs = max(before.runs, 1), max(after.runs, 1)
     for state in union.record.walk():
+        # Paths of the union begin with the new root, which may have another name.
         old_path = old.record.path + state.path.removeprefix(union.record.path)
         pair = before.states.get(old_path), after.states.get(state.path)
         first, second = ({} if one is None else one.to_json() for one in pair)
@@ -230,6 +237,8 @@ def _number_words(
         yield _times(*visits)
     before, after = old.get("median"), new.get("median")
     if before is not None and after is not None:
+        # Both limits: a factor alone would report noise of short states, a difference alone that
+        # of long ones.
         low, high = sorted((before, after))
         if high - low > LEAST_S and high > SLOWER * low:
             yield f"{before:.3g} s \u2192 {after:.3g} s"

@@ -95,11 +95,13 @@ class _Export:
         began = datetime.fromtimestamp(self._recording.made_ns / 1e9, UTC)
         facts = {"machine": self._recording.record.label, "began": began.isoformat()}
         self._writer.add_metadata("run", facts)
+        # As SMACH's introspection: the structure first, then a status for every change.
         for container in self._containers.values():
             message = _structure(container, self._recording.stamp_ns)
             topic = f"{self._server}/smach/container_structure"
             self._write(topic, message, self._recording.stamp_ns)
         recording = self._recording
+        # Both are in order of time, and so are the merged messages.
         records = heapq.merge(recording.events, recording.observed, key=itemgetter("stamp_ns"))
         for event in records:
             stamp = event["stamp_ns"]
@@ -146,6 +148,7 @@ class _Export:
         )
 
     def _write_goal(self, event: dict[str, Any], part: str, size: int) -> None:
+        # The messages of actionlib: goal, feedback or result, each with id and status, ...
         action, stamp = f"/{event['action'].strip('/')}", event["stamp_ns"]
         header = Header(stamp=Time(0, stamp))
         if part == "goal":
@@ -167,6 +170,7 @@ class _Export:
                 self.left_out[f"{action}/{part}", str(error).partition("\n")[0]] += 1
         elif content is not None:
             self.left_out[f"{action}/{part}", "it was recorded as text"] += 1
+        # ... and the status of all goals of the action, when it changes.
         known = self._statuses.setdefault(action, {})
         if part == "feedback" and (action, event["goal_id"]) in self._ended:
             return  # late feedback must not make an ended goal active again
@@ -200,6 +204,7 @@ def define_types(definitions: Mapping[str, str]) -> None:
     for name, goal in definitions.items():
         action = name.removesuffix("Goal")
         parts = [goal, definitions.get(f"{action}Result"), definitions.get(f"{action}Feedback")]
+        # Only complete actions; a definition of this program comes first, as it is already in use.
         if action == name or None in parts or _is_known(name):
             continue
         try:
@@ -277,6 +282,7 @@ def _restored_text(text: str, kind: str, size: int) -> Any:
         return float(text)
     if was_cut(text, size):
         raise ValueError(f"too long to be recorded: a {kind}")
+    # Arrays of octets are bytes in Python, and the recording has their repr.
     if element in _OCTETS and text.startswith(("b'", 'b"')):
         try:
             return list(ast.literal_eval(text))

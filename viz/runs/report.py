@@ -63,7 +63,7 @@ def collect(recordings: Iterable[Recording]) -> dict[str, Runs]:
         runs.statistics.add(recording.events, recording.record)
         way = list(_way(recording))
         outcome, seconds = "not finished", None
-        for event in recording.events:
+        for event in recording.events:  # the last end counts, if a file has several runs
             if event["kind"] == "Finished":
                 outcome = event.get("outcome") or RAISED
                 seconds = (event["stamp_ns"] - recording.events[0]["stamp_ns"]) / 1e9
@@ -97,6 +97,7 @@ def report(
 
     Blocks: while `dot` runs.
     """
+    # The picture of the machine, then one section after the other; empty ones are left out.
     marks = marks_of(runs.statistics, runs.record)
     ends = ", ".join(f"{outcome} \u00d7{n}" for outcome, n in runs.statistics.outcomes.items())
     legend = (("", f"{runs.statistics.runs} runs: {ends or 'none has ended'}"),
@@ -151,7 +152,7 @@ def by_quarter(
     """Return the outcomes by quarters of a varied number, or by each value if it is no number."""
     pairs = [(values[file][key], end) for file, end, _ in runs.files if key in values.get(file, {})]
     numbers = sorted((v, end) for v, end in pairs if isinstance(v, int | float))
-    if len(numbers) < len(pairs):
+    if len(numbers) < len(pairs):  # some are texts: no order, so no quarters
         ends: dict[str, Counter[str]] = {}
         for value, end in pairs:
             ends.setdefault(str(value), Counter())[end] += 1
@@ -170,6 +171,7 @@ def _states(runs: Runs) -> str:
         one = runs.statistics.states.get(state.path)
         if one is None:
             continue
+        # Each histogram has its own axis, as durations of states can differ greatly.
         bars = ""
         if one.durations and max(one.durations) > 0:
             low, high = min(one.durations), max(one.durations)
@@ -194,6 +196,7 @@ def _differences(before: Runs, runs: Runs) -> str:
 
 def _files(runs: Runs, values: Mapping[str, Mapping[str, object]]) -> str:
     rows = []
+    # Names are relative to the folder that all files share: whole paths would fill the table.
     places = [Path(file).absolute() for file, _, _ in runs.files]
     common = os.path.commonpath([place.parent for place in places]) if places else ""
     for place, (file, outcome, seconds) in zip(places, runs.files, strict=True):

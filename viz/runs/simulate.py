@@ -81,11 +81,11 @@ class Vary:
         low, dots, high = values.partition("..")
         if not (key.strip() and equals and values.strip()):
             raise ValueError(f"got {text!r}; expected KEY=LOW..HIGH or KEY=ONE,OTHER")
-        if not dots:
+        if not dots:  # no range
             return cls(key.strip(), choices=tuple(word.strip() for word in values.split(",")))
         try:
             first, last = float(low), float(high)
-        except ValueError:
+        except ValueError:  # reported below, together with limits in the wrong order
             first = last = math.nan
         if not (math.isfinite(first) and math.isfinite(last) and first <= last):
             raise ValueError(
@@ -112,7 +112,7 @@ class Vary:
         random.Random(f"{seed} {self.key}").shuffle(order)  # noqa: S311  no secret
         inside = random.Random(f"{seed} {self.key} {run}").random()  # noqa: S311
         share = (order[run] + inside) / runs
-        if self.whole:
+        if self.whole:  # share is below 1: each whole number, the highest too, is equally likely
             return int(self.low) + int(share * (int(self.high) - int(self.low) + 1))
         return self.low + share * (self.high - self.low)
 
@@ -264,6 +264,7 @@ def simulate(
             executor = stack.enter_context(_pool(jobs, len(tasks)))
         futures = {executor.submit(run_one, task): task for task in tasks}
         results = {}
+        # In the order of their ends, for the progress; the results are sorted at the end.
         for future in as_completed(futures):
             task = futures[future]
             error = future.exception()
@@ -296,6 +297,7 @@ def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
     try:
         yield executor
     except BaseException:
+        # First take the waiting runs away, so that no process begins another one.
         executor.shutdown(wait=False, cancel_futures=True)
         for process in active_children():
             if process not in others:
@@ -383,7 +385,7 @@ def _execute(task: Task) -> tuple[str | None, str]:
     info = mission_info(target.thing)
     with contextlib.ExitStack() as stack:
         config = OFFICE_ROBOT
-        if robot_values:
+        if robot_values:  # beside the recording, which has a name of its own for each run
             config = task.file.with_suffix(".yaml")
             _write_config(config, robot_values)
             stack.callback(config.unlink)
@@ -419,9 +421,9 @@ class _Limit:
         self.reached: str | None = None
         self._machine = machine
         self._seconds = seconds
-        self._instant, self._events = 0.0, 0
-        self._active: dict[str, None] = {}
-        self._newest = "no state"
+        self._instant, self._events = 0.0, 0  # newest instant, and number of events at it
+        self._active: dict[str, None] = {}  # paths of running states, in the order of their begin
+        self._newest = "no state"  # path of the state that was left last
 
     def on_time(self) -> None:
         """End the run: its virtual time is over."""

@@ -114,6 +114,7 @@ def _vary(text: str) -> Vary:
 
 
 def _run(args: argparse.Namespace) -> int:
+    # By default SIGTERM ends Python at once: temporary files and processes would remain.
     signal.signal(signal.SIGTERM, _end)
     keys = [vary.key for vary in args.vary]
     if len(set(keys)) < len(keys):
@@ -144,6 +145,7 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
     from viz.runs.cli import collect_one, console, print_differences, print_statistics
     from viz.runs.simulate import Plan, simulate
 
+    # Read first: a mistake in the name should not be reported after an hour of simulation.
     before = None if args.compare is None else collect_one(args.compare, "simulate --compare")
     plan = Plan(args.mission, args.runs, folder, args.vary, args.seed, args.limit)
     progress = _Progress(args.runs, as_json=args.json)
@@ -153,7 +155,7 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
         finally:
             progress.end()
     failed = [result for result in results if result.outcome is None]
-    if not any(result.task.file.exists() for result in results):
+    if not any(result.task.file.exists() for result in results):  # then there is nothing to count
         raise UsageError(f"smachpy simulate: no run has ended; run 1: {failed[0].error}")
     runs = collect_one(str(folder), "simulate")
     values = {str(result.task.file): result.task.values for result in results}

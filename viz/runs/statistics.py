@@ -85,6 +85,7 @@ class Statistics:
 
     def add(self, events: Iterable[dict[str, Any]], record: StateRecord | None = None) -> None:
         """Add the events of one file; `record`, its machine, tells which states only observe."""
+        # Kinds first: `failures` needs them.
         for one in () if record is None else record.walk():
             if one.kind in WATCHING:
                 self._state(one.path).kind = one.kind
@@ -105,11 +106,11 @@ class Statistics:
                 state = self._state(path)
                 state.outcomes[outcome] = state.outcomes.get(outcome, 0) + 1
                 newest[path] = stamp, outcome
-                if path in since:
+                if path in since:  # otherwise the visit began before the recording
                     state.durations.append((stamp - since.pop(path)) / 1e9)
                 if kind == "Finished":
                     self.outcomes[outcome] = self.outcomes.get(outcome, 0) + 1
-                    self.durations += state.durations[-1:]
+                    self.durations += state.durations[-1:]  # the run's is its root's
 
     def _recover(
         self, event: dict[str, Any], since: dict[str, int], newest: dict[str, tuple[int, str]]
@@ -256,6 +257,7 @@ def moved_states(old: StateRecord, new: StateRecord) -> list[tuple[str, str]]:
             continue
         for other in fresh:
             twin = after[other]
+            # The same label, kind and class elsewhere: each new place is used once.
             if (twin.label, twin.kind, twin.type_name) == (
                 state.label, state.kind, state.type_name,
             ):  # fmt: skip
@@ -316,7 +318,7 @@ class StatisticsOfFiles:
         return {label: counted.statistics for label, counted in self._read().items()}
 
     def _read(self) -> dict[str, Counted]:
-        with self._lock:
+        with self._lock:  # one thread reads the files, others wait for it
             if self._found is None:
                 self._found = count_by_machine(each_recording(self._places))
             return self._found

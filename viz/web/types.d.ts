@@ -264,7 +264,7 @@ interface SentGoal {
   text: string;
   sent: number;
   ended: number | null;
-  heard: number;
+  feedback_count: number;
   cancelled: boolean;
   fraction: number | null;
   distance: number | null;

@@ -102,7 +102,7 @@ def test_a_goal_with_feedback_and_result(world):
     world.clock.sleep(5.0)
     goal = world.goal()
     assert (goal["status"], goal["text"], goal["result"]) == ("SUCCEEDED", "done", "result: 3")
-    assert goal["heard"] == 3
+    assert goal["feedback_count"] == 3
     assert goal["ended"] - goal["sent"] == pytest.approx(3e9, rel=0.1)
 
 

@@ -407,7 +407,7 @@ def test_two_machines_of_one_name_are_two_machines(start, look):
     # A command would reach both, so it reaches none.
     page.click("#pause")
     page.wait_for_selector(".notice.error")
-    assert "2 machines are called 'twin'" in page.text_content(".notice")
+    assert "got 2 machines with the name 'twin'" in page.text_content(".notice")
     # The one goes, the other stays; a new one takes the place of the one that has gone.
     first.kill()
     wait_for(page, "smachpy.store.runStatus.value.word === 'stale'")

@@ -86,7 +86,10 @@ export function moved(all, name, dock, index = Infinity) {
   return next;
 }
 
-/** The arrangement with another height of a panel. @param {Arrangement} all @param {PanelName} name @param {number} size [px] */
+/**
+ * The arrangement with another height of a panel.
+ * @param {Arrangement} all @param {PanelName} name @param {number} size [px]
+ */
 export function resized(all, name, size) {
   const next = { ...all };
   for (const dock of DOCKS)
@@ -94,7 +97,10 @@ export function resized(all, name, size) {
   return next;
 }
 
-/** The arrangement with another width of a dock. @param {Arrangement} all @param {"left" | "right"} dock @param {number} width [px] */
+/**
+ * The arrangement with another width of a dock.
+ * @param {Arrangement} all @param {"left" | "right"} dock @param {number} width [px]
+ */
 export const widened = (all, dock, width) => ({ ...all, widths: { ...all.widths, [dock]: within(width, WIDTHS) } });
 
 /**

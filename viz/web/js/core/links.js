@@ -21,7 +21,10 @@ const LATEST = 1e15; // [ms], later than any clock
  * @property {string[][] | null} plots ids of series; null: the usual ones
  */
 
-/** An instant in seconds, rounded up to microseconds: the event at the instant must be included. @param {number} at [ms] */
+/**
+ * An instant in seconds, rounded up to microseconds: the event at the instant must be included.
+ * @param {number} at [ms]
+ */
 const instant = (at) => (Math.ceil(at * 1000) / 1e6).toFixed(6);
 
 /** @param {string | null} text @returns {number | null} */

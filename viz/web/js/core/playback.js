@@ -1,4 +1,5 @@
 // Replay of a run: the instant to show at each moment, and the events that are targets of jumps.
+import { countWhile } from "#core/lists.js";
 import { endClass, outcomeClass } from "#core/outcomes.js";
 
 export const RATES = [0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
@@ -121,15 +122,9 @@ export class Marks {
   find(name, shown, step, model) {
     const marks = this.#marks.get(name) ?? [];
     const at = shown + this.#gone;
-    let low = 0;
-    let high = marks.length;
-    while (low < high) {
-      const mid = (low + high) >> 1;
-      if (marks[mid].number <= at) low = mid + 1;
-      else high = mid;
-    }
-    const here = low > 0 && marks[low - 1].number === at ? marks[low - 1].t : null;
-    for (let i = step > 0 ? low : low - 1; i >= 0 && i < marks.length; i += step)
+    const count = countWhile(marks, (mark) => mark.number <= at);
+    const here = count > 0 && marks[count - 1].number === at ? marks[count - 1].t : null;
+    for (let i = step > 0 ? count : count - 1; i >= 0 && i < marks.length; i += step)
       if (marks[i].t !== here && isOrigin(marks[i], model)) return marks[i].number - this.#gone;
     return null;
   }

@@ -1,6 +1,7 @@
 // One machine's run: its state now and after each kept event, the spans of time in which its states ran, and the
 // preempts. Times in spans are milliseconds since the epoch.
 import { emptyState, foldOne, ms, RAISED, requestOf } from "#core/fold.js";
+import { countWhile, innermost } from "#core/lists.js";
 
 const KEYFRAME = 400; // events between two stored states: an earlier state is folded from at most this many
 
@@ -160,7 +161,7 @@ export class Run {
         abandoned: until(row.abandoned),
       }));
     const running = rows.filter((row) => row.to === null);
-    const holds = running.filter((row) => !running.some((other) => other.path.startsWith(`${row.path}/`)));
+    const holds = innermost(running, (row) => row.path);
     const to = running.length ? null : Math.max(...rows.map((row) => row.to ?? t));
     return { from: found.from, to, rows, holds };
   }
@@ -174,18 +175,11 @@ export class Run {
   }
 
   /**
-   * Number of events until and with the instant t [ms].
+   * The number of events up to and including the instant t [ms].
    * @param {number} t
    */
   indexAt(t) {
-    let low = 0;
-    let high = this.events.length;
-    while (low < high) {
-      const mid = (low + high) >> 1;
-      if (timeOf(this.events[mid]) <= t) low = mid + 1;
-      else high = mid;
-    }
-    return low;
+    return countWhile(this.events, (e) => timeOf(e) <= t);
   }
 
   /**

@@ -34,7 +34,10 @@ export const SHOWN_NAMES = {
   cut: "without an end",
 };
 
-/** The status of a run: live, interrupted, queued, cut (no end is known) or the class of its outcome. @param {RunRow} row */
+/**
+ * The status of a run: live, interrupted, queued, cut (no end is known) or the class of its outcome.
+ * @param {RunRow} row
+ */
 export function standing(row) {
   const status = row.mission?.status ?? "";
   if (row.live || (status === "running" && row.outcome === null)) return "live";

@@ -1,7 +1,8 @@
-// The robots' poses, tracks by the visits that drove them, goals, scans, plans and maps. They come from records of their
-// topics (smachpy.network.observations); poses also from feedback, as long as there are none from topics.
+// The robots' poses, tracks by the visits that drove them, goals, scans, plans and maps. They come from records of
+// robot topics (smachpy.network.observations); poses also from feedback, as long as there are none from topics.
 // Times are milliseconds since the epoch; places are [m], angles [rad], in the map frame.
 import { own } from "#core/fold.js";
+import { countWhile } from "#core/lists.js";
 
 export const COLOURS = 8; // of tracks; from the ninth state on they repeat, dashed
 const MOST_POSES = 60_000; // of one robot
@@ -50,16 +51,7 @@ const NAMED = /name='([^']{1,40})'.*?\bx=(-?[\d.e+-]+).*?\by=(-?[\d.e+-]+)/;
  * @param {{ t: number }[]} list
  * @param {number} t
  */
-export function countUntil(list, t) {
-  let low = 0;
-  let high = list.length;
-  while (low < high) {
-    const mid = (low + high) >> 1;
-    if (list[mid].t <= t) low = mid + 1;
-    else high = mid;
-  }
-  return low;
-}
+export const countUntil = (list, t) => countWhile(list, (one) => one.t <= t);
 
 /**
  * The newest goal sent by `t`, if it had not ended then.

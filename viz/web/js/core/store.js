@@ -3,6 +3,7 @@ import { batch, computed, signal } from "@preact/signals";
 import { arrangementOf, moved, PANELS, placeOf, usual as usualArrangement, wordOf } from "#core/arrangement.js";
 import { emptyState, ms, own } from "#core/fold.js";
 import { withNotes } from "#core/links.js";
+import { innermost } from "#core/lists.js";
 import { Model } from "#core/model.js";
 import { instantAt, loopedAt, Marks } from "#core/playback.js";
 import { Run } from "#core/run.js";
@@ -251,7 +252,10 @@ export function playOn(moment) {
   else show(t, run.indexAt(t));
 }
 
-/** Select a stretch of the run between two instants [ms]; none if it is too short. @param {number} a @param {number} [b] */
+/**
+ * Select a stretch of the run between two instants [ms]; none if it is too short.
+ * @param {number} a @param {number} [b]
+ */
 export function selectStretch(a, b = a) {
   const inRun = (/** @type {number} */ t) => Math.max(run.first() ?? t, Math.min(t, run.last() ?? t));
   const [from, to] = [inRun(Math.min(a, b)), inRun(Math.max(a, b))];
@@ -527,10 +531,7 @@ export const activePaths = computed(() => {
     .filter(([, state]) => state.since != null)
     .map(([path]) => path);
 });
-export const activeLeaves = computed(() => {
-  const all = activePaths.value;
-  return all.filter((path) => !all.some((other) => other.startsWith(`${path}/`)));
-});
+export const activeLeaves = computed(() => innermost(activePaths.value, (path) => path));
 
 /** The running innermost states; after the end of a run, the innermost state that was left last. */
 export const lastLeaves = computed(() => {
@@ -542,7 +543,7 @@ export const lastLeaves = computed(() => {
   const [last] = left.reduce((a, b) => ((b[1].left ?? 0) > (a[1].left ?? 0) ? b : a));
   const isWithin = (/** @type {string} */ path, /** @type {string} */ top) => `${path}/`.startsWith(`${top}/`);
   const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered(last));
-  const end = inside.filter(([path]) => !inside.some(([other]) => other.startsWith(`${path}/`)));
+  const end = innermost(inside, ([path]) => path);
   const newest = end.reduce((a, b) => {
     const later = (b[1].left ?? 0) - (a[1].left ?? 0);
     return later > 0 || (later === 0 && depth(b[0]) > depth(a[0])) ? b : a;

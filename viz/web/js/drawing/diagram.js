@@ -344,7 +344,7 @@ export class Diagram {
    * @param {string} path
    * @param {StateRun | undefined} state
    * @param {number} now [ms]
-   * @param {GoalRun | null | undefined} goal what the state has sent and waits for
+   * @param {GoalRun | null | undefined} goal the goal that the state waits for
    * @param {boolean} noServer no action server is seen that would take it
    */
   paint(path, state, now, goal, noServer = false) {
@@ -428,7 +428,10 @@ export class Diagram {
     }
   }
 
-  /** Flash the arrows along which tokens have just moved. @param {string} path @param {string} fired @param {number} now */
+  /**
+   * Flash the arrows along which tokens have just moved.
+   * @param {string} path @param {string} fired @param {number} now
+   */
   flashFired(path, fired, now) {
     const transition = `${path}/${fired}`;
     const arrows = [...this.arrows.values()].flat();

@@ -1,4 +1,5 @@
-// Follow mode: opens the running containers, closes the others, and frames the running states as long as they are legible.
+// Follow mode: opens the running containers, closes the others, and frames the running states as far as they are
+// legible.
 import * as store from "#core/store.js";
 
 /** @typedef {import("#drawing/diagram.js").Diagram} Diagram */
@@ -105,7 +106,10 @@ function boxOfOne(diagram, path) {
   return null;
 }
 
-/** The box, made at least as large as the view: small states are not enlarged. @param {Box} box @param {Viewport} view */
+/**
+ * The box, made at least as large as the view: small states are not enlarged.
+ * @param {Box} box @param {Viewport} view
+ */
 function atLeast(box, view) {
   const w = Math.max(box.w, view.width * 0.9);
   const h = Math.max(box.h, view.height * 0.9);

@@ -152,7 +152,7 @@ export class Layout {
    * Lay out everything below `root`, with the containers of `open` opened.
    * @param {StateNode} root
    * @param {Set<string>} open
-   * @param {(done: number, all: number) => void} [onProgress] told of the states that are laid out
+   * @param {(done: number, all: number) => void} [onProgress] called with the number of states that are laid out
    * @throws {Error} ELK fails for the root; a container inside for which it fails is shown closed
    */
   async run(root, open, onProgress) {
@@ -394,7 +394,7 @@ class Plan {
    * @param {Direction | null} outer direction of the container around it; null for the root
    * @param {string} id
    * @param {Map<string, ContainerLayout>} inner by label
-   * @param {number} aspect of what is folded
+   * @param {number} aspect aspect of the view, for folding
    */
   constructor(node, shape, outer, id, inner, aspect) {
     this.node = node;

@@ -260,7 +260,10 @@ export class MapView {
     }
   }
 
-  /** Draw each goal's place once, with the status of the newest goal there. @param {Scene} scene @param {number} until */
+  /**
+   * Draw each goal's place once, with the status of the newest goal there.
+   * @param {Scene} scene @param {number} until
+   */
   #goals(scene, until) {
     const g = this.context;
     /** @type {Map<string, DrivenGoal>} */

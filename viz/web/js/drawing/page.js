@@ -538,7 +538,10 @@ export class Page {
 
   // -- input --------------------------------------------------------------------------------------
 
-  /** Set the state of the diagram that the pointer is on: its visit is highlighted everywhere. @param {string | null} path */
+  /**
+   * Set the state of the diagram that the pointer is on: its visit is highlighted everywhere.
+   * @param {string | null} path
+   */
   #hover(path) {
     if (path !== this.hovered) store.hoverAt(path);
     this.hovered = path;

@@ -1,5 +1,6 @@
 // The timeline: a lane for each container, with a row for each branch of a concurrence.
 import { ms } from "#core/fold.js";
+import { countWhile } from "#core/lists.js";
 import { endClass } from "#core/outcomes.js";
 import { COLOURS } from "#core/scene.js";
 import * as store from "#core/store.js";
@@ -23,7 +24,7 @@ const LONGEST_MS = 30 * 86_400_000;
 const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14_400];
 
 /** @typedef {import("#core/model.js").Model} Model */
-/** @typedef {{ from: number, to: number, x: (t: number) => number }} Scale what is shown [ms], and where [px] */
+/** @typedef {{ from: number, to: number, x: (t: number) => number }} Scale the range shown [ms], and its pixels */
 /** @typedef {{ left: number, right: number, top: number, bottom: number, span: Span }} Hit */
 
 export class Timeline {
@@ -357,7 +358,7 @@ export class Timeline {
    * @param {StateNode} node
    * @param {boolean} ended
    * @param {(t: number) => number} x
-   * @param {number} now what is later has not happened [ms]
+   * @param {number} now the instant shown [ms]; later parts are pale
    */
   #bar({ left, right, top, bottom, span }, node, ended, x, now) {
     const g = this.context;
@@ -547,20 +548,12 @@ const laneHeight = (lane) =>
   lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(lane.children.length, MOST_ROWS) + 3) : LANE;
 
 /**
- * The index of the first span to draw; spans are in order of their beginnings, but not of their ends.
+ * The index of the first span to draw. Spans are in order of their beginnings, and only roughly in that of their ends,
+ * so some before the one that is found are drawn as well.
  * @param {Span[]} spans
  * @param {number} t
  */
-function firstAfter(spans, t) {
-  let low = 0;
-  let high = spans.length;
-  while (low < high) {
-    const mid = (low + high) >> 1;
-    if ((spans[mid].to ?? Infinity) < t) low = mid + 1;
-    else high = mid;
-  }
-  return Math.max(0, low - 16);
-}
+const firstAfter = (spans, t) => Math.max(0, countWhile(spans, (span) => (span.to ?? Infinity) < t) - 16);
 
 /** @param {Span} span */
 function describe(span) {

@@ -1,4 +1,5 @@
-// The page for the actions on the network: sends goals from a form or as YAML, shows feedback and results, cancels goals.
+// The page for the actions on the network: sends goals from a form or as YAML, shows feedback and results, and cancels
+// goals.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { ask, askAction, encoded, hasToken, isFile, showActions } from "#core/connection.js";
 import { problemsWithoutField, toState, toYaml } from "#core/goal_values.js";
@@ -251,7 +252,7 @@ function Goal({ goal }) {
     }
     ${
       goal.feedback != null &&
-      html`<details open=${!ended}><summary>feedback, the newest of ${goal.heard}</summary>
+      html`<details open=${!ended}><summary>feedback, the newest of ${goal.feedback_count}</summary>
         <pre>${goal.feedback}</pre></details>`
     }
     <small class="id" title=${goal.id}>${goal.id}</small>

@@ -48,7 +48,7 @@ export function Controls() {
       !paused &&
       html`<${Confirm} text="Pause now" id="pause-now"
         question="Preempt the running states? They start again on resume."
-        title="preempt what runs instead of waiting for its end"
+        title="preempt the running states instead of waiting for their ends"
         onConfirm=${() => command("pause", { running: "cancel" })} />`
     }
     <${Command} id="step" disabled=${!paused} title="run one state, then pause again (s)"

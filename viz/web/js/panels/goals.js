@@ -65,7 +65,10 @@ function Goal({ id, goal, now, page }) {
     <${Foldable} label="goal" value=${goal.goal} /></div>`;
 }
 
-/** Attributes of a row that is highlighted with the visit that sent its goal. @param {GoalRun} goal @param {string} kind */
+/**
+ * Attributes of a row that is highlighted with the visit that sent its goal.
+ * @param {GoalRun} goal @param {string} kind
+ */
 const linked = (goal, kind) => ({
   ...store.hoverHandlers(goal.path, goal.since / 1e6),
   class: `${kind} ${store.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`,

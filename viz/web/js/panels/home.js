@@ -210,7 +210,10 @@ function MissionButtons({ mission }) {
   });
 }
 
-/** The strip of a run's states in the colours of their outcomes. @param {{ row: RunRow, seconds: number | null }} props */
+/**
+ * The strip of a run's states in the colours of their outcomes.
+ * @param {{ row: RunRow, seconds: number | null }} props
+ */
 function Strip({ row, seconds }) {
   if (!seconds) return null;
   const rows = row.strip.reduce((most, [at]) => Math.max(most, at + 1), 1);

@@ -1,4 +1,4 @@
-// The panel beside the diagram: questions, the selected state, preempts, goals, userdata, numbers, problems and the log.
+// The panel beside the diagram: questions, the selected state, preempts, goals, userdata, numbers, problems, the log.
 import * as store from "#core/store.js";
 import { countOfEvents, shorten } from "#core/text.js";
 import { Differences } from "#panels/comparison.js";

@@ -23,7 +23,7 @@ const LEGEND = [
 const KEYS = [
   ["/", "search"],
   ["0", "fit everything"],
-  ["f p g k", "next failure, preempt, goal, change of a key; with Shift the one before"],
+  ["f p g k", "next failure, preempt, goal, change of a key; with Shift the previous one"],
   ["Home End", "the beginning, the end"],
   ["m", "the map: + \u2212 zoom, 0 shows all"],
   ["o", "follow the running states"],
@@ -31,19 +31,19 @@ const KEYS = [
   ["\u2190 \u2191 \u2192 \u2193", "move the view, or select a neighbour of the selected state"],
   ["Enter", "open or close the selected state"],
   [", .", "one event back or forward"],
-  ["l", "back to now"],
+  ["l", "return to live"],
   ["1 \u2026 9", "levels to open"],
-  ["r [ ]", "loop over the selected stretch of the run; let it begin or end at the instant shown"],
-  ["w", "why it ended so"],
+  ["r [ ]", "loop over the selected stretch of the run; move its beginning or end to the instant shown"],
+  ["w", "the causes of the run's end"],
   ["n", "note at the instant shown"],
   ["t", "states, on a small screen"],
   ["i", "implicit transitions"],
   ["a", "actions"],
   ["h", "runs"],
   ["d", "dark or light"],
-  ["Space", "play or hold; pause or resume the mission (with control)"],
+  ["Space", "play or pause the view; pause or resume the mission (with control)"],
   ["s", "step (with control)"],
-  ["Esc", "select nothing"],
+  ["Esc", "clear the selection"],
 ];
 
 /** @param {{ page: Page }} props */
@@ -179,7 +179,7 @@ export function TokenDialog() {
   };
   return html`<div class="veil"><form class="card token" role="dialog" aria-label="token" onSubmit=${onSubmit}>
     <h2>The viewer has a new token</h2>
-    <p>It was started anew. Paste the address that it printed, or the token at its end.</p>
+    <p>It was restarted. Paste the printed address, or the token at its end.</p>
     <input aria-label="address or token" autocomplete="off" spellcheck=${false} value=${text}
       ref=${(/** @type {HTMLInputElement | null} */ input) => input?.focus()}
       onInput=${(/** @type {Event} */ e) => setText(fieldValue(e))} />

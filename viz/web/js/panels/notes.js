@@ -20,10 +20,10 @@ export function ShareButtons({ page }) {
   };
   const done = store.filmed.value;
   return html`<span class="share">
-    <button title="GIF of the selected stretch, else of the 20 s before the instant shown" disabled=${done !== null}
+    <button title="GIF of the selected stretch, or of the 20 s before the instant shown" disabled=${done !== null}
       onClick=${() => saveFilm(page)}>${done === null ? "GIF" : `GIF ${done} %`}</button>
     <button title="note at the instant shown (n)" onClick=${() => store.askForNote()}>Note</button>
-    <button title="copy the address of what is shown: instant, selection, what is open, notes"
+    <button title="copy the address of this view: instant, selection, open containers, notes"
       onClick=${copy}>Link</button></span>`;
 }
 

@@ -1,5 +1,6 @@
 // The course of a preempt: its origin, the states that have serviced it, and those for which it waits.
 import { ms } from "#core/fold.js";
+import { innermost } from "#core/lists.js";
 import * as store from "#core/store.js";
 import { askerText, duration, holdText } from "#core/text.js";
 import { html, Section, StateLink } from "#panels/html.js";
@@ -85,7 +86,7 @@ function rowText(row, found, now) {
 
 /** The innermost state that took the longest time. @param {PreemptedSpan[]} rows */
 function longest(rows) {
-  const leaves = rows.filter((row) => !rows.some((other) => other.path.startsWith(`${row.path}/`)));
+  const leaves = innermost(rows, (row) => row.path);
   const length = (/** @type {PreemptedSpan} */ row) => (row.to ?? row.preempt) - row.preempt;
   return leaves.reduce((a, b) => (length(b) > length(a) ? b : a));
 }

@@ -16,7 +16,7 @@ const TONES = [880, 1175]; // [Hz]
 const TONE_S = 0.16;
 
 /** Instants of the questions for which a sound was played: an older question that is still open is not new. */
-const heard = new Set();
+const sounded = new Set();
 
 /** The questions to show; those of a live machine are the present ones, independent of the instant shown. */
 function questionsShown() {
@@ -39,9 +39,9 @@ export function Questions({ page }) {
   }, [title]);
   useEffect(() => {
     if (isFile() || facts?.recorded) return;
-    const unheard = shown.filter((one) => one.isOpen && !heard.has(one.asked));
-    for (const one of unheard) heard.add(one.asked);
-    if (unheard.length && store.sound.value) chime();
+    const unsounded = shown.filter((one) => one.isOpen && !sounded.has(one.asked));
+    for (const one of unsounded) sounded.add(one.asked);
+    if (unsounded.length && store.sound.value) chime();
   });
   if (!shown.length && !held.length) return null;
   return html`<section class="questions" aria-label="questions">
@@ -104,7 +104,7 @@ function Picture({ one }) {
   const [gone, setGone] = useState(false);
   if (gone) return null;
   const source = link("question", `&path=${encoded(one.path)}&asked=${one.asked}`);
-  return html`<img class="question-picture" alt="what the question is about" src=${source}
+  return html`<img class="question-picture" alt="picture of the question" src=${source}
     onError=${() => setGone(true)} />`;
 }
 

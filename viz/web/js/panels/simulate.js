@@ -54,7 +54,7 @@ function OpenDialog() {
       <label>Runs <input inputmode="numeric" value=${form.runs} onInput=${change("runs")} /></label>
       <label>Seed <input inputmode="numeric" value=${form.seed} onInput=${change("seed")} /></label>
       <label>Limit of a run <input value=${form.limit} onInput=${change("limit")} /></label>
-      <label class="wide">What varies, a line each
+      <label class="wide">Varied values, one per line
         <textarea rows="2" placeholder="battery=0.2..1.0" spellcheck=${false} value=${form.vary}
           onInput=${change("vary")}></textarea></label>
       <label class="wide">Compare with <select value=${form.compare} onChange=${change("compare")}>
@@ -64,7 +64,7 @@ function OpenDialog() {
       ${problems && html`<p class="problem wide">${problems}</p>`}
       <p class="wide"><button class="primary" type="submit">Start</button>
         <span class="hint">${shorten(missions[mission] ?? "", 90)}</span></p></form>`
-        : html`<p class="hint">Runs are started from a viewer with --control, by its address with the token.</p>`
+        : html`<p class="hint">Only a viewer with --control can start runs, at its address with the token.</p>`
     }
     <ul class="batches">${batches.map((one) => html`<${BatchRow} key=${one.id} batch=${one} />`)}</ul>
   </div></div>`;

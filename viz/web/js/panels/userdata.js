@@ -108,7 +108,10 @@ function pressAsClick(e) {
 /** @type {import("@preact/signals").Signal<Record<string, Answer>>} */
 const wholeValues = signal({}); // fetched values by container and key; kept here, as rows come and go
 
-/** Fetches a complete value from the mission: events contain only the beginning of a long one. @param {{ entry: UserdataEntry }} props */
+/**
+ * Fetches a complete value from the mission: events contain only the beginning of a long one.
+ * @param {{ entry: UserdataEntry }} props
+ */
 function WholeValue({ entry }) {
   // Labels can contain slashes, so the container cannot be found in the path.
   const container = store.model.value?.get(entry.writer)?.parent?.path ?? entry.container;

@@ -21,7 +21,7 @@ export function WhyPanel({ page }) {
   return html`<${Section} title=${title}><div class="why">
     <span class="why-tools"><button class="small" onClick=${copy}>Copy as text</button>
       <button class="small" aria-label="close" onClick=${() => showWhy(false)}>\u2715</button></span>
-    ${!why.steps.length && html`<p class="hint">nothing is known of it</p>`}
+    ${!why.steps.length && html`<p class="hint">the causes are unknown</p>`}
     <ol>${why.steps.map(
       (step, i) => html`<${Step} step=${step} began=${why.began ?? 0} first=${i === 0} page=${page} />`,
     )}</ol></div><//>`;
