@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.interfaces import ros2_action
 from actionlib_core.wire.ros2.action_messages import (
-    Asked,
-    Canceling,
+    CancelRequest,
+    CancelResponse,
     GoalState,
     pack_cancel,
     pack_id,
     pack_with_id,
     unpack_accepted,
-    unpack_canceling,
+    unpack_cancel_response,
     unpack_statuses,
     unpack_with_id,
 )
@@ -147,12 +147,14 @@ class Ros2Client:
     def result(self, uuid: bytes) -> Pending:
         return self.ask(self.names.get_result, pack_id(uuid))
 
-    def cancel(self, uuid: bytes, stamp_ns: int = 0) -> Canceling:
+    def cancel(self, uuid: bytes, stamp_ns: int = 0) -> CancelResponse:
         payload = (
-            self.ask(self.names.cancel_goal, pack_cancel(Asked(uuid, stamp_ns))).answer().payload
+            self.ask(self.names.cancel_goal, pack_cancel(CancelRequest(uuid, stamp_ns)))
+            .answer()
+            .payload
         )
         assert payload is not None
-        return unpack_canceling(payload)
+        return unpack_cancel_response(payload)
 
     def end_of(self, pending: Pending) -> tuple[int, Any]:
         """Return status and result of an answer to `result`."""

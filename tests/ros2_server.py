@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.interfaces import ros2_action
 from actionlib_core.transport import Quality
 from actionlib_core.wire.ros2.action_messages import (
-    Canceling,
+    CancelResponse,
     GoalState,
     pack_accepted,
-    pack_canceling,
+    pack_cancel_response,
     pack_statuses,
     pack_with_id,
     unpack_cancel,
@@ -185,8 +185,8 @@ class Ros2Server:
         code = 0 if goals else 2
         for goal in goals:
             self.set_state(goal, 3)
-        self.reply(query, pack_canceling(Canceling(code, tuple((u, 0) for u in goals))))
+        self.reply(query, pack_cancel_response(CancelResponse(code, tuple((u, 0) for u in goals))))
 
     def refuse_cancel(self, query: Query, uuid: bytes) -> None:
         """Answer as rclpy does when its callback refuses: code 0 and an empty list."""
-        self.reply(query, pack_canceling(Canceling(0, ())))
+        self.reply(query, pack_cancel_response(CancelResponse(0, ())))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Sample
     from actionlib_core.wire.presence import Endpoint, Kind
-    from actionlib_core.wire.ros2.action_messages import Canceling, GoalState
+    from actionlib_core.wire.ros2.action_messages import CancelResponse, GoalState
 
 ASK_S = 2.0  # longest wait for an answer
 STATUS_S = 1.0  # longest wait for a server's latched status; one that never had a goal has none
@@ -186,18 +186,22 @@ class RemoteAction:
         subscription.close()
         return unpack_statuses(samples[-1].payload) if samples else []
 
-    def cancel(self, uuid: bytes, stamp_ns: int) -> Canceling:
-        """Send a cancel to the server; see `Asked`.
+    def cancel(self, uuid: bytes, stamp_ns: int) -> CancelResponse:
+        """Send a cancel to the server; see `CancelRequest`.
 
         Raises:
             UsageError: no answer came.
 
         Blocks: `ASK_S` at most.
         """
-        from actionlib_core.wire.ros2.action_messages import Asked, pack_cancel, unpack_canceling
+        from actionlib_core.wire.ros2.action_messages import (
+            CancelRequest,
+            pack_cancel,
+            unpack_cancel_response,
+        )
 
-        request = pack_cancel(Asked(uuid, stamp_ns))
-        return unpack_canceling(self._ask("cancel_goal", self.parts.cancel_goal, request))
+        request = pack_cancel(CancelRequest(uuid, stamp_ns))
+        return unpack_cancel_response(self._ask("cancel_goal", self.parts.cancel_goal, request))
 
     def result(self, uuid: bytes) -> tuple[int, Any]:
         """Return state and result of a goal that has ended; state 0: it is unknown.

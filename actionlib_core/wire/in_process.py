@@ -1,7 +1,7 @@
-"""Action servers that a bridge shows in this process: clients here reach them without the network.
+"""Action servers that a bridge shows in this process: clients here call them directly.
 
-Goals, feedback and results go this way, and over the network too, for others who look on; both ends
-drop that copy. All else goes over the network alone.
+Goals, feedback and results are passed directly and, for other programs that watch the action, over
+the network as well; both ends drop that copy. Everything else goes over the network alone.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
 
 class ClientInProcess(Protocol):
-    """A client, as a server in its process sees it."""
+    """A client, as a server in the same process sees it."""
 
     def take_feedback(self, sample: Sample, /) -> None:
-        """Take feedback; must not wait."""
+        """Handle feedback; must not wait."""
 
     def take_result(self, sample: Sample, /, *, direct: bool) -> None:
-        """Take a result, `direct` if it did not come over the network; must not wait."""
+        """Handle a result, `direct` if it did not come over the network; must not wait."""
 
 
 class ServerInProcess(Protocol):
-    """A server, as clients in its process see it.
+    """A server, as clients in the same process see it.
 
     Attributes:
         session: Id of its network session.
@@ -33,16 +33,17 @@ class ServerInProcess(Protocol):
     session: str
 
     def join(self, client: ClientInProcess) -> None:
-        """Send to a client directly from now on."""
+        """Send directly to a client from now on."""
 
     def leave(self, client: ClientInProcess) -> None:
-        """Send to a client over the network alone."""
+        """Send to a client over the network only."""
 
     def take_goal(self, sample: Sample) -> None:
-        """Take a goal that will come over the network too; never waits."""
+        """Handle a goal that will also arrive over the network; never waits."""
 
 
 servers: dict[str, ServerInProcess] = {}
-"""By the keys of their tokens; each is here before its token is shown."""
+"""By the keys of their tokens. Each is entered before its token is declared, so that a client that
+sees the token finds its server here."""
 
-os.register_at_fork(after_in_child=servers.clear)  # the connections are the other process's
+os.register_at_fork(after_in_child=servers.clear)  # their connections belong to the parent process

@@ -1,8 +1,8 @@
-"""The 33 bytes that go with every message, request and reply of ROS 2 over Zenoh.
+"""The attachment of 33 bytes on every message, request and reply of ROS 2 over Zenoh.
 
-A real node dies of a request whose attachment is missing, short, negative or a repetition, and of
-a reply or message likewise. So nothing is packed here that is not exactly right, and every end
-numbers what it sends with one `Numbering` of its own.
+A real node aborts when the attachment of a request is missing, too short, negative or repeated, and
+likewise for replies and messages. So invalid attachments are refused here before they are sent, and
+each endpoint numbers its messages with its own `Numbering`.
 
 Source:
     rmw_zenoh_cpp 0.6.7, as measured: int64 sequence number from 1, int64 time of sending [ns since
@@ -22,12 +22,12 @@ _LARGEST = 2**63 - 1
 
 
 class Attachment(NamedTuple):
-    """What an attachment says.
+    """The content of an attachment.
 
     Attributes:
-        sequence: From 1, one more with every message or request of its sender.
+        sequence: Counts the messages or requests of the sender, from 1.
         time_ns: When it was sent [ns since 1970], by the sender's clock.
-        gid: Sixteen bytes that only this publisher or service client has.
+        gid: Identifies the publisher or service client, 16 bytes.
     """
 
     sequence: int
@@ -39,8 +39,8 @@ def pack_attachment(attachment: Attachment) -> bytes:
     """Return the 33 bytes of an attachment.
 
     Raises:
-        ValueError: a real node would die of it: a sequence number below 0, a negative time, a gid
-            that is not 16 bytes, a number that 64 bits do not hold.
+        ValueError: a real node would abort on it: a negative sequence number or time, a gid without
+            16 bytes, a number that does not fit into 64 bits.
     """
     sequence, time_ns, gid = attachment
     for what, number in (("sequence", sequence), ("time_ns", time_ns)):
@@ -52,10 +52,10 @@ def pack_attachment(attachment: Attachment) -> bytes:
 
 
 def unpack_attachment(raw: bytes | None) -> Attachment:
-    """Return what an attachment says; bytes after the 33 are ignored, as ROS 2 does.
+    """Return the content of an attachment; bytes after the 33 are ignored, as in ROS 2.
 
     Raises:
-        ValueError: there is none, or it is none of ROS 2's.
+        ValueError: there is none, or it is not one of ROS 2.
     """
     if raw is None or len(raw) < SIZE:
         got = "none" if raw is None else f"{len(raw)} bytes"
@@ -71,32 +71,35 @@ def unpack_attachment(raw: bytes | None) -> Attachment:
 
 
 def answer_to(request: Attachment, time_ns: int) -> bytes:
-    """Return the attachment of the reply to a request: its number and gid, and a new time."""
+    """Return the attachment of the reply to a request.
+
+    It carries the request's number and gid, by which the client finds the request, and a new time.
+    """
     return pack_attachment(request._replace(time_ns=max(0, time_ns)))
 
 
 class Numbering:
-    """Numbers what one publisher or service client sends, so that no two attachments are equal.
+    """Numbers the messages of one publisher or service client, so that no attachment is repeated.
 
     Args:
-        gid: Of that end, 16 bytes.
+        gid: Identifies that endpoint, 16 bytes.
 
     Raises:
         ValueError: the gid has another length.
 
-    Threads: any; two of them never get the same number.
+    Threads: any; no number is given out twice.
     """
 
     def __init__(self, gid: bytes) -> None:
         self.gid = bytes(gid)
-        self._numbers = itertools.count(1)  # taking one is a single step of the interpreter
-        pack_attachment(Attachment(0, 0, self.gid))
+        self._numbers = itertools.count(1)  # needs no lock: next() on it is atomic in CPython
+        pack_attachment(Attachment(0, 0, self.gid))  # raises for a bad gid now, not while sending
 
     def take(self, time_ns: int) -> tuple[int, bytes]:
-        """Return the next sequence number and the attachment with it.
+        """Return the next sequence number and its attachment.
 
         Args:
-            time_ns: Time now [ns since 1970]; a clock that stands before 1970 counts as 1970.
+            time_ns: Current time [ns since 1970]; times before 1970 count as 1970.
         """
         sequence = next(self._numbers)
         return sequence, pack_attachment(Attachment(sequence, max(0, time_ns), self.gid))

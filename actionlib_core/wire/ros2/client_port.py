@@ -1,8 +1,8 @@
-"""An action client's end of ROS 2's wire: three service clients and two subscriptions.
+"""An action client's port to ROS 2's wire: three service clients and two subscriptions.
 
-What is to be asked about a goal `GoalExchange` decides; here are the requests, the tokens of the
-servers, and what is told of all this to the client. Acknowledgements and farewells do not exist
-there: a server keeps a result as long as its own `result_timeout` says.
+`GoalExchange` decides what to request for a goal; this module sends the requests, watches the
+tokens of servers, and reports to the client. ROS 2 has no acknowledgements and farewells: a server
+keeps a result for its own `result_timeout`.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import ros2_action
 from actionlib_core.wire.arrivals import Bursts, Readable
 from actionlib_core.wire.ros2.action_messages import (
-    Asked,
+    CancelRequest,
     find_states,
     pack_cancel,
     pack_id,
     pack_with_id,
     status_in,
     unpack_accepted,
-    unpack_canceling,
+    unpack_cancel_response,
     unpack_with_id,
 )
 from actionlib_core.wire.ros2.attachment import unpack_attachment
@@ -47,7 +47,6 @@ from actionlib_core.wire.ros2.names import (
     goal_uuid,
 )
 from actionlib_core.wire.ros2.network import ros_network
-from actionlib_core.wire.ros2.question import Question
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,7 +57,7 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Reply, Sample
     from actionlib_core.wire.action_types import ActionTypes
-    from actionlib_core.wire.ros2.action_messages import Canceling
+    from actionlib_core.wire.ros2.action_messages import CancelResponse
     from actionlib_core.wire.ros2.graph import End, RosServer
     from actionlib_core.wire.ros2.names import Token
 
@@ -66,16 +65,19 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-AT_ONCE = 8  # goals on their way: a ROS 2 server's queue holds 10 requests and drops the oldest
-PAUSE_S = 0.1  # before a question that was not answered is asked again; then twice as long
-LONGEST_S = 2.0
-LAST_WORDS_S = 0.03  # answers of a server that leaves may come so long after its tokens went
+# The default of rmw_zenoh. It is not infinite, because Zenoh keeps memory for each query until its
+# time is over, even when it was answered. A request that ends without an answer is repeated.
+ANSWER_S = 600.0
+MAX_IN_FLIGHT = 8  # unanswered goals; a ROS 2 server queues 10 requests and drops the oldest
+PAUSE_S = 0.1  # before an unanswered request is repeated; doubled each time
+LONGEST_PAUSE_S = 2.0
+LATE_ANSWERS_S = 0.03  # answers of a leaving server are awaited for this time after its tokens went
 
 
 class _Goal:
-    """A goal and what is under way for it."""
+    """A goal and its open requests."""
 
-    __slots__ = ("body", "exchange", "id", "on_asked", "open", "pause", "server", "uuid")
+    __slots__ = ("body", "exchange", "id", "on_done", "open", "pause", "server", "uuid")
 
     def __init__(self, goal_id: str, body: bytes, server: str, *, attached: bool = False) -> None:
         self.id = goal_id
@@ -84,12 +86,16 @@ class _Goal:
         self.server = server
         self.exchange = GoalExchange(attached=attached)
         self.pause = PAUSE_S
-        self.on_asked: list[Callable[[], None]] = []
-        self.open: dict[End, Closable] = {}  # its questions that are not answered yet
+        self.on_done: list[Callable[[], None]] = []
+        self.open: dict[End, Closable] = {}  # requests that are not answered yet, by service
 
 
 class RosClientPort:
-    """The ends of an action client on a ROS 2 network; see `ports.make_client_port`."""
+    """The client's port on a ROS 2 network; see `ports.make_client_port`.
+
+    `GoalExchange` is called with `_lock` held, and the steps that it returns are carried out
+    without: they call the listener and the network, which may call back into this object.
+    """
 
     def __init__(
         self,
@@ -132,15 +138,15 @@ class RosClientPort:
         self._by_uuid: dict[bytes, _Goal] = {}
         self._queue: deque[_Goal] = deque()
         self._sending: set[_Goal] = set()
-        self._there: dict[RosServer, TypeMismatchError | None] = {}
+        self._present: dict[RosServer, TypeMismatchError | None] = {}
         self._silent: set[RosServer] = set()
-        self._asks_for_life = False
+        self._probing = False
         self._leaving: dict[RosServer, Timer] = {}
         self._probe = LinkProbe(
             node.clock,
             network.settings.probe,
-            self._ask_for_life,
-            lambda: bool((self._goals and self._there) or self._silent),
+            self._send_probe,
+            lambda: bool((self._goals and self._present) or self._silent),
             self._on_silent,
         )
         self._readable = Readable(log)
@@ -150,6 +156,7 @@ class RosClientPort:
         self._listener = listener
         subscribe = self._network.transport.subscribe
         ends = (self._send, self._cancel, self._result, self._feedback_end, self._status_end)
+        # Subscribe first and show the tokens last: a server that sees them may publish at once.
         self._declared = [
             self._subscribe_to_status(),
             subscribe(self._feedback_end.key, self._feedback.take, history=False),
@@ -177,10 +184,10 @@ class RosClientPort:
         for entry in reversed(declared):
             entry.close()
 
-    # -- what the client wants -----------------------------------------------------------------
+    # -- calls of the client -------------------------------------------------------------------
 
     def is_heard(self) -> bool:
-        return any(error is None for error in self._there.values())
+        return any(error is None for error in self._present.values())
 
     def explain_absence(self) -> str:
         settings = self._network.settings
@@ -210,7 +217,7 @@ class RosClientPort:
         *,
         wait: bool = True,  # noqa: ARG002  a request is not dropped
     ) -> None:
-        """See to it that a goal reaches the server, unless that is under way.
+        """Send a goal, unless it is already on its way; the client calls this repeatedly.
 
         Raises:
             TransportError: the client is stopped.
@@ -236,7 +243,7 @@ class RosClientPort:
         self._do(goal, step)
 
     def _cancel_many(self, stamp_ns: int) -> None:
-        def on_answer(answer: Canceling, _: Reply) -> None:
+        def on_answer(answer: CancelResponse, _: Reply) -> None:
             for uuid, _stamp in answer.goals:
                 goal = self._by_uuid.get(uuid)
                 if goal is not None:
@@ -244,11 +251,11 @@ class RosClientPort:
                         step = goal.exchange.on_cancel_answer(CancelCode.NONE, listed=True)
                     self._do(goal, step)
 
-        request = pack_cancel(Asked(NO_GOAL, stamp_ns))
-        self._ask(None, self._cancel, request, unpack_canceling, on_answer)
+        request = pack_cancel(CancelRequest(NO_GOAL, stamp_ns))
+        self._ask(None, self._cancel, request, unpack_cancel_response, on_answer)
 
     def acknowledge(self, goal_ids: list[str], *, farewell: bool = False) -> None:
-        """Say nothing: ROS 2 has no acknowledgements."""
+        """Do nothing: ROS 2 has no acknowledgements."""
 
     def ask(self, goal_id: str, on_done: Callable[[], None]) -> None:
         with self._lock:
@@ -256,58 +263,61 @@ class RosClientPort:
             known = goal is not None
             if goal is None:
                 goal = self._keep(_Goal(goal_id, b"", "", attached=True))
-            step = goal.exchange.ask_again() if self._there else Step.NOTHING
+            step = goal.exchange.ask_again() if self._present else Step.NOTHING
             waits = goal.exchange.asking
             if waits:
-                goal.on_asked.append(on_done)
+                goal.on_done.append(on_done)
         if not waits:
             on_done()
         self._do(goal, step)
         if not known and self._last_status is not None:
-            with contextlib.suppress(ValueError):  # reported when it came
+            with contextlib.suppress(ValueError):  # reported when it arrived
                 self._read_states(self._last_status)
 
     def _keep(self, goal: _Goal) -> _Goal:
         """Keep a new goal. Needs the lock."""
         self._goals[goal.id] = self._by_uuid[goal.uuid] = goal
-        goal.server = goal.server or next((server.session for server in self._there), "")
+        goal.server = goal.server or next((server.session for server in self._present), "")
         return goal
 
     def _drop(self, goal: _Goal) -> None:
-        """Forget a goal that is over, or that nobody follows any more."""
+        """Forget a goal that has ended, or that the client no longer follows."""
         with self._lock:
             self._goals.pop(goal.id, None)
             self._by_uuid.pop(goal.uuid, None)
             if goal in self._queue:
                 self._queue.remove(goal)
-            questions = self._take_back(goal)
-        for question in questions:
-            question.close()
-        self._send_next()  # it may have been on its way
+            requests = self._withdraw(goal)
+        for request in requests:
+            request.close()
+        self._send_next()  # the goal may have been one of the `MAX_IN_FLIGHT`
 
-    def _take_back(self, goal: _Goal) -> list[Closable]:
-        """Return the open questions of a goal, which count as unanswered now. Needs the lock."""
+    def _withdraw(self, goal: _Goal) -> list[Closable]:
+        """Return a goal's open requests, for the caller to close without the lock. Needs the lock.
+
+        They count as unanswered from now on.
+        """
         self._sending.discard(goal)
-        questions = list(goal.open.values())
+        requests = list(goal.open.values())
         goal.open.clear()
         goal.exchange.on_link_lost()
-        return questions
+        return requests
 
-    # -- what is decided -----------------------------------------------------------------------
+    # -- steps of GoalExchange -----------------------------------------------------------------
 
     def _do(self, goal: _Goal, step: int) -> None:
-        """Do what `GoalExchange` has decided."""
-        if step & Step.ASK:  # first: an answer is awaited
+        """Carry out the steps that `GoalExchange` has returned."""
+        if step & Step.ASK:  # first: its round trip goes on while the client is notified
             self._ask_result(goal)
-        if step & Step.TELL:
-            self._tell(goal)
-        if not step & ~(Step.ASK | Step.TELL):
+        if step & Step.NOTIFY:
+            self._notify(goal)
+        if not step & ~(Step.ASK | Step.NOTIFY):
             return
         if step & Step.QUEUE:
             self._enqueue(goal)
         if step & Step.ASK_LATER:
             self._clock.call_later(goal.pause, partial(self._ask_again, goal))
-            goal.pause = min(2 * goal.pause, LONGEST_S)
+            goal.pause = min(2 * goal.pause, LONGEST_PAUSE_S)
         if step & Step.CANCEL:
             self._ask_cancel(goal)
         if step & Step.KEEPS_RUNNING:
@@ -316,15 +326,19 @@ class RosClientPort:
             if step & end:
                 self._end(goal, status, text)
 
-    def _tell(self, goal: _Goal) -> None:
-        """Tell the client's goal where it stands."""
-        if not self._there:  # who speaks without a server would count as one
+    def _notify(self, goal: _Goal) -> None:
+        """Report the goal's status to the client."""
+        # The client takes the sender of a status for a server, so none is reported before a
+        # server's tokens are there; `_on_token` does it then.
+        if not self._present:
             return
         status = goal.exchange.status
-        tell = partial(self._listener.on_statuses, session=goal.server, whole=False)
-        if status is Status.RECALLING:  # which says nothing of a goal that was not heard of before
-            tell([StatusEntry(goal.id, 0, Status.PENDING, "")])
-        tell([StatusEntry(goal.id, 0, status, "")])
+        report = partial(self._listener.on_statuses, session=goal.server, whole=False)
+        # RECALLING alone does not show that the server has the goal: on our own wire it may mean a
+        # cancel that arrived first (see `ClientGoal`).
+        if status is Status.RECALLING:
+            report([StatusEntry(goal.id, 0, Status.PENDING, "")])
+        report([StatusEntry(goal.id, 0, status, "")])
 
     def _end(self, goal: _Goal, status: Status, text: str) -> None:
         self._drop(goal)
@@ -337,7 +351,7 @@ class RosClientPort:
             self._listener.on_statuses([entry], goal.server, whole=False)
 
     def _enqueue(self, goal: _Goal) -> None:
-        """Send a goal when it is its turn, if the client still wants it."""
+        """Put a goal into the queue, if the client still follows it."""
         if not self._listener.follows(goal.id):
             self._drop(goal)
             return
@@ -347,10 +361,10 @@ class RosClientPort:
         self._send_next()
 
     def _send_next(self) -> None:
-        """Send goals that wait, as long as few are on their way."""
+        """Send queued goals while fewer than `MAX_IN_FLIGHT` are unanswered."""
         while True:
             with self._lock:
-                if not self._queue or len(self._sending) >= AT_ONCE or self._closed:
+                if not self._queue or len(self._sending) >= MAX_IN_FLIGHT or self._closed:
                     return
                 goal = self._queue.popleft()
                 self._sending.add(goal)
@@ -388,11 +402,11 @@ class RosClientPort:
         )
 
     def _on_result(self, goal: _Goal, code: int, reply: Reply) -> None:
-        self._feedback.flush()
+        self._feedback.flush()  # the user gets feedback before the result
         with self._lock:
             step = goal.exchange.on_result(code, self._clock.now())
             status = goal.exchange.status
-            goal.open.pop(self._result, None)  # it is over without being taken back
+            goal.open.pop(self._result, None)  # it ends by itself, so `_drop` need not close it
         if not step & Step.END:
             self._do(goal, step)
             return
@@ -410,17 +424,17 @@ class RosClientPort:
 
     def _on_result_done(self, goal: _Goal, answered: bool) -> None:
         with self._lock:
-            told, goal.on_asked = goal.on_asked, []
+            callbacks, goal.on_done = goal.on_done, []
             step = Step.NOTHING if answered else goal.exchange.on_no_result()
-        for on_done in told:
+        for on_done in callbacks:
             on_done()
         self._do(goal, step)
 
     def _ask_again(self, goal: _Goal) -> None:
-        """Ask once more for a result, if somebody is there to answer."""
+        """Request a result again, if there is a server to answer."""
         with self._lock:
             known = not self._closed and self._goals.get(goal.id) is goal
-            step = goal.exchange.ask_again() if known and self._there else Step.NOTHING
+            step = goal.exchange.ask_again() if known and self._present else Step.NOTHING
         if step and not self._listener.follows(goal.id):
             self._drop(goal)
         else:
@@ -430,13 +444,13 @@ class RosClientPort:
         self._ask(
             goal,
             self._cancel,
-            pack_cancel(Asked(goal.uuid, 0)),
-            unpack_canceling,
+            pack_cancel(CancelRequest(goal.uuid, 0)),
+            unpack_cancel_response,
             partial(self._on_cancel_answer, goal),
             partial(self._on_cancel_done, goal),
         )
 
-    def _on_cancel_answer(self, goal: _Goal, answer: Canceling, _: Reply) -> None:
+    def _on_cancel_answer(self, goal: _Goal, answer: CancelResponse, _: Reply) -> None:
         listed = any(uuid == goal.uuid for uuid, _ in answer.goals)
         with self._lock:
             step = goal.exchange.on_cancel_answer(answer.code, listed=listed)
@@ -460,56 +474,75 @@ class RosClientPort:
         on_answer: Callable[[T, Reply], object],
         on_done: Callable[[bool], object] = bool,
     ) -> None:
-        """Ask one server; see `Question`.
+        """Send a request to one server; the first answer that can be parsed counts.
 
         Args:
-            goal: What it is about; it keeps the question until that ends.
-            end: Our end of the service.
+            goal: The goal that it is about; it holds the request until its end. None: no goal.
+            end: Our endpoint of the service.
             request: The request.
-            read: Reads an answer; raises ValueError.
-            on_answer: Gets the first answer that can be read.
-            on_done: Gets, in the end, whether there was one; not called for a question taken back.
+            read: Parses an answer; raises ValueError.
+            on_answer: Gets the parsed answer and the reply.
+            on_done: Called at the end with whether there was one; not called when the request was
+                withdrawn.
         """
+        answered = over = False
 
         def take(reply: Reply) -> None:
-            self._hear()
-            if not self._closed:
-                problem = question.take(reply)
-                if problem:
-                    self._report("an answer", problem)
+            nonlocal answered
+            self._note_received()
+            if self._closed or answered:
+                return
+            try:
+                answer = _parse(reply, read)
+            except ValueError as error:
+                self._report("an answer", error)
+                return
+            answered = True
+            on_answer(answer, reply)
 
         def done() -> None:
+            nonlocal over
             with self._lock:
-                question.over = True
+                over = True
                 if goal is not None:
                     goal.open.pop(end, None)
                 if end is self._send and goal is not None:
                     self._sending.discard(goal)
             if not self._closed:
-                on_done(question.answered)
+                on_done(answered)
 
-        question = Question(read, on_answer)
         try:
-            asked = question.ask(self._network.transport, end, request, take, done)
+            asked = self._network.transport.query(
+                end.key,
+                request,
+                attachment=end.attachment(),
+                best=True,  # one server: a goal must not run in two
+                timeout=ANSWER_S,
+                on_reply=take,
+                on_done=done,
+            )
         except TransportError as error:
             self._readable.report("ask", error)
             done()
             return
         with self._lock:
-            if goal is not None and not question.over:
+            # It may be over before `query` has returned: then there is nothing to keep.
+            if goal is not None and not over:
                 goal.open[end] = asked
 
     def _report(self, what: str, error: object) -> None:
-        """Report a message that is dropped; once of a kind, a server may go on like this."""
+        """Log a dropped message, once per kind, as a server may send many of them."""
         text = f"action '{self._name}': {what} cannot be read: {error}"
         self._readable.report(what, ActionlibError(text))
 
     # -- topics --------------------------------------------------------------------------------
 
     def _on_status(self, sample: Sample) -> None:
-        self._feedback.flush()
+        self._feedback.flush()  # the user gets the feedback that was received before
         self._last_status = sample
-        self._hear()
+        self._note_received()
+        # Without a gap, this list has the next number of the same publisher. The number is kept
+        # only if the list could be read.
         last, self._last_number = self._last_number, None
         try:
             number, _, gid = unpack_attachment(sample.attachment)
@@ -520,10 +553,10 @@ class RosClientPort:
         self._last_number = gid, number
 
     def _read_states(self, sample: Sample, *, unbroken: bool = False) -> None:
-        """Take in what a status list says of goals that are followed.
+        """Handle the states of followed goals in a status list.
 
         Raises:
-            ValueError: it cannot be read.
+            ValueError: the list cannot be read.
         """
         with self._lock:
             wanted = set(self._by_uuid)
@@ -539,7 +572,7 @@ class RosClientPort:
             self._do(goal, step)
 
     def _on_feedback(self, sample: Sample) -> None:
-        self._hear()
+        self._note_received()
         try:
             uuid, _ = unpack_with_id(sample.payload)
         except ValueError as error:
@@ -557,8 +590,8 @@ class RosClientPort:
         self._listener.on_feedback(entry, sample.payload, goal.server)
 
     def _note_sender(self, goal: _Goal, session: str) -> None:
-        """Note which of several servers has a goal, where that is known. Needs the lock."""
-        if session != goal.server and any(server.session == session for server in self._there):
+        """Note which of several servers has a goal, if known. Needs the lock."""
+        if session != goal.server and any(server.session == session for server in self._present):
             goal.server = session
 
     # -- servers -------------------------------------------------------------------------------
@@ -568,43 +601,44 @@ class RosClientPort:
             change = self._servers.on_token(token, alive=alive)
             if change is None:
                 return
-        server, error = (
-            change.server,
-            explain_mismatch(self._name, change, self._network.settings.distro),
-        )
+        server = change.server
+        error = explain_mismatch(self._name, change, self._network.settings.distro)
         with self._lock:
             self._silent.discard(server)
             if change.alive:
-                self._there[server] = error
+                self._present[server] = error
                 for goal in self._goals.values():
                     goal.server = goal.server or server.session
             else:
-                self._there.pop(server, None)
+                self._present.pop(server, None)
         if not change.alive:
             self._lose_soon(server)
             return
         self._lose_now()
-        self._hear()
+        self._note_received()
         if error is not None:
             self._readable.report(f"{server.session} {server.node}", error)
         self._listener.on_server(server, error)
         with self._lock:
             heard_of = [goal for goal in self._goals.values() if goal.exchange.code]
-        for goal in heard_of:  # a status that came before the server's tokens was told to nobody
-            self._tell(goal)
+        for goal in heard_of:  # their statuses came before the server's tokens: see `_notify`
+            self._notify(goal)
 
     def _lose_soon(self, server: RosServer) -> None:
-        """Take the loss of a server after its last answers, which its tokens may overtake."""
+        """Handle the loss of a server a little later: its last answers may come after the tokens.
+
+        Without open requests there is nothing to wait for.
+        """
         with self._lock:
             asked = any(goal.open for goal in self._goals.values())
             if asked and not self._closed:
-                later = self._clock.call_later(LAST_WORDS_S, partial(self._lose_now, server))
+                later = self._clock.call_later(LATE_ANSWERS_S, partial(self._lose_now, server))
                 self._leaving[server] = later
         if not asked:
             self._lose(server, "is gone")
 
     def _lose_now(self, only: RosServer | None = None) -> None:
-        """Take the loss of a server that has left, or of all that have."""
+        """Handle the loss of a server that has left, or of all that have."""
         with self._lock:
             left = [server for server in self._leaving if only in {None, server}]
             timers = [self._leaving.pop(server) for server in left]
@@ -614,60 +648,72 @@ class RosClientPort:
             self._lose(server, "is gone")
 
     def _lose(self, server: RosServer, why: str) -> None:
-        """Take the loss of a server: what was asked there is answered no more."""
+        """Handle the loss of a server: requests to it will not be answered."""
         self._feedback.flush()
         self._listener.on_server_gone(server, why)
         with self._lock:
             mine = [g for g in self._goals.values() if g.server in {"", server.session}]
-            questions = [question for goal in mine for question in self._take_back(goal)]
-            told = [on_done for goal in mine for on_done in goal.on_asked]
+            requests = [request for goal in mine for request in self._withdraw(goal)]
+            callbacks = [on_done for goal in mine for on_done in goal.on_done]
             for goal in mine:
-                goal.on_asked.clear()
+                goal.on_done.clear()
                 if goal in self._queue:
                     self._queue.remove(goal)
-        for question in questions:
-            question.close()
-        for on_done in told:
+        for request in requests:
+            request.close()
+        for on_done in callbacks:
             on_done()
         for goal in mine:
             if not self._listener.follows(goal.id):
                 self._drop(goal)
 
-    def _hear(self) -> None:
-        """Note that a server was heard; those that had been silent are there again."""
-        self._probe.hear()
+    def _note_received(self) -> None:
+        """Note that a server has sent something; silent servers count as present again."""
+        self._probe.note_received()
         if not self._silent:
             return
         with self._lock:
             back, self._silent = self._silent, set()
-            self._there.update(dict.fromkeys(back))
+            self._present.update(dict.fromkeys(back))
         for server in back:
             self._listener.on_server(server, None)
 
-    def _ask_for_life(self) -> Closable:
-        """Ask for the last status or, of a server that had no goal yet, for the result of none.
+    def _send_probe(self) -> Closable:
+        """Request the last status or, if there was none yet, the result of an unknown goal.
 
-        The second is answered by its executor, which has no goals to be busy with. One such
-        question at a time, or those of a suspended server would push others out of its queue.
+        The second is answered by the server's executor, which is not busy as it has no goals. Only
+        one such request is open at a time: a suspended server would queue them, and real requests
+        would drop out of its queue of 10.
         """
         if self._last_status is not None:
             return self._subscribe_to_status()
 
         def on_done(_: bool) -> None:
-            self._asks_for_life = False
+            self._probing = False
 
-        if not self._asks_for_life:
-            self._asks_for_life = True
+        if not self._probing:
+            self._probing = True
             asked = pack_id(uuid4().bytes)
             self._ask(None, self._result, asked, status_in, lambda *_: None, on_done)
-        return contextlib.ExitStack()  # nothing to take back: a late answer counts, too
+        return contextlib.ExitStack()  # nothing to close: a late answer counts as well
 
     def _on_silent(self, seconds: float) -> None:
-        """Give up servers that do not answer, although their tokens are there."""
+        """Count servers that do not answer as lost, although their tokens are present."""
         with self._lock:
-            silent = [server for server, error in self._there.items() if error is None]
+            silent = [server for server, error in self._present.items() if error is None]
             self._silent.update(silent)
             for server in silent:
-                del self._there[server]
+                del self._present[server]
         for server in silent:
             self._lose(server, f"has not been heard for {seconds:.1f} s")
+
+
+def _parse(reply: Reply, read: Callable[[bytes], T]) -> T:
+    """Return the answer in a reply.
+
+    Raises:
+        ValueError: the reply is an error, or it cannot be parsed.
+    """
+    if reply.error:
+        raise ValueError(reply.payload.decode(errors="replace") or "an error without a text")
+    return read(reply.payload)

@@ -1,6 +1,6 @@
-"""What the tokens of a ROS 2 robot say about whether it can be used from here, and what to try.
+"""Findings about a ROS 2 robot: can it be used from here, and if not, what to try.
 
-Pure: it is given what was found, and returns what to say.
+Pure functions: they get the tokens and measurements that were collected, and return texts.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 CLOCK_OFF_S = 0.1  # Nav2's usual tolerance for transforms
 SLOW_S = 0.5
-MOST_NAMED = 5
+MOST_NAMED = 5  # names shown in one finding; the rest is counted
 START = "ros2 run rmw_zenoh_cpp rmw_zenohd"
 
 
 class Level(StrEnum):
-    """How good or bad a finding is."""
+    """The severity of a finding."""
 
     OK = "ok"
     NOTE = "note"
@@ -40,11 +40,11 @@ class Level(StrEnum):
 
 
 class Finding(NamedTuple):
-    """One thing that was looked at.
+    """The outcome of one check.
 
     Attributes:
-        level: How good or bad it is.
-        what: What was looked at: "router", "nodes", "types", "actions", "qos", "answers", "clock".
+        level: Its severity.
+        what: The check: "router", "nodes", "types", "actions", "qos", "answers", "clock".
         text: What was found.
         way_out: What to try; "" when nothing is wrong.
     """
@@ -56,11 +56,11 @@ class Finding(NamedTuple):
 
 
 def diagnose_nodes(tokens: Iterable[Token], domain: int) -> Finding:
-    """Tell whether nodes show themselves in a domain.
+    """Check whether any node is present in a domain.
 
     Args:
         tokens: Of all domains.
-        domain: The one that is to be used.
+        domain: The domain to be used.
     """
     by_domain: dict[int, set[str]] = {}
     for token in tokens:
@@ -86,20 +86,20 @@ def diagnose_nodes(tokens: Iterable[Token], domain: int) -> Finding:
 
 
 def explain_absence(action: str, tokens: Iterable[Token], domain: int, router: str) -> str:
-    """Return where the server of an action was looked for in vain, who is there, and what to try.
+    """Explain why an action has no server: where it was looked for, what is there, what to try.
 
     Args:
-        action: Its full name there.
-        tokens: Of all domains, without our own.
-        domain: The one that is used.
-        router: Its endpoint; "" for the network that the program has joined anyway.
+        action: Its full name on the ROS 2 network.
+        tokens: Of all domains, without those of this program.
+        domain: The domain in use.
+        router: The router's address; "" for the network that the program has joined anyway.
     """
     tokens = list(tokens)
     nodes = diagnose_nodes(tokens, domain)
     where = f"router {router}" if router else "the program's own network"
-    said = f"looked at {where} in domain {domain}: "
+    intro = f"looked at {where} in domain {domain}: "
     if nodes.level is not Level.OK:
-        return f"{said}nodes: {nodes.text}. {nodes.way_out}"
+        return f"{intro}nodes: {nodes.text}. {nodes.way_out}"
     names = {
         action_of(token.name)
         for token in tokens
@@ -107,19 +107,19 @@ def explain_absence(action: str, tokens: Iterable[Token], domain: int, router: s
     }
     served = sorted(f"/{name}" for name in names if name is not None)
     if f"/{action}" in served:
-        return f"{said}its server shows only a part of it, and is just starting or hangs."
+        return f"{intro}its server shows only a part of it, and is just starting or hangs."
     if not served:
-        return f"{said}{nodes.text}, and no action has a server. Is it started?"
-    return f"{said}actions: {_listed(served)}.{did_you_mean(f'/{action}', served)}"
+        return f"{intro}{nodes.text}, and no action has a server. Is it started?"
+    return f"{intro}actions: {_listed(served)}.{did_you_mean(f'/{action}', served)}"
 
 
 def explain_mismatch(action: str, change: ServerChange, distro: str) -> TypeMismatchError | None:
-    """Return what is wrong with the types of a server that has appeared; None when nothing is.
+    """Return the error about a new server whose types differ from ours; None when they fit.
 
     Args:
-        action: Its full name here.
-        change: What its tokens say.
-        distro: Whose definitions are used here.
+        action: Its full name in this program.
+        change: The server, as its tokens describe it.
+        distro: The distribution whose definitions are used here.
     """
     if not change.mismatches:
         return None
@@ -143,8 +143,8 @@ def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
     """Compare the type hashes of a robot with those of the definitions here.
 
     Args:
-        tokens: Of the robot's ends, in its domain.
-        distro: Whose definitions are to be used.
+        tokens: Of the robot's endpoints, in its domain.
+        distro: The distribution whose definitions are to be used.
     """
     types = {(t.type, t.type_hash) for t in tokens if t.kind is not Kind.NODE}
     if not types:
@@ -156,6 +156,8 @@ def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
             return [Finding(Level.NOTE, "types", note)]
         text = f"the robot shows no type hashes, as Humble does; expected those of {distro}"
         return [Finding(Level.PROBLEM, "types", text, "Try --distro humble.")]
+    # A type may fit several distributions, as most definitions do not change between them. The one
+    # that fits most types is the best guess for the robot's.
     fitting: Counter[str] = Counter()
     wrong: list[str] = []
     unknown: list[str] = []
@@ -195,7 +197,8 @@ def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
 
 
 def diagnose_actions(tokens: Sequence[Token]) -> list[Finding]:
-    """Tell of each action whether it has one server, with all its parts."""
+    """Check that each action has exactly one server, with all its parts."""
+    # For each action its servers, by session and node, and the parts that each shows.
     servers: dict[str, dict[tuple[str, int], set[str]]] = {}
     nodes: dict[tuple[str, int], str] = {}
     for token in tokens:
@@ -236,7 +239,7 @@ def diagnose_actions(tokens: Sequence[Token]) -> list[Finding]:
 
 
 def diagnose_qos(tokens: Iterable[Token]) -> list[Finding]:
-    """Tell which topics keep messages for late subscribers, and which may drop them."""
+    """List the topics that keep messages for late subscribers, and those that may drop messages."""
     topics = {
         token.name: token.qos
         for token in tokens
@@ -255,10 +258,10 @@ def diagnose_qos(tokens: Iterable[Token]) -> list[Finding]:
 
 
 def diagnose_answers(seconds: Mapping[str, float | None]) -> Finding:
-    """Tell which nodes answer, and how fast.
+    """Check whether all nodes answer, and how fast.
 
     Args:
-        seconds: How long each node took [s], by its full name; None for one that did not answer.
+        seconds: Time that each node took to answer [s], by its full name; None: no answer.
     """
     silent = sorted(f"/{node}" for node, took in seconds.items() if took is None)
     if silent:
@@ -273,20 +276,21 @@ def diagnose_answers(seconds: Mapping[str, float | None]) -> Finding:
     slowest, took = max(((node, took or 0.0) for node, took in seconds.items()), key=lambda x: x[1])
     level = Level.OK if took < SLOW_S else Level.NOTE
     way_out = "" if level is Level.OK else "The link or the robot is slow."
-    told = f"{_named(seconds)}; the slowest, /{slowest}, answers in {took * 1e3:.0f} ms"
-    return Finding(level, "answers", told, way_out)
+    text = f"{_named(seconds)}; the slowest, /{slowest}, answers in {took * 1e3:.0f} ms"
+    return Finding(level, "answers", text, way_out)
 
 
 def diagnose_clock(offsets: Mapping[str, tuple[float, float]]) -> Finding:
-    """Tell how far the nodes' clocks are from ours.
+    """Compare the nodes' clocks with ours.
 
     Args:
-        offsets: How far each node's clock is ahead [s], by its full name, and to what that is
-            known [s].
+        offsets: By full name of a node: how far its clock is ahead, and the uncertainty of that
+            measurement [s].
     """
-    node, (offset_s, doubt_s) = max(offsets.items(), key=lambda each: abs(each[1][0]) - each[1][1])
-    if abs(offset_s) <= CLOCK_OFF_S + doubt_s:
-        text = f"the same within {max(abs(offset_s), doubt_s) * 1e3:.0f} ms"
+    # The node whose clock is certainly off the furthest.
+    node, (offset_s, error_s) = max(offsets.items(), key=lambda each: abs(each[1][0]) - each[1][1])
+    if abs(offset_s) <= CLOCK_OFF_S + error_s:
+        text = f"the same within {max(abs(offset_s), error_s) * 1e3:.0f} ms"
         return Finding(Level.OK, "clock", text)
     side = "ahead of" if offset_s > 0 else "behind"
     return Finding(

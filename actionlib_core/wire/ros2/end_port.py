@@ -1,4 +1,4 @@
-"""One end of a topic or service of ROS 2: CDR with an attachment, under name, type and hash."""
+"""An endpoint of a ROS 2 topic or service: CDR with an attachment, under name, type and hash."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _KINDS_THERE = {kind: there for there, kind in _KINDS.items()}
 
 
 class RosEndPort:
-    """An end on a network of ROS 2; see `make_end_port`. The end of a caller is its client's."""
+    """An endpoint on a ROS 2 network; see `make_end_port`. With `calls`, a service's client."""
 
-    ages = False  # tokens there do not tell
+    ages = False  # ROS 2's tokens do not say which endpoint is older
 
     def __init__(
         self, node: Node, kind: EndKind, name: str, interface: Any, *, calls: bool = False
@@ -62,7 +62,7 @@ class RosEndPort:
             node.on_close(self._end.close)
 
     def _convert(self, token: Token) -> Endpoint:
-        """Return an end as it would be on our own wire."""
+        """Return the endpoint that a token describes, as our own wire describes endpoints."""
         return Endpoint(
             _KINDS.get(token.kind, EndKind.SERVICE),
             self._name,
@@ -91,6 +91,8 @@ class RosEndPort:
     def send(self, *, latch: bool) -> Sender:
         quality = Quality(block=False, cache=LATCHED.depth if latch else 0)
         if latch:
+            # The token contains the QoS, and the gid is made from the token: a latched publisher
+            # is a new endpoint.
             ros = self._network.ros
             self._end = ros.end(Kind.PUBLISHER, self._name_there, self._type, LATCHED)
             self.own = self._convert(self._end.token)
@@ -99,6 +101,7 @@ class RosEndPort:
         return Sender(lambda it: port.put(to_ros2(it).to_cdr(), end.attachment()), port.close)
 
     def receive(self, callback: Callable[[Sample], None]) -> Closable:
+        # Asks for kept messages in any case: whether a publisher latches is its own choice.
         return self._network.transport.subscribe(self._end.key, callback, cached=LATCHED.depth)
 
     def read(self, sample: Sample) -> Any:

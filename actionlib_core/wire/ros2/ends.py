@@ -1,6 +1,7 @@
-"""The ends on networks of ROS 2, as tools show those of our own: by name here, kind, type, node.
+"""The endpoints on ROS 2 networks, as the command line and the live page list them.
 
-An action's ends are told by its feedback; what ROS 2's tools hide is left out.
+Each is an `Endpoint`, as on our own wire. The servers and clients of an action are recognised by
+their endpoint of its feedback topic. Names that ROS 2's tools hide are left out.
 """
 
 from __future__ import annotations
@@ -38,13 +39,15 @@ def networks(node: Node) -> Iterator[RosNetwork]:
 
 
 def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
-    """Return what a token shows as an end of ours; None for a node and what tools hide.
+    """Return the endpoint that a token shows; None for a node and for hidden names.
 
-    Those of an action are its servers and clients, told by its feedback. The checksum is the hash.
+    `Endpoint.md5` holds the type hash.
     """
     action = action_of(token.name)
     name, type_name = token.name, token.type
     if action is not None:
+        # Of the five parts of an action only feedback counts: the server publishes it, each client
+        # subscribes to it, and its type contains the name of the action's type.
         kinds = {
             RosKind.PUBLISHER: Kind.ACTION_SERVER,
             RosKind.SUBSCRIPTION: Kind.ACTION_CLIENT,
@@ -58,6 +61,7 @@ def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
             RosKind.SUBSCRIPTION: Kind.SUBSCRIBER,
             RosKind.SERVICE: Kind.SERVICE,
         }
+    # ROS 2 hides names with a word that begins with an underscore.
     if token.kind not in kinds or any(word.startswith("_") for word in name.split("/")):
         return None
     return Endpoint(
@@ -72,12 +76,12 @@ def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
 
 
 def watch_ends(node: Node, on_end: Callable[[Endpoint, str, bool], object]) -> list[Closable]:
-    """Hear of the ends there are and of every change.
+    """Call a function for each endpoint on a node's ROS 2 networks, and for every change.
 
     Args:
-        node: On whose networks.
-        on_end: Gets an end, what identifies it, and whether it is there; called on the networks'
-            threads, must not wait.
+        node: The node.
+        on_end: Gets an endpoint, the key of its token, and whether it is there; called on the
+            networks' threads, must not wait.
 
     Raises:
         TransportError: a network cannot be joined.
@@ -97,10 +101,10 @@ def watch_ends(node: Node, on_end: Callable[[Endpoint, str, bool], object]) -> l
 
 
 def class_of(node: Node, end: Endpoint) -> Any:
-    """Return the class of the type of an end, by the definition that its hash is of.
+    """Return the class of an endpoint's type, if the definition here has the endpoint's hash.
 
     Raises:
-        InterfaceError: there is none here, or it is another one.
+        InterfaceError: there is no definition here, or a different one.
     """
     network = choose_network(node.config.ros2, end.name)
     get: Callable[[str, str], Any] = ros2.get_message
@@ -119,13 +123,13 @@ def class_of(node: Node, end: Endpoint) -> Any:
 
 
 def mismatch_text(type_name: str, hashed: str, own: tuple[str, str], found: str) -> str:
-    """Return what to say about a type whose hash there is another than ours.
+    """Return the error text for a type that has another hash on the robot.
 
     Args:
         type_name: The type.
-        hashed: The type that the hash is of.
+        hashed: The type from which the hash is computed: of an action, its feedback message.
         own: Our distribution, and the hash of its definition.
-        found: The hash there.
+        found: The hash on the robot.
     """
     if found == ros2.NO_HASH:
         fitting = ["humble"]
@@ -134,7 +138,7 @@ def mismatch_text(type_name: str, hashed: str, own: tuple[str, str], found: str)
     way_out = (
         f"Try --distro {fitting[0]}."
         if fitting
-        else ("Try the definition of the robot's own workspace in SMACHPY_INTERFACE_PATH.")
+        else "Try the definition of the robot's own workspace in SMACHPY_INTERFACE_PATH."
     )
     whose = f"It is that of {', '.join(fitting)}. " if fitting else ""
     return (

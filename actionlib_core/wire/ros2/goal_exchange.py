@@ -1,9 +1,10 @@
-"""What a client has to ask a ROS 2 server about one goal, and what the answers mean: decides only.
+"""Decides what a client requests from a ROS 2 server for one goal, and what the answers mean.
 
-A goal is sent in one request, never blindly repeated. When that ends without an answer, the result
-of the same id is asked for: a server that has the goal keeps that question until the goal ends, one
-that has not says so at once, and only then the goal may be sent again. A server that knows an id
-refuses it, so that a second sending that is refused has to be settled in the same way.
+A goal is sent in one request and never blindly repeated, because it may move a robot. When that
+request ends without an answer, the result of the same id is requested: a server that has the goal
+holds this request until the goal ends, and a server that does not have it says so at once. Only
+then may the goal be sent again. A server refuses an id that it already knows, so a refusal of the
+second request does not mean that the goal was refused; it is settled in the same way.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ import enum
 from actionlib_core.goal.states import Status
 from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, to_status
 
-# A server may forget a goal some time after its end, 10 s by default. Doubt that is settled later
-# than this after the goal was sent is settled no more: it may have run and been forgotten.
+# A server forgets a goal some time after its end (10 s by default). When it answers "unknown" later
+# than this after the goal was sent, the goal may have run and been forgotten, so it is not sent
+# again.
 SETTLED_S = 5.0
-
 
 TEXT_REFUSED = "the server refused the goal"
 TEXT_RECALLED = "This goal was canceled before any action server could have it"
@@ -28,7 +29,7 @@ TEXT_UNSETTLED = (
 
 
 class Phase(enum.Enum):
-    """What is known about where a goal is."""
+    """What is known about the whereabouts of a goal."""
 
     HERE = "no server can have it"
     QUEUED = "it waits for its turn to be sent"
@@ -38,31 +39,34 @@ class Phase(enum.Enum):
 
 
 class Step:
-    """What is to be done next: bits, as an `enum.Flag` takes ten times as long for each goal."""
+    """What the owner has to do next, as bits.
+
+    They are plain integers: an `enum.Flag` takes ten times as long for each goal.
+    """
 
     NOTHING = 0
     QUEUE = 0x1
-    """Send the goal when it is its turn, and call `on_sent` then."""
+    """Put the goal into the queue, and call `on_sent` when it is sent."""
     ASK = 0x2
-    """Ask for the result; the answer comes when the goal ends."""
+    """Request the result; the answer comes when the goal ends."""
     ASK_LATER = 0x4
     """Call `ask_again` after a pause."""
     CANCEL = 0x8
-    """Ask for its end."""
-    TELL = 0x10
-    """Tell the client's goal its `status`."""
+    """Send a cancel request."""
+    NOTIFY = 0x10
+    """Report its `status` to the client."""
     END = 0x20
-    """Hand the result on; it is over."""
+    """The goal has ended: deliver its result."""
     REFUSED = 0x40
-    """It is over: the server has refused it."""
+    """The goal has ended: the server has refused it."""
     RECALLED = 0x80
-    """It is over: it was cancelled before any server could have it."""
+    """The goal has ended: it was cancelled before any server could have it."""
     UNKNOWN = 0x100
-    """It is over: the server has forgotten it, or is another one."""
+    """The goal has ended: the server has forgotten it, or is another one."""
     UNSETTLED = 0x200
-    """It is over: nobody can say whether the server has run it."""
+    """The goal has ended: it is unknown whether the server has run it."""
     KEEPS_RUNNING = 0x400
-    """The server has refused to cancel it."""
+    """The server has refused to cancel the goal."""
 
 
 ENDS = (
@@ -71,19 +75,19 @@ ENDS = (
     (Step.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
     (Step.UNSETTLED, Status.LOST, TEXT_UNSETTLED),
 )
-"""The steps with which a goal is over, and its status and text then."""
+"""The steps that end a goal without a result, with its final status and text."""
 
 
 class GoalExchange:
     """One goal between its client and a ROS 2 server.
 
     Args:
-        attached: It was sent in an earlier life of the program: it is asked for and never sent.
+        attached: An earlier process has sent it: its result is requested, and it is never sent.
 
     Attributes:
         phase: See `Phase`.
-        code: The last state the server has told, see `GoalCode`.
-        asking: The question for its result is open.
+        code: The last state that the server has reported, see `GoalCode`. It never decreases.
+        asking: A request for its result is open.
         sent_at: When it was last sent [s, clock].
 
     Threads: none of its own, no lock; the owner calls it under its lock.
@@ -120,56 +124,59 @@ class GoalExchange:
 
     @property
     def status(self) -> Status:
-        """What a ROS 1 client would be told."""
+        """The goal's status in the terms of ROS 1."""
         return to_status(self.code, was_active=not self._never_active)
 
     # -- sending -------------------------------------------------------------------------------
 
     def want(self) -> int:
-        """Take the wish that the goal reaches the server, made again while nothing is known."""
+        """Start or continue to deliver the goal; called repeatedly until its status is known."""
         if self.phase is Phase.HERE:
             self.phase = Phase.QUEUED
             return Step.QUEUE
         if self.phase is Phase.TAKEN:
-            return Step.TELL if self.code else Step.NOTHING  # it was told while nobody was there
+            # The state may have arrived before the server's tokens, when it could not be reported.
+            return Step.NOTIFY if self.code else Step.NOTHING
         return self.ask_again()
 
     def on_sent(self, now: float) -> None:
-        """Note that the request goes out."""
+        """Note that the request is being sent."""
         self.phase = Phase.SENT
         self.sent_at = now
         self._sendings += 1
 
     def on_answer(self, *, accepted: bool) -> int:
-        """Take the answer to the request."""
+        """Handle the answer to the request."""
         if accepted:
             return self._take(GoalCode.ACCEPTED)
         if self._sendings == 1 and self.code <= GoalCode.ACCEPTED:
             return Step.REFUSED
-        if self.phase is Phase.TAKEN:  # the refusal of a repetition
+        if self.phase is Phase.TAKEN:  # the server has it from the first request
             return Step.NOTHING
+        # Either a real refusal, or the first request has arrived after all and this was refused as
+        # a repetition. The request for the result tells which.
         self._refused = True
         self.phase = Phase.UNSURE
         return self.ask_again()
 
     def on_unanswered(self) -> int:
-        """Take the end of the request without an answer."""
+        """Handle the end of the request without an answer."""
         if self.phase is not Phase.SENT:
             return Step.NOTHING
         self.phase = Phase.UNSURE
         return self.ask_again()
 
-    # -- what the server says of it --------------------------------------------------------------
+    # -- its state at the server -----------------------------------------------------------------
 
     def on_state(self, code: int, *, unbroken: bool = False) -> int:
-        """Take its state from the list that the server publishes.
+        """Handle its state in a status list of the server.
 
-        A server publishes one at each change, but late lists may be skipped. So a goal that is
-        cancelled was never executing only if lists without a gap say so.
+        A server publishes a list at each change, but lists may be lost. So a cancelled goal counts
+        as never executed only if consecutive lists show it first as accepted, then as canceling.
 
         Args:
             code: See `GoalCode`.
-            unbroken: The list before this one was seen, too.
+            unbroken: The list before this one was received as well.
         """
         if code not in _STATES:
             return Step.NOTHING
@@ -179,7 +186,7 @@ class GoalExchange:
         return self._take(code)
 
     def on_feedback(self) -> int:
-        """Take feedback, which shows that it runs."""
+        """Handle feedback, which shows that it is executing."""
         return self._take(max(self.code, GoalCode.EXECUTING))
 
     def _take(self, code: int) -> int:
@@ -190,22 +197,22 @@ class GoalExchange:
             if self._cancel_wanted and not self._cancelling:
                 self._cancelling = True
                 step |= Step.CANCEL
-        if code > self.code:  # one that was overtaken says nothing new
+        if code > self.code:  # else the message was overtaken by a newer one
             self.code = GoalCode(code)
-            step |= Step.TELL
+            step |= Step.NOTIFY
         return step
 
     # -- the result ------------------------------------------------------------------------------
 
     def ask_again(self) -> int:
-        """Return whether to ask for the result now."""
+        """Request the result, unless a request is open or the server cannot have the goal."""
         if self.asking or self.phase not in {Phase.UNSURE, Phase.TAKEN}:
             return Step.NOTHING
         self.asking = True
         return Step.ASK
 
     def on_result(self, code: int, now: float) -> int:
-        """Take the answer to the question for the result."""
+        """Handle the answer to the request for the result."""
         self.asking = False
         if code in ENDED:
             self.code = GoalCode(code)
@@ -215,8 +222,8 @@ class GoalExchange:
         return self._on_unknown(now)
 
     def _on_unknown(self, now: float) -> int:
-        """Take the word that the server does not know the goal."""
-        if self.phase is Phase.TAKEN:
+        """Handle the answer that the server does not know the goal."""
+        if self.phase is Phase.TAKEN:  # it knew the goal before
             return Step.UNKNOWN
         if now > self.sent_at + SETTLED_S:
             return Step.UNSETTLED
@@ -228,17 +235,18 @@ class GoalExchange:
         return self.want()
 
     def on_no_result(self) -> int:
-        """Take the end of that question without an answer."""
+        """Handle the end of that request without an answer."""
         self.asking = False
         return Step.ASK_LATER
 
     # -- its cancel ------------------------------------------------------------------------------
 
     def cancel(self, *, again: bool = False) -> int:
-        """Take the wish that it ends; `again`: nobody wished it anew, it is only repeated."""
+        """Cancel the goal; `again`: the client repeats an earlier cancel by itself."""
         if self.phase in {Phase.HERE, Phase.QUEUED} and not self._attached:
             return Step.RECALLED
         self._cancel_wanted = True
+        # A goal that may be on its way is cancelled when the server has it, see `_take`.
         if self.phase is not Phase.TAKEN or self._cancelling or self.code >= GoalCode.CANCELING:
             return Step.NOTHING
         if again and self._cancel_refused:
@@ -247,26 +255,26 @@ class GoalExchange:
         return Step.CANCEL
 
     def on_cancel_answer(self, code: int, *, listed: bool) -> int:
-        """Take the answer to a cancel.
+        """Handle the answer to a cancel request.
 
         Args:
-            code: See `CancelCode`. It is 0 also where a server has refused and listed nothing.
-            listed: The goal is among those that the server says are canceling.
+            code: See `CancelCode`. It is 0 also when a server refuses and lists no goal.
+            listed: The goal is in the answer's list of goals that are canceling.
         """
         self._cancelling = False
         if listed:
             return self._take(GoalCode.CANCELING)
         if code in {CancelCode.UNKNOWN_GOAL, CancelCode.GOAL_TERMINATED}:
-            return Step.NOTHING  # the answer to the question for the result says what it is
+            return Step.NOTHING  # the answer to the request for the result will tell how it ended
         self._cancel_refused = True
         return Step.KEEPS_RUNNING
 
     def on_no_cancel_answer(self) -> None:
-        """Take the end of a cancel without an answer: it may be repeated."""
+        """Handle the end of a cancel request without an answer: it may be repeated."""
         self._cancelling = False
 
     def on_link_lost(self) -> None:
-        """Take the loss of the server: what was asked is answered no more."""
+        """Handle the loss of the server: open requests will not be answered."""
         self.asking = self._cancelling = False
         if self.phase is Phase.SENT:
             self.phase = Phase.UNSURE

@@ -1,7 +1,7 @@
-"""One life cycle of a goal for the user: the states of ROS 2's actions in those of ROS 1's.
+"""The goal states of ROS 2 and of ROS 1, translated into each other.
 
-ROS 2 has six states and no text with them; a refused goal has none. What each side makes of the
-other is two tables, from which the documentation draws its own.
+Users see the statuses of ROS 1 on both wires. ROS 2 has six states without a text; a refused goal
+has no state at all. The tables of the documentation are made from those here.
 
 Source:
     https://design.ros2.org/articles/actions.html, `action_msgs/msg/GoalStatus`.
@@ -15,7 +15,7 @@ from actionlib_core.goal.states import Status
 
 
 class GoalCode(IntEnum):
-    """Where a goal is at a ROS 2 server (action_msgs/msg/GoalStatus)."""
+    """The state of a goal at a ROS 2 server (action_msgs/msg/GoalStatus)."""
 
     UNKNOWN = 0
     ACCEPTED = 1
@@ -27,10 +27,10 @@ class GoalCode(IntEnum):
 
 
 class CancelCode(IntEnum):
-    """What a ROS 2 server answers to a cancel (action_msgs/srv/CancelGoal)."""
+    """The answer of a ROS 2 server to a cancel request (action_msgs/srv/CancelGoal)."""
 
     NONE = 0
-    """No error: the goals in the list are canceling."""
+    """No error: the listed goals are canceling."""
     REJECTED = 1
     UNKNOWN_GOAL = 2
     GOAL_TERMINATED = 3
@@ -48,14 +48,14 @@ TO_STATUS = {
     GoalCode.CANCELED: Status.PREEMPTED,
     GoalCode.ABORTED: Status.ABORTED,
 }
-"""What a client sees of a goal that has been executing."""
+"""The status at a client here of a goal that has been executing, or may have been."""
 
 TO_STATUS_NEVER_ACTIVE = {
     **TO_STATUS,
     GoalCode.CANCELING: Status.RECALLING,
     GoalCode.CANCELED: Status.RECALLED,
 }
-"""What it sees of one of which it knows that it has not."""
+"""The status at a client here of a goal that is known not to have been executing."""
 
 TO_CODE = {
     Status.PENDING: GoalCode.ACCEPTED,
@@ -69,7 +69,7 @@ TO_CODE = {
     Status.RECALLED: GoalCode.CANCELED,
     Status.LOST: GoalCode.UNKNOWN,
 }
-"""What a server here shows of its goal to ROS 2."""
+"""The state in which a server here shows its goal to ROS 2."""
 
 
 def to_status(code: int, *, was_active: bool) -> Status:
@@ -77,14 +77,14 @@ def to_status(code: int, *, was_active: bool) -> Status:
 
     Args:
         code: See `GoalCode`; other numbers count as unknown.
-        was_active: The goal has been executing, or nobody knows that it has not.
+        was_active: False only when it is known that the goal has not been executing.
     """
     table = TO_STATUS if was_active else TO_STATUS_NEVER_ACTIVE
     return table.get(code, Status.LOST)  # type: ignore[call-overload, no-any-return]  # an int is equal to its member
 
 
 def to_code(status: int) -> GoalCode:
-    """Return the state of ROS 2 that stands for a status."""
+    """Return the state of ROS 2 for a status."""
     return TO_CODE[Status(status)]
 
 
@@ -105,7 +105,7 @@ def draw_tables() -> str:
 
 
 def reason_of(result: object) -> str:
-    """Return what a result says about why its goal has failed, "" where its type does not.
+    """Return the reason for a goal's failure from its result; "" when its type has no such field.
 
     ROS 2 has no text beside a status. Nav2's results have `error_msg` and `error_code`, those of
     controllers `error_string`.
@@ -119,10 +119,10 @@ def reason_of(result: object) -> str:
 
 
 def give_reason(result: object, text: str) -> bool:
-    """Write into a result why its goal has failed, where its type has room and nobody did.
+    """Write the reason for a goal's failure into its result, if there is an empty field for it.
 
     Returns:
-        Whether it was written; `reason_of` finds it then.
+        Whether it was written; `reason_of` reads it.
     """
     for name in ("error_msg", "error_string"):
         if getattr(result, name, None) == "":

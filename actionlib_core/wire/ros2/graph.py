@@ -1,8 +1,8 @@
-"""The graph of ROS 2: our node and its ends as others see them, and who else is there.
+"""The graph of ROS 2: our node and its endpoints as others see them, and those of others.
 
-Every node shows a token, and every publisher, subscription, service and service client of it
-another (`names.Token`). `RosNode` shows ours and watches those of others; `ActionServers` tells
-from them which servers of an action are there.
+Each node declares a token, and another one for each of its publishers, subscriptions, services and
+service clients (`names.Token`). `RosNode` declares ours and watches the others; `ActionServers`
+derives from them which servers of an action are present.
 """
 
 from __future__ import annotations
@@ -32,14 +32,15 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable, Presence, Transport
     from actionlib_core.wire.ros2.names import Qos
 
-LIST_TIMEOUT_S = 1.0  # longest wait for the network to say who is there
+LIST_TIMEOUT_S = 1.0  # longest wait for the network to list tokens
 
 
 class RosType(NamedTuple):
-    """A type as ROS 2 names it on the wire.
+    """The name and hash of a type, as tokens and keys contain them.
 
     Attributes:
-        name: "pkg/kind/Type"; of a service its own name, of an action's part that of the part.
+        name: "pkg/kind/Type": for a service the service's own name, for a part of an action that of
+            the part.
         hash: RIHS01 hash, or `names.HASH_NOT_SUPPORTED`.
     """
 
@@ -48,12 +49,12 @@ class RosType(NamedTuple):
 
 
 class End:
-    """One end of ours on a ROS 2 network; `RosNode.end` makes it.
+    """An endpoint of this program on a ROS 2 network, made by `RosNode.end`.
 
     Attributes:
-        key: The key on which it meets the others of its name and type.
-        token: What it shows.
-        gid: What names it in messages and requests, 16 bytes.
+        key: The key that all endpoints of its name and type use.
+        token: The content of its token.
+        gid: Identifies it in messages and requests, 16 bytes.
 
     Threads: any.
     """
@@ -68,11 +69,11 @@ class End:
         self._shown: Closable | None = None
 
     def attachment(self) -> bytes:
-        """Return the attachment of the next message or request: no two of them are equal."""
+        """Return the attachment for the next message or request; each call returns another one."""
         return self._numbering.take(self._node.clock.time_ns())[1]
 
     def show(self) -> None:
-        """Show the token: what others send may come from now on.
+        """Declare the token: from now on others may send messages and requests.
 
         Raises:
             TransportError: the session is closed.
@@ -81,24 +82,25 @@ class End:
             self._shown = self._node.transport.declare_alive(self._token_key)
 
     def close(self) -> None:
-        """Take the token back; a second call does nothing."""
+        """Undeclare the token; a second call does nothing."""
         shown, self._shown = self._shown, None
         if shown is not None:
             shown.close()
 
 
 class RosNode:
-    """A node of ours on a ROS 2 network, with what its ends need.
+    """A node of this program on a ROS 2 network; it makes endpoints and watches tokens.
 
     Args:
-        transport: Its session there, which stays the caller's.
-        clock: Gives the times of sending.
+        transport: The session; the caller closes it.
+        clock: Gives the time of sending.
         domain: ROS_DOMAIN_ID.
-        full_name: The node's name with its namespace, no slash in front.
-        ids: Numbers the nodes and ends of the session, from 0; None when no other node uses it.
+        full_name: The node's name with its namespace, without a slash in front.
+        ids: Numbers the nodes and endpoints of the session, from 0; None when this is its only
+            node.
 
     Raises:
-        ValueError: the domain or the name is none.
+        ValueError: the domain or the name is invalid.
         TransportError: the session is closed (from `show`).
 
     Threads: every method may be called from any thread.
@@ -127,25 +129,25 @@ class RosNode:
 
     @property
     def full_name(self) -> str:
-        """The node's name with its namespace, no slash in front."""
+        """The node's name with its namespace, without a slash in front."""
         return self.token.full_node
 
     def show(self) -> None:
-        """Show the node itself; its ends show themselves."""
+        """Declare the node's own token; endpoints declare theirs."""
         if self._shown is None:
             self._shown = self.transport.declare_alive(self._key)
 
     def close(self) -> None:
-        """Take the node's own token back; a second call does nothing."""
+        """Undeclare the node's own token; a second call does nothing."""
         shown, self._shown = self._shown, None
         if shown is not None:
             shown.close()
 
     def end(self, kind: Kind, name: str, ros_type: RosType, qos: Qos = DEFAULT) -> End:
-        """Return a new end of the full name `name`, not yet shown to anybody.
+        """Return a new endpoint with the full name `name`; its token is not declared yet.
 
         Raises:
-            ValueError: a name, type or hash is none.
+            ValueError: a name, type or hash is invalid.
         """
         token = self.token._replace(
             entity_id=next(self._ids),
@@ -164,13 +166,13 @@ class RosNode:
         kind: Kind | None = None,
         name: str | None = None,
     ) -> Closable:
-        """Hear of the tokens of this domain: those that are there first, then every change.
+        """Call a function for each token of this domain that is present, then for every change.
 
         Args:
-            callback: Gets what a token says, its key, and whether it is there. It is called on the
-                network's threads and must not wait.
-            kind: None for every kind.
-            name: Full name of a topic or service; None for every one, nodes included.
+            callback: Gets the content of a token, its key, and whether it is present. It is called
+                on the network's threads and must not wait.
+            kind: None: every kind.
+            name: Full name of a topic or service; None: all of them, and nodes.
         """
 
         def on_presence(presence: Presence) -> None:
@@ -182,7 +184,7 @@ class RosNode:
         return self.transport.watch_alive(pattern, on_presence)
 
     def watch_action(self, name: str, callback: Callable[[Token, str, bool], None]) -> Closable:
-        """Hear of the ends of an action, of its servers and of its clients; see `watch`."""
+        """Watch the endpoints of an action's servers and clients; see `watch`."""
         watches = contextlib.ExitStack()
         try:
             for part in action_names(name):
@@ -193,7 +195,7 @@ class RosNode:
         return watches
 
     def list_others(self, timeout: float = LIST_TIMEOUT_S) -> list[Token]:
-        """Return the tokens of other sessions, in every domain; blocks as `list`."""
+        """Return the tokens of other sessions, of all domains; blocks as `list`."""
         found = (parse_token(key) for key in self.transport.list_alive(f"{ROOT}/**", timeout))
         own = self.token.session
         return [token for token in found if token is not None and token.session != own]
@@ -205,7 +207,7 @@ class RosNode:
         name: str | None = None,
         timeout: float = LIST_TIMEOUT_S,
     ) -> list[Token]:
-        """Return what the tokens say that are there now, sorted by key.
+        """Return the tokens that are present, sorted by key.
 
         Blocks: until the network has answered, `timeout` [s] at most.
         """
@@ -215,13 +217,13 @@ class RosNode:
 
 
 class RosServer(NamedTuple):
-    """A server of an action: the node whose five tokens are there.
+    """A server of an action: a node whose five tokens are present.
 
     Attributes:
         session: Id of its network session.
         node: Full name of its node.
         node_id: Number of the node in its session.
-        number: How many came before it, as this program saw them; tokens tell no age.
+        number: How many servers this program has seen before it; tokens contain no time.
     """
 
     session: str
@@ -231,12 +233,12 @@ class RosServer(NamedTuple):
 
     @property
     def age(self) -> tuple[int, str]:
-        """The greater, the later it came."""
+        """Sorts servers by their appearance: the later, the greater."""
         return self.number, self.session
 
 
 class Mismatch(NamedTuple):
-    """A part of an action of which a server has another type or another definition of it."""
+    """A part of an action for which a server has another type or another definition."""
 
     name: str
     own: RosType
@@ -244,7 +246,7 @@ class Mismatch(NamedTuple):
 
 
 class ServerChange(NamedTuple):
-    """A server that appeared or left, and what does not fit."""
+    """A server that appeared or disappeared, and the parts whose types do not fit."""
 
     server: RosServer
     alive: bool
@@ -252,15 +254,15 @@ class ServerChange(NamedTuple):
 
 
 class ActionServers:
-    """Which servers of one action are there: decides, and does nothing.
+    """Derives from tokens which servers of one action are present.
 
-    ROS 2 counts a server as there when it shows the three services and two topics of the action. It
-    compares their types but not the hashes; where only those differ, nobody ever hears a goal. So
-    a server whose tokens differ from ours in either is reported with what differs.
+    As in ROS 2, a server is present when it shows the three services and two topics of the action.
+    ROS 2 compares their types but not the hashes; where only the hashes differ, the keys differ and
+    goals never arrive. So both are compared here, and the differences are reported.
 
     Args:
-        name: The action's full name there.
-        parts: The types of the five ends, in the order of `names.ActionNames`.
+        name: The action's full name on the ROS 2 network.
+        parts: The types of the five parts, in the order of `names.ActionNames`.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -281,10 +283,10 @@ class ActionServers:
         return len(self._servers)
 
     def on_token(self, token: Token, *, alive: bool) -> ServerChange | None:
-        """Take in a token that appeared or vanished; return what that changes, None for nothing."""
+        """Handle a token that appeared or disappeared; return the change of a server, if any."""
         if self._kinds.get(token.name) is not token.kind:
             return None
-        which = token.session, token.node_id
+        which = token.session, token.node_id  # one session may hold several nodes
         seen = self._seen.setdefault(which, set())
         if alive:
             seen.add(token)
@@ -297,13 +299,14 @@ class ActionServers:
             return None
         if not complete:
             return ServerChange(self._servers.pop(which), alive=False)
-        number = self._numbers.setdefault(which, len(self._numbers))  # one that returns is the same
+        # A server that comes back, after its link was down, keeps its number: equal to the old one.
+        number = self._numbers.setdefault(which, len(self._numbers))
         server = RosServer(token.session, token.full_node, token.node_id, number)
         self._servers[which] = server
         return ServerChange(server, alive=True, mismatches=self._mismatches(seen))
 
     def _mismatches(self, tokens: Iterable[Token]) -> tuple[Mismatch, ...]:
-        """Return the parts that have no end of our type and hash."""
+        """Return the parts for which no endpoint has our type and hash."""
         found = {(token.name, RosType(token.type, token.type_hash)) for token in tokens}
         fitting = {name for name, other in found if other == self._types[name]}
         return tuple(

@@ -1,9 +1,9 @@
-"""Notices that a server is not heard any more, long before its tokens say so.
+"""Notices that a link to a server is silent, long before its tokens disappear.
 
-A ROS 2 node takes a link for dead after 60 s of silence. The last status list, which servers keep
-for subscribers that come late, is answered by a node's network threads even while its executor is
-busy, and no callback runs there for it: asking for it again tells whether the link is there. A
-server that has never had a goal keeps no list; it is asked for the result of an unknown goal.
+With the configuration of ROS 2 nodes, Zenoh keeps the tokens of a silent link for 60 s. A probe
+requests the last status list, which servers keep for late subscribers: a node's network threads
+answer that even while its executor is busy, and no callback of the node runs for it. A server that
+has never had a goal has no list yet; it gets a request for the result of an unknown goal.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ WAIT_S = 2.0  # longest wait for the answer to a probe
 
 
 class LinkProbe:
-    """Asks whether a link is there when nothing was heard on it for a while.
+    """Sends a probe when nothing was received on a link for a while.
 
     Args:
-        clock: Gives time.
-        every: After so much silence it asks [s]; 0: never.
-        ask: Asks; whatever is heard then is noted with `hear`. Raises TransportError when the
-            session is closed.
-        wanted: Tells whether anybody is interested, and there is somebody to answer.
-        on_silent: Gets for how long nothing was heard [s], when nothing came in answer either;
-            called again after each further probe without an answer.
+        clock: The clock.
+        every: Sends a probe after this time without a message [s]; 0: never.
+        ask: Sends a probe; the answer is to be noted with `note_received`. Raises TransportError
+            when the session is closed.
+        wanted: Returns whether the link matters now: somebody waits, and a server could answer.
+        on_silent: Gets the time since the last message [s] when a probe was not answered; called
+            again after each further probe without an answer.
 
     Attributes:
-        heard: When something was heard last [s, clock].
+        last_received: When something was received last [s, clock].
 
     Threads: any; the functions are called by the clock's timer thread.
     """
@@ -48,7 +48,7 @@ class LinkProbe:
         wanted: Callable[[], bool],
         on_silent: Callable[[float], None],
     ) -> None:
-        self.heard = clock.now()
+        self.last_received = clock.now()
         self._clock = clock
         self._every = every
         self._ask = ask
@@ -59,16 +59,16 @@ class LinkProbe:
         self._asked: Closable | None = None
         self._closed = False
 
-    def hear(self) -> None:
-        """Note that something was heard."""
-        self.heard = self._clock.now()
+    def note_received(self) -> None:
+        """Note that something was received."""
+        self.last_received = self._clock.now()
 
     def watch(self) -> None:
-        """Look after the link from now on, as long as that is `wanted`."""
+        """Supervise the link from now on, as long as that is `wanted`."""
         self._later(self._every, self._look)
 
     def close(self) -> None:
-        """Ask no more."""
+        """Stop probing."""
         with self._lock:
             self._closed = True
             timer = self._timer
@@ -83,7 +83,9 @@ class LinkProbe:
 
     def _look(self) -> None:
         self._timer = None
-        left = self.heard + self._every - self._clock.now()  # rounded, it lets time pass
+        # Summed in this order, it is at least one step of the clock's float. `every - (now -
+        # last_received)` can be so small that a timer for it fires at the same time, without end.
+        left = self.last_received + self._every - self._clock.now()
         if not self._wanted():
             self._keep(None)
         elif left > 0:
@@ -97,15 +99,15 @@ class LinkProbe:
 
     def _judge(self) -> None:
         self._timer = None
-        quiet = self._clock.now() - self.heard
+        quiet = self._clock.now() - self.last_received
         if quiet < self._every:
             self._keep(None)
         elif self._wanted():
-            self._on_silent(quiet)  # what was asked stays open: a late answer counts, too
+            self._on_silent(quiet)  # the probe stays open: a late answer counts as well
         self.watch()
 
     def _keep(self, asked: Closable | None) -> None:
-        """Close the last question; keep `asked` instead."""
+        """Close the last probe and keep `asked` instead."""
         with self._lock:
             last, self._asked = self._asked, asked
         if last is not None:

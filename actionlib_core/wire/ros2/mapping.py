@@ -1,9 +1,9 @@
-"""What a name of ours is on a network of ROS 2: its name and type there, and the way of messages.
+"""Maps a name of this program to ROS 2: its name and type there, and conversions of its messages.
 
-A ROS 2 class goes to ROS 2 as it is. A ROS 1 class does where the configuration says so: the names
-in `ros2.names`, those of a `ros2.robot`, and those in `ros2.map`. Its counterpart is the ROS 2 type
-that `map` gives, else one that is known here (move_base is navigate_to_pose), else the one of the
-same name.
+Names with a ROS 2 class are on ROS 2 without further settings. Names with a ROS 1 class are where
+the configuration says so: the names in `ros2.names`, those of a `ros2.robot`, and those in
+`ros2.map`. The ROS 2 type is the one in `map`, else a successor that is known here (move_base
+becomes navigate_to_pose), else the type of the same name.
 """
 
 from __future__ import annotations
@@ -28,22 +28,23 @@ if TYPE_CHECKING:
 
     Convert = Callable[[Any], Any]
 
-_OF_PROGRAMS = frozenset({"std_msgs", "std_srvs"})
+_PACKAGES_OF_PROGRAMS = frozenset({"std_msgs", "std_srvs"})
+"""Not taken to a robot by `ALL_NAMES`: missions use them among themselves."""
 KNOWN_ACTIONS = {
     "move_base_msgs/MoveBase": ("move_base", "navigate_to_pose", "nav2_msgs/NavigateToPose"),
 }
-"""ROS 1 actions whose successors have other names: their usual name, that of ROS 2, its type."""
+"""ROS 1 actions with successors: their usual name, the name on ROS 2, the type on ROS 2."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActionOnRos2:
-    """An action of ours as it is on ROS 2.
+    """An action as it is on ROS 2.
 
     Attributes:
-        name: Full name, as we would call it; the network's namespace is put before it there.
+        name: Full name on ROS 2, still without the network's namespace.
         action: Its ROS 2 class.
-        to_goal: Makes the goal there of one of ours.
-        from_goal: The other way round, for servers.
+        to_goal: Converts a goal of this program to ROS 2.
+        from_goal: The opposite direction, for servers.
         to_result: As `to_goal`.
         from_result: As `from_goal`, for clients.
         to_feedback: As `to_goal`.
@@ -62,13 +63,13 @@ class ActionOnRos2:
 
 @dataclass(frozen=True, slots=True)
 class MessageOnRos2:
-    """A topic of ours, or one direction of a service, as it is on ROS 2.
+    """A topic, or one direction of a service, as it is on ROS 2.
 
     Attributes:
-        name: As for `ActionOnRos2`.
+        name: As in `ActionOnRos2`.
         message: Its ROS 2 class.
-        to_ros2: Makes a message of that class of one of ours.
-        from_ros2: The other way round.
+        to_ros2: Converts a message of this program to that class.
+        from_ros2: The opposite direction.
     """
 
     name: str
@@ -78,15 +79,15 @@ class MessageOnRos2:
 
 
 def find_network(node: Node, name: str, cls: Any) -> Ros2 | None:
-    """Return the network of ROS 2 that a full name is on, None when it is on our own wire.
+    """Return the ROS 2 network of a full name; None when the name is on our own wire.
 
     Args:
-        node: Whose configuration counts.
+        node: Its configuration is used.
         name: Of an action, topic or service.
         cls: Its class.
 
     Raises:
-        ConfigError: The class is one of ROS 2, and no network has the name.
+        ConfigError: the class is one of ROS 2, and the name is on no network.
     """
     networks = node.config.ros2
     if getattr(cls, "_wire", "ros1") == "ros2":
@@ -94,6 +95,7 @@ def find_network(node: Node, name: str, cls: Any) -> Ros2 | None:
     if not any(is_named(network, name) for network in networks):
         return None
     network = choose_network(networks, name)
+    # When only `ALL_NAMES` matches, the name was not chosen by itself: its type decides.
     others = tuple(pattern for pattern in network.names if pattern != ALL_NAMES)
     if others != network.names and not is_named(replace(network, names=others), name):
         return network if _is_of_robots(network, cls) else None
@@ -101,14 +103,14 @@ def find_network(node: Node, name: str, cls: Any) -> Ros2 | None:
 
 
 def _is_of_robots(network: Ros2, cls: Any) -> bool:
-    """Tell whether `ALL_NAMES` means a type: one of ROS 2 that programs have no use for alone."""
-    if not hasattr(cls, "_type"):  # made by a program, with the attributes of an action
+    """Return whether `ALL_NAMES` applies to a type: ROS 2 has it, and robots use it."""
+    if not hasattr(cls, "_type"):  # a class that only looks like an action, made by a program
         return False
     if cls._type in {f"{known}Action" for known in KNOWN_ACTIONS}:
         return True
     found = ros2_registry(network.distro)
     package, _, short = cls._type.partition("/")
-    if package in _OF_PROGRAMS:
+    if package in _PACKAGES_OF_PROGRAMS:
         return False
     kinds = {"srv": short, "action": short.removesuffix("Action"), "msg": short}
     kind: Kind = "msg"
@@ -120,11 +122,11 @@ def _is_of_robots(network: Ros2, cls: Any) -> bool:
 
 
 def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2:
-    """Return what an action is on a network.
+    """Return an action as it is on a network.
 
     Raises:
-        ConfigError: The action has no counterpart, or fields of its goal, result or feedback have
-            none; all of them.
+        ConfigError: the action, or fields of its goal, result or feedback, have no counterpart;
+            lists all of these fields.
     """
     mapped = _mapped(network, name)
     there, wanted = name, mapped.type if mapped else ""
@@ -132,6 +134,7 @@ def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2
     if types.action._wire == "ros1":
         type_name = type_name.removesuffix("Action")
         if not mapped and type_name in KNOWN_ACTIONS:
+            # The type alone gives the new type; the name changes only if it is the usual one.
             usual, successor, wanted = KNOWN_ACTIONS[type_name]
             front, _, last = name.rpartition("/")
             if last == usual:
@@ -141,6 +144,7 @@ def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2
     problems: list[str] = []
 
     def ways(part: str) -> tuple[Convert, Convert]:
+        # `fields` are "goal.x": "goal.y"; `converter` wants those of one part, "x": "y".
         ours, theirs = getattr(types, part), getattr(action, part.title())
         own = {
             name.partition(".")[2]: counterpart.rpartition(".")[2]
@@ -156,7 +160,7 @@ def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2
 
 
 def message_on_ros2(network: Ros2, name: str, cls: Any) -> MessageOnRos2:
-    """Return what a topic with a message class is on a network; raises as `action_on_ros2`."""
+    """Return a topic as it is on a network; raises as `action_on_ros2`."""
     mapped = _mapped(network, name)
     theirs = _looked_up(network, name, "message", (mapped and mapped.type) or cls._type)
     problems: list[str] = []
@@ -169,10 +173,10 @@ def message_on_ros2(network: Ros2, name: str, cls: Any) -> MessageOnRos2:
 def service_on_ros2(
     network: Ros2, name: str, cls: Any
 ) -> tuple[type[ros2.Ros2Service], MessageOnRos2, MessageOnRos2]:
-    """Return what a service is on a network: its class there, the request and the response.
+    """Return a service as it is on a network: its ROS 2 class, the request and the response.
 
     Raises:
-        ConfigError: As `action_on_ros2`.
+        ConfigError: as `action_on_ros2`.
     """
     mapped = _mapped(network, name)
     theirs = _looked_up(network, name, "service", (mapped and mapped.type) or cls._type)
@@ -213,7 +217,10 @@ def _looked_up(network: Ros2, name: str, kind: str, type_name: str) -> Any:
 def _ways(
     ours: Any, theirs: Any, fields: dict[str, str], problems: list[str]
 ) -> tuple[Convert, Convert]:
-    """Return what makes a message of theirs of one of ours, and the other way round."""
+    """Return the conversions from `ours` to `theirs` and back; add what does not fit to `problems`.
+
+    Every field of `ours` needs a counterpart, in both directions; ROS 2 may have more fields.
+    """
     try:
         return (
             converter(ours, theirs, fields, whole="source"),
@@ -221,4 +228,5 @@ def _ways(
         )
     except CorrespondenceError as error:
         problems += error.problems
+        # Placeholders: the caller raises when it has collected the problems of all parts.
         return (lambda message: message), (lambda message: message)

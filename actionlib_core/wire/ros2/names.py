@@ -1,7 +1,7 @@
-"""What ROS 2 nodes call their ends on Zenoh: keys, liveliness tokens, quality of service, actions.
+"""How ROS 2 nodes name their endpoints on Zenoh: keys, liveliness tokens, QoS, action names.
 
-Names in full have no slash in front here, as everywhere in this package; types are those of ROS 2
-with their kind, `nav2_msgs/action/NavigateToPose`. Everything here is pure.
+Full names have no slash in front, as everywhere in this package; types are those of ROS 2 with
+their kind, `nav2_msgs/action/NavigateToPose`. Everything here is pure.
 
 Source:
     rmw_zenoh_cpp 0.6.7 (ROS 2 Kilted), as measured; its `docs/design.md` names the parts.
@@ -16,20 +16,21 @@ from typing import NamedTuple
 
 ROOT = "@ros2_lv"
 HASH_NOT_SUPPORTED = "TypeHashNotSupported"  # what ROS 2 Humble writes in place of every hash
-NO_GOAL = bytes(16)  # the id that a cancel of several goals carries; no goal has it
+NO_GOAL = bytes(16)  # the id in a request to cancel several goals; no goal has it
 
-NODE_WORDS = 9
-END_WORDS = 13
+NODE_WORDS = 9  # words of a node's token
+END_WORDS = 13  # words of an endpoint's token: name, type, hash and QoS in addition
 UUID_BYTES = 16
 
-_FORBIDDEN = re.compile(r"[*$?#/%\s]|[^\x20-\x7e]")  # Zenoh's own characters, and the escape of "/"
+# Zenoh gives * $ ? # and / a meaning in keys; % is rmw_zenoh's escape for "/".
+_FORBIDDEN = re.compile(r"[*$?#/%\s]|[^\x20-\x7e]")
 _TIMES = re.compile(r"\d*,\d*:\d*,\d*:[0-3]?,\d*,\d*", re.ASCII)
 _UUID = re.compile(r"[0-9a-f]{32}")
 _NUMBER = re.compile(r"[0-9]{1,20}")  # 64 bits
 
 
 class Kind(StrEnum):
-    """What shows a token."""
+    """The kind of entity that a token belongs to."""
 
     NODE = "NN"
     PUBLISHER = "MP"
@@ -42,14 +43,14 @@ _KINDS = frozenset(kind.value for kind in Kind)
 
 
 class Qos(NamedTuple):
-    """Quality of service of an end: what it promises or expects; it never prevents a match.
+    """Quality of service that an endpoint offers or expects; it never prevents a match.
 
     Attributes:
-        reliable: False is "best effort".
-        latched: Late subscriptions get the last messages; ROS 2 calls it "transient local".
-        depth: How many messages or requests wait for the end.
-        keep_all: All of them wait; `depth` says nothing then.
-        rest: Deadline, lifespan and liveliness, as they are written.
+        reliable: False: "best effort".
+        latched: Late subscribers get the last messages; ROS 2 calls it "transient local".
+        depth: Length of the queue for messages or requests.
+        keep_all: The queue is unlimited, and `depth` has no meaning.
+        rest: Deadline, lifespan and liveliness, as in the token.
     """
 
     reliable: bool = True
@@ -59,27 +60,27 @@ class Qos(NamedTuple):
     rest: str = ",:,:,,"
 
 
-DEFAULT = Qos()  # services, feedback, and a topic of which nothing was said
+DEFAULT = Qos()  # services, feedback, and topics without further settings
 LATCHED = Qos(latched=True, depth=1)  # the status of actions, maps
-_UNWRITTEN_DEPTH = 42  # rmw_zenoh leaves out what equals its own default
+_UNWRITTEN_DEPTH = 42  # rmw_zenoh's default; tokens leave out values that equal the default
 
 
 class Token(NamedTuple):
-    """What a token says of a node or of one of its ends.
+    """The content of a token: it describes a node or one of its endpoints.
 
     Attributes:
         domain: ROS_DOMAIN_ID.
         session: Id of the Zenoh session, lower-case hexadecimal.
         node_id: Number of the node in its session.
-        entity_id: Number of the end in its session.
-        kind: What shows the token.
+        entity_id: Number of the node or endpoint in its session.
+        kind: The kind of entity.
         enclave: Security enclave, "" without one.
-        namespace: Of the node, without slashes around it; "" is the root.
+        namespace: Of the node, without a slash at either side; "" is the root.
         node: The node's base name.
         name: Full name of the topic or service; "" for a node.
         type: "pkg/kind/Type"; "" for a node.
         type_hash: RIHS01 hash of the type, or `HASH_NOT_SUPPORTED`; "" for a node.
-        qos: None for a node, and when it cannot be read.
+        qos: None for a node, or when it cannot be parsed.
     """
 
     domain: int
@@ -97,7 +98,7 @@ class Token(NamedTuple):
 
     @property
     def full_node(self) -> str:
-        """Full name of the node, no slash in front."""
+        """Full name of the node, without a slash in front."""
         return f"{self.namespace}/{self.node}" if self.namespace else self.node
 
 
@@ -112,18 +113,18 @@ class ActionNames(NamedTuple):
 
 
 def action_names(name: str) -> ActionNames:
-    """Return the names of what the action `name` consists of."""
+    """Return the names of the services and topics of the action `name`."""
     return ActionNames(*(f"{name}/_action/{word}" for word in ActionNames._fields))
 
 
 def action_of(name: str) -> str | None:
-    """Return the action that a topic or service belongs to; None when it is no part of one."""
+    """Return the action to which a topic or service belongs; None when it belongs to none."""
     front, found, part = name.partition("/_action/")
     return front if found and front and part in ActionNames._fields else None
 
 
 def dds_type(type_name: str) -> str:
-    """Return a type as keys and tokens write it: `std_msgs::msg::dds_::String_`.
+    """Return a type as in keys and tokens: `std_msgs::msg::dds_::String_`.
 
     Raises:
         ValueError: it is not "pkg/kind/Type".
@@ -139,7 +140,7 @@ def dds_type(type_name: str) -> str:
 
 
 def ros_type(dds_name: str) -> str:
-    """Return "pkg/kind/Type" of what a key or token names; other text comes back as it is."""
+    """Return "pkg/kind/Type" for a type in a key or token; other text is returned unchanged."""
     words = dds_name.split("::")
     if len(words) == 4 and words[2] == "dds_" and words[3].endswith("_"):  # noqa: PLR2004
         return "/".join((words[0], words[1], words[3][:-1]))
@@ -147,10 +148,10 @@ def ros_type(dds_name: str) -> str:
 
 
 def data_key(domain: int, name: str, type_name: str, type_hash: str) -> str:
-    """Return the key on which all ends of a topic or service meet.
+    """Return the key that all endpoints of a topic or service use.
 
     Raises:
-        ValueError: a part is empty, or holds what a key must not.
+        ValueError: a part is empty, or has a character that is not allowed in keys.
     """
     words = [_check("name", word) for word in name.split("/")]
     return "/".join(
@@ -162,7 +163,7 @@ def token_key(token: Token) -> str:
     """Return the key of a token.
 
     Raises:
-        ValueError: a part is empty where it must not be, or holds what a key must not.
+        ValueError: a part is empty that must not be, or has a character that is not allowed.
     """
     words = [
         ROOT,
@@ -186,9 +187,9 @@ def token_key(token: Token) -> str:
 
 
 def parse_token(key: str) -> Token | None:
-    """Return what a token's key says; None when it is none of ROS 2's.
+    """Return the content of a token; None when the key is not a token of ROS 2.
 
-    Words after the last known one are ignored: newer releases add some.
+    Words after the last known one are ignored: newer releases append some.
     """
     words = key.split("/")
     if len(words) < NODE_WORDS or words[0] != ROOT:
@@ -219,37 +220,34 @@ def parse_token(key: str) -> Token | None:
     )
 
 
-def token_pattern(
-    domain: int, kind: Kind | None = None, *, name: str | None = None, session: str = "*"
-) -> str:
-    """Return the pattern of the tokens of a domain, to watch or list them.
+def token_pattern(domain: int, kind: Kind | None = None, *, name: str | None = None) -> str:
+    """Return a key expression for tokens of a domain, to watch or list them.
 
     Args:
         domain: ROS_DOMAIN_ID.
-        kind: None for every kind, nodes included.
-        name: Full name of a topic or service; None for every one. The ends of an action are those
-            of the five names in `action_names`.
-        session: Only those of this session.
+        kind: None: every kind, nodes included.
+        name: Full name of a topic or service; None: every name.
     """
-    front = f"{ROOT}/{domain}/{session}/*/*/{kind.value if kind else '*'}"
+    front = f"{ROOT}/{domain}/*/*/*/{kind.value if kind else '*'}"
+    # The three stars are enclave, namespace and node.
     return f"{front}/**" if name is None else f"{front}/*/*/*/{_escape('name', name)}/**"
 
 
 def gid_of(key: str) -> bytes:
-    """Return the 16 bytes by which messages name the end that shows the token `key`.
+    """Return the 16 bytes that identify the endpoint with the token `key` in messages.
 
-    They are those of rmw_zenoh: XXH3 of the token, 128 bits, the low half first.
+    They are computed as in rmw_zenoh: XXH3 of the token, 128 bits, the low half first.
     """
-    import xxhash  # here: the names alone are of use without it
+    import xxhash  # here, so that the rest of this module works without it
 
     return xxhash.xxh3_128_digest(key.encode())[::-1]
 
 
 def qos_text(qos: Qos) -> str:
-    """Return quality of service as tokens write it: what equals rmw_zenoh's default is left out.
+    """Return quality of service as in tokens, without the values that equal rmw_zenoh's defaults.
 
     Raises:
-        ValueError: the depth is negative, or `rest` is none that rmw_zenoh writes.
+        ValueError: the depth is negative, or rmw_zenoh would not write such a `rest`.
     """
     if not _TIMES.fullmatch(qos.rest):
         raise ValueError(f"qos: rest: got {qos.rest!r}; expected text like {DEFAULT.rest!r}.")
@@ -265,7 +263,7 @@ def qos_text(qos: Qos) -> str:
 
 
 def parse_qos(text: str) -> Qos | None:
-    """Return what `qos_text` wrote, or None when nobody could have written it."""
+    """Return quality of service from a token; None when the text is malformed."""
     words = text.split(":", 3)
     if len(words) != 4:  # noqa: PLR2004
         return None
@@ -288,10 +286,10 @@ def parse_qos(text: str) -> Qos | None:
 
 
 def goal_uuid(goal_id: str) -> bytes:
-    """Return the 16 bytes that stand for a goal id on this wire: always the same for the same id.
+    """Return the 16 bytes for a goal id on this wire: always the same for the same id.
 
-    An id of 32 hexadecimal digits is those bytes; any other text is digested. Never `NO_GOAL`,
-    which would make a cancel of one goal a cancel of all.
+    32 hexadecimal digits are these bytes; any other text is hashed. The result is never `NO_GOAL`,
+    which would turn the cancel of one goal into a cancel of all.
     """
     if _UUID.fullmatch(goal_id):
         uuid = bytes.fromhex(goal_id)
@@ -301,12 +299,12 @@ def goal_uuid(goal_id: str) -> bytes:
 
 
 def goal_id_text(uuid: bytes) -> str:
-    """Return the goal id of 16 bytes that came from another program: 32 hexadecimal digits."""
+    """Return the goal id for 16 bytes of another program: 32 hexadecimal digits."""
     return bytes(uuid).hex()
 
 
 def _check(what: str, word: str) -> str:
-    """Return one word of a key if it is one."""
+    """Return a word if it may be part of a key, else raise."""
     found = _FORBIDDEN.search(_filled(what, word))
     if found is not None or word.startswith("@"):
         bad = found.group() if found else "@"
@@ -327,7 +325,7 @@ def _number(what: str, number: int) -> str:
 
 
 def _escape(what: str, name: str) -> str:
-    """Return a name as one word, as if it had a slash in front."""
+    """Return a name as one word of a key, with % for each slash and for the one in front."""
     if not name:
         return "%"
     return "".join("%" + _check(what, word) for word in name.split("/"))

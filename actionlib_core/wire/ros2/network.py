@@ -1,4 +1,4 @@
-"""The ROS 2 networks that a node of ours uses: which name is on which, and their sessions."""
+"""The ROS 2 networks that a node of this program uses: the names on each, and their sessions."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable, Transport
 
 _ids: weakref.WeakKeyDictionary[Transport, Iterator[int]] = weakref.WeakKeyDictionary()
-"""What numbers the nodes and ends of a session, which several nodes of ours may share."""
+"""Count the nodes and endpoints of each session, which several nodes may share."""
 
 
 def choose_network(networks: Sequence[Ros2], name: str) -> Ros2:
-    """Return the network that the full name `name` is on.
+    """Return the network for the full name `name`.
 
-    Without any network it is the one that this program has joined anyway, in ROS's domain 0. Of
-    several it is the first that has the robot or a pattern of the name, else the one that names
+    Without any setting it is the network that this program has joined anyway, in ROS domain 0. Of
+    several networks it is the first whose robot or patterns match the name, else the one that has
     neither.
 
     Raises:
-        ConfigError: there are several, and none of them has the name.
+        ConfigError: there are several, and the name belongs to none of them.
     """
     if len(networks) <= 1:
         return networks[0] if networks else Ros2()
@@ -51,7 +51,7 @@ def choose_network(networks: Sequence[Ros2], name: str) -> Ros2:
 
 
 def is_named(network: Ros2, name: str) -> bool:
-    """Tell whether a network's settings say that it has the full name `name`."""
+    """Return whether the settings of a network claim the full name `name`."""
     if any(entry.name == name for entry in network.map):
         return True
     robot = clean_namespace(network.robot)
@@ -60,7 +60,7 @@ def is_named(network: Ros2, name: str) -> bool:
 
 
 def name_there(network: Ros2, name: str) -> str:
-    """Return what the full name `name` is called on a network, no slash in front."""
+    """Return the name on a network of the full name `name` here, without a slash in front."""
     robot, namespace = clean_namespace(network.robot), clean_namespace(network.namespace)
     if robot:
         name = name.removeprefix(f"{robot}/")
@@ -70,7 +70,7 @@ def name_there(network: Ros2, name: str) -> str:
 
 
 def name_here(network: Ros2, name: str) -> str:
-    """Return what we call the full name `name` of a network; the inverse of `name_there`."""
+    """Return the full name here of the name `name` on a network; the inverse of `name_there`."""
     robot, namespace = clean_namespace(network.robot), clean_namespace(network.namespace)
     if namespace:
         name = name.removeprefix(f"{namespace}/")
@@ -78,24 +78,25 @@ def name_here(network: Ros2, name: str) -> str:
 
 
 class RosNetwork:
-    """A network of ROS 2 as one node of ours uses it.
+    """A ROS 2 network as one node of this program uses it.
 
     Attributes:
-        settings: Which network, as the configuration says.
-        ros: Our node there; shown since this was made, with its parameter services.
+        settings: The network's settings in the configuration.
+        ros: The node on that network; visible from the beginning, with its parameter services.
 
     Args:
-        node: Our node; the network is left as it closes.
+        node: The node of this program; the network is left when it closes.
         settings: See above.
 
     Raises:
         TransportError: the network cannot be joined.
 
-    Blocks: making one opens the session, where the network has one of its own.
+    Blocks: while it opens the session, if the network has its own.
     """
 
     def __init__(self, node: Node, settings: Ros2) -> None:
         self.settings = settings
+        # A node that was given its transport (in memory, for tests) uses it for ROS 2 as well.
         owned = bool(settings.router) and node.owns_transport
         transport = _join(node, settings) if owned else node.transport
         self._owned = transport if owned else None
@@ -115,32 +116,32 @@ class RosNetwork:
 
     @property
     def transport(self) -> Transport:
-        """The session there."""
+        """The session on that network."""
         return self.ros.transport
 
     def name(self, name: str) -> str:
-        """Return what our full name `name` is called there."""
+        """Return the name there of the full name `name` here."""
         return name_there(self.settings, name)
 
     def type(self, type_name: str, type_hash: str) -> RosType:
-        """Return a type as it is named there: Humble knows no hashes."""
+        """Return a type as tokens contain it; Humble has no hashes."""
         humble = self.settings.distro == "humble"
         return RosType(type_name, HASH_NOT_SUPPORTED if humble else type_hash)
 
     def _close(self) -> None:
-        if self._owned is not None:
+        if self._owned is not None:  # closing the session withdraws everything in it
             self._owned.close()
-        elif hasattr(self, "ros"):
+        elif hasattr(self, "ros"):  # not yet there when `__init__` has failed
             for declared in reversed(self._parameters):
                 declared.close()
             self.ros.close()
 
 
 def ros_network(node: Node, name: str) -> RosNetwork:
-    """Return the ROS 2 network that our full name `name` is on, joined when it is first needed.
+    """Return the ROS 2 network of the full name `name`; it is joined when it is first needed.
 
     Raises:
-        ConfigError: no network has the name.
+        ConfigError: the name is on no network.
         TransportError: the network cannot be joined.
 
     Blocks: the first time, until the network is joined: `Config.connect_timeout` at most.
@@ -149,7 +150,7 @@ def ros_network(node: Node, name: str) -> RosNetwork:
 
 
 def network_of(node: Node, settings: Ros2) -> RosNetwork:
-    """Return the network with these settings; raises and blocks as `ros_network`."""
+    """Return a node's network with these settings; raises and blocks as `ros_network`."""
     return node.shared(("ros2", settings), lambda: RosNetwork(node, settings))
 
 

@@ -1,10 +1,11 @@
-"""The parameter services that every node of ROS 2 has, for a node of ours.
+"""The parameter services that every ROS 2 node has, for the nodes of this program.
 
-`ros2 param list` asks each node that it sees and waits for those that do not answer. A node of ours
-has the one parameter that all nodes have, `use_sim_time`, and it cannot be changed.
+`ros2 param list` asks each node that it sees and waits for those that do not answer, so a node
+without these services delays it. Our nodes have the parameter that all nodes have, `use_sim_time`,
+and it is read-only.
 
 Source:
-    rclpy's parameter_service.py for names and for what is answered about unknown parameters.
+    rclpy's parameter_service.py: the names, and the answers about unknown parameters.
 """
 
 from __future__ import annotations
@@ -45,11 +46,11 @@ SERVICES = {
 
 
 def serve_parameters(node: RosNode, distro: str) -> list[Closable]:
-    """Offer the parameter services of a node; return what is to be closed, the last first.
+    """Offer the parameter services of a node; return what is to be closed, in reverse order.
 
     Args:
-        node: Ours.
-        distro: By whose definitions.
+        node: The node.
+        distro: The distribution whose definitions are used.
 
     Raises:
         TransportError: the session is closed.
@@ -66,13 +67,13 @@ def serve_parameters(node: RosNode, distro: str) -> list[Closable]:
         ends.append(end)
         take = partial(_take, node, service_class, partial(answer, service, distro))
         declared.append(node.transport.queryable(end.key, take, complete=True))
-    for end in ends:  # last: who sees them may ask at once
+    for end in ends:  # last, because a program that sees them may send a request at once
         end.show()
     return [*declared, *ends]
 
 
 def _take(node: RosNode, service_class: Any, decide: Callable[[Any], Any], query: Query) -> None:
-    """Answer a request, one that cannot be read with an error."""
+    """Answer a request; if it cannot be read, with an error."""
     try:
         asked = unpack_attachment(query.attachment)
         request = service_class.Request.from_cdr(query.payload)
@@ -87,7 +88,7 @@ def _take(node: RosNode, service_class: Any, decide: Callable[[Any], Any], query
 def answer(service: str, distro: str, request: Any) -> Any:
     """Return the response to a request of one of `SERVICES`.
 
-    As rclpy's, a question that names an unknown parameter is answered with an empty list.
+    As in rclpy, a request that names an unknown parameter is answered with an empty list.
     """
     service_class: Any = ros2.get_service(SERVICES[service], distro)
     response = service_class.Response()
@@ -99,7 +100,7 @@ def answer(service: str, distro: str, request: Any) -> Any:
             response.results = [_set([each], distro) for each in request.parameters]
         case "set_parameters_atomically":
             response.result = _set(request.parameters, distro)
-        case _ if set(request.names) - {OWN}:
+        case _ if set(request.names) - {OWN}:  # an unknown one: all lists stay empty
             pass
         case "get_parameters":
             value: Any = ros2.get_message("rcl_interfaces/ParameterValue", distro)
@@ -116,7 +117,7 @@ def answer(service: str, distro: str, request: Any) -> Any:
 
 
 def _set(parameters: list[Any], distro: str) -> Any:
-    """Return what becomes of a wish to set parameters: refused, unless it changes nothing."""
+    """Return the result of setting parameters: refused, unless nothing would change."""
     reasons = [
         READ_ONLY if each.name == OWN else UNKNOWN.format(each.name)
         for each in parameters

@@ -1,9 +1,8 @@
-"""An action server's end of ROS 2's wire: three services and two topics, as rclpy offers them.
+"""An action server's port to ROS 2's wire: three services and two topics, as in rclpy.
 
-A goal is answered once its server accepts or refuses it, after `DECISION_S` at the latest: then it
-counts as accepted, and a refusal after that is shown as an abort. Results are held open for whoever
-asks, and answered when the goal ends. What does not exist there is left out: texts,
-acknowledgements and farewells.
+A goal request is answered when the server accepts or refuses the goal. After `DECISION_S` the goal
+counts as accepted, and a later refusal is shown as an abort. Requests for results are kept open and
+answered when the goal ends. ROS 2 has no status texts, acknowledgements and farewells.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from actionlib_core.interfaces import ros2_action
 from actionlib_core.transport import Quality
 from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.ros2.action_messages import (
-    Canceling,
+    CancelResponse,
     GoalState,
     join_statuses,
     pack_accepted,
-    pack_canceling,
+    pack_cancel_response,
     pack_state,
     pack_with_id,
     unpack_cancel,
@@ -59,17 +58,18 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, PublisherPort, Query
     from actionlib_core.wire.action_types import ActionTypes
-    from actionlib_core.wire.ros2.action_messages import Asked
+    from actionlib_core.wire.ros2.action_messages import CancelRequest
     from actionlib_core.wire.ros2.attachment import Attachment
     from actionlib_core.wire.ros2.graph import End
     from actionlib_core.wire.ros2.names import Token
 
 log = logging.getLogger(__name__)
 
-DECISION_S = 0.2  # a server that has not refused a goal by then has accepted it
-REFUSED_KEPT = 10_000  # ids of refused goals, which ROS 2 counts as unknown
+DECISION_S = 0.2  # a goal that was not refused within this time is answered as accepted
+REFUSED_KEPT = 10_000  # remembered ids of refused goals: for ROS 2 these are unknown
 PUBLISHED = Quality(express=True, block=False)
 STATUS = Quality(express=True, block=False, cache=LATCHED.depth)
+# The state that a goal had before its cancel, where its status still tells it.
 _BEFORE_CANCEL: Mapping[int, GoalCode] = {
     Status.PREEMPTING: GoalCode.EXECUTING,
     Status.PREEMPTED: GoalCode.EXECUTING,
@@ -78,23 +78,23 @@ _BEFORE_CANCEL: Mapping[int, GoalCode] = {
 }
 
 
-class _Asker(NamedTuple):
-    """A request that waits for its answer."""
+class _Request(NamedTuple):
+    """A request that is not answered yet."""
 
     query: Query
     attachment: Attachment
 
 
 class _Undecided(NamedTuple):
-    """A goal of which its client does not know yet whether it is accepted."""
+    """A goal whose request is not answered yet."""
 
-    asker: _Asker
+    request: _Request
     stamp_ns: int
     due: float
 
 
 class _Shown(NamedTuple):
-    """A goal as the list of statuses showed it."""
+    """A goal as the last status list showed it, with its bytes for the next list."""
 
     status: int
     code: GoalCode
@@ -107,9 +107,10 @@ class _Shown(NamedTuple):
 
 
 class RosServerPort:
-    """The ends of an action server on a ROS 2 network; see `ports.make_server_port`.
+    """The server's port on a ROS 2 network; see `ports.make_server_port`.
 
-    Threads: any. The listener is called on the network's threads.
+    Threads: any. The listener is called on the network's threads, never with `_lock` held: it takes
+    the server's lock, and the server calls this port with that lock held.
     """
 
     def __init__(self, node: Node, name: str, types: ActionTypes) -> None:
@@ -141,14 +142,14 @@ class RosServerPort:
         self._status: PublisherPort | None = None
         self._shown: dict[str, _Shown] = {}
         self._undecided: dict[str, _Undecided] = {}
-        self._waiting: dict[str, list[_Asker]] = {}
+        self._waiting: dict[str, list[_Request]] = {}
         self._refused = Recent(REFUSED_KEPT)
         self._clients: set[str] = set()
         self._last_stamp_ns = 0
         self._timer: Timer | None = None
         self._closed = False
 
-    # -- what the server does ------------------------------------------------------------------
+    # -- calls of the server -------------------------------------------------------------------
 
     def open(self, listener: ServerListener) -> None:
         self._listener = listener
@@ -177,7 +178,7 @@ class RosServerPort:
                 (names.send_goal, self._on_goal),
             ):
                 self._declared.append(transport.queryable(keys[name], answer, complete=True))
-            for end in self._ends.values():  # last: who sees them may ask at once
+            for end in self._ends.values():  # last: a client that sees them may send at once
                 end.show()
             self._declared.append(self._ros.watch_action(self._there, self._on_token))
         except BaseException:
@@ -193,13 +194,15 @@ class RosServerPort:
             timer, self._timer = self._timer, None
         if timer is not None:
             timer.cancel()
+        # Tokens first, so that no client sends a new request. Then all open requests are answered:
+        # a client of ROS 2 waits for an answer without a time limit.
         for end in self._ends.values():
             end.close()
         for goal in undecided.values():
-            self._reply(goal.asker, pack_accepted(None))
-        for askers in waiting.values():
-            for asker in askers:
-                self._reply(asker, self._unknown)
+            self._reply(goal.request, pack_accepted(None))
+        for requests in waiting.values():
+            for request in requests:
+                self._reply(request, self._unknown)
         for entry in declared:
             entry.close()
 
@@ -213,10 +216,10 @@ class RosServerPort:
         return True
 
     def send_farewell(self, taken: Iterable[StatusEntry]) -> None:
-        """Send nothing: ROS 2's clients see the tokens go."""
+        """Do nothing: clients of ROS 2 see the tokens disappear."""
 
     def pack_result(self, result: Any) -> bytes:
-        """Return the whole response, with a status that is put in when it is sent."""
+        """Return the whole response; `_response` puts the status in when it is sent."""
         result = self._on_ros2.to_result(result)
         response: bytes = self._response_class(status=0, result=result).to_cdr()
         return response
@@ -231,9 +234,10 @@ class RosServerPort:
     def send_status(self, entries: Iterable[StatusEntry]) -> None:  # noqa: ARG002  see below
         """Send the list of all goals, if anything in it has changed.
 
-        One thread at a time makes the list and sends it, once more when it was asked meanwhile: a
-        list made by another thread may be older than what was sent last, and late subscribers would
-        see it for ever. No lock is held meanwhile, as the caller may hold the server's.
+        Only one thread at a time makes and sends lists; calls in the meantime let it do so once
+        more. If each caller sent its own list, an older one could be sent last, and late
+        subscribers would keep getting it. No lock is held while sending, as the caller may hold the
+        server's lock.
         """
         with self._lock:
             self._status_due = True
@@ -241,26 +245,29 @@ class RosServerPort:
                 return
             self._status_busy = True
         try:
-            while self._takes_up_status():
+            while self._claim_status():
                 self._publish_status(self._listener.list_goals())
         except BaseException:
             self._status_busy = False
             raise
 
-    def _takes_up_status(self) -> bool:
-        """Return whether there is something to say; if not, the thread is done with it."""
+    def _claim_status(self) -> bool:
+        """Return whether a list is due; if not, another thread may send the next one."""
         with self._lock:
             due, self._status_due = self._status_due, False
             self._status_busy = due
             return due
 
     def _publish_status(self, listed: list[StatusEntry]) -> None:
-        """Send the list if it has changed; most goals in it have ended, and are as they were."""
+        """Send the list if it has changed.
+
+        Most goals in it have ended, so their bytes are taken from the list before.
+        """
         before = self._shown
         now: dict[str, _Shown] = {}
-        skipped: dict[str, _Shown] = {}
+        skipped: dict[str, _Shown] = {}  # goals in a state that no list has shown
         for entry in listed:
-            if entry.id in self._undecided:  # it may yet be refused, and never be known
+            if entry.id in self._undecided:  # it may still be refused: then no list may show it
                 continue
             known = before.get(entry.id)
             if known is not None and known.status == entry.status:
@@ -274,7 +281,7 @@ class RosServerPort:
             if earlier > (known.code if known else GoalCode.UNKNOWN):
                 skipped[entry.id] = _Shown.make(entry, earlier)
         if now != before:
-            # A client can tell only from the list before a cancel whether the goal has run.
+            # Clients see only from the list before a cancel whether the goal has been executing.
             for each in (now | skipped, now) if skipped else (now,):
                 payload = join_statuses([shown.packed for shown in each.values()])
                 self._put(self._status, self._names.status, payload)
@@ -285,11 +292,11 @@ class RosServerPort:
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:  # noqa: ARG002  replies never wait
         self._decide(entry.id, accepted=entry.status != Status.REJECTED)
         if entry.status in _BEFORE_CANCEL:
-            self.send_status(())  # tells whether it has run, which the result does not
+            self.send_status(())  # shows whether it has been executing; the result does not
         self._answer(entry.id, self._response(entry, body))
 
     def _response(self, entry: StatusEntry, body: bytes) -> bytes:
-        """Return a result's response: with its status and, where its type has that, the reason."""
+        """Return the response for a result, with its status and, if it has a field, the reason."""
         if entry.text and entry.status in {Status.ABORTED, Status.REJECTED}:
             response = self._response_class.from_cdr(body)
             if give_reason(response.result, entry.text):
@@ -298,7 +305,7 @@ class RosServerPort:
 
     def send_feedback(self, entry: StatusEntry, body: bytes) -> None:
         payload = pack_with_id(goal_uuid(entry.id), body)
-        with self._feedback_lock:
+        with self._feedback_lock:  # attachments are to be sent in the order of their numbers
             self._put(self._feedback, self._names.feedback, payload)
 
     def _put(self, publisher: PublisherPort | None, name: str, payload: bytes) -> None:
@@ -309,7 +316,7 @@ class RosServerPort:
         publisher.put(payload, self._ends[name].attachment())
 
     def _code(self, entry: StatusEntry) -> GoalCode:
-        """Return the state of a goal as ROS 2 sees it: a refused one is not known."""
+        """Return the state of a goal for ROS 2, where a refused goal is unknown."""
         if entry.status == Status.REJECTED and (
             entry.id in self._refused or entry.id in self._undecided
         ):
@@ -319,14 +326,14 @@ class RosServerPort:
     # -- goals ---------------------------------------------------------------------------------
 
     def _on_goal(self, query: Query) -> None:
-        asker = self._asker("a goal", query)
-        if asker is None:
+        request = self._read_request("a goal", query)
+        if request is None:
             return
         try:
             uuid, body = unpack_with_id(query.payload)
             content = self._on_ros2.from_goal(self._goal_class.from_cdr(body))
         except (ValueError, ActionlibError) as error:
-            self._refuse_unreadable("a goal", asker, error)
+            self._refuse_unreadable("a goal", request, error)
             return
         goal_id = goal_id_text(uuid)
         known = self._listener.find_end(goal_id)[0].status != Status.LOST
@@ -334,16 +341,17 @@ class RosServerPort:
             if known or goal_id in self._undecided or self._closed or uuid == NO_GOAL:
                 stamp_ns = None
             else:
+                # Strictly increasing, so that "cancel all goals up to a stamp" is unambiguous.
                 stamp_ns = self._last_stamp_ns = max(self._clock.time_ns(), self._last_stamp_ns + 1)
                 due = self._clock.now() + DECISION_S
-                self._undecided[goal_id] = _Undecided(asker, stamp_ns, due)
+                self._undecided[goal_id] = _Undecided(request, stamp_ns, due)
         if stamp_ns is None:
-            self._reply(asker, pack_accepted(None))
+            self._reply(request, pack_accepted(None))
             return
         taken = False
         try:
             taken = self._listener.on_goal(
-                goal_id, stamp_ns, content, goal_id_text(asker.attachment.gid)
+                goal_id, stamp_ns, content, goal_id_text(request.attachment.gid)
             )
         finally:
             if not taken:
@@ -351,17 +359,17 @@ class RosServerPort:
         self._arm()
 
     def _decide(self, goal_id: str, *, accepted: bool) -> None:
-        """Answer the client that waits to hear about its goal, if it still does."""
+        """Answer the request for a goal, if that was not done before."""
         with self._lock:
             found = self._undecided.pop(goal_id, None)
             if found is None:
                 return
             if not accepted:
                 self._refused.add(goal_id)
-        self._reply(found.asker, pack_accepted(found.stamp_ns if accepted else None))
+        self._reply(found.request, pack_accepted(found.stamp_ns if accepted else None))
 
     def _arm(self) -> None:
-        """Let the timer run when the oldest undecided goal is due."""
+        """Start the timer for the oldest undecided goal, if it does not run."""
         with self._lock:
             if self._timer is None and self._undecided and not self._closed:
                 due = next(iter(self._undecided.values())).due
@@ -381,24 +389,25 @@ class RosServerPort:
     # -- results -------------------------------------------------------------------------------
 
     def _on_result(self, query: Query) -> None:
-        asker = self._asker("a question for a result", query)
-        if asker is None:
+        request = self._read_request("a request for a result", query)
+        if request is None:
             return
         try:
             goal_id = goal_id_text(unpack_id(query.payload))
         except ValueError as error:
-            self._refuse_unreadable("a question for a result", asker, error)
+            self._refuse_unreadable("a request for a result", request, error)
             return
-        with self._lock:  # before looking: the goal may end in between
+        # Before looking whether it has ended: if it ends in between, `send_result` finds this.
+        with self._lock:
             if not self._closed:
-                self._waiting.setdefault(goal_id, []).append(asker)
+                self._waiting.setdefault(goal_id, []).append(request)
         self._answer_ended(goal_id)
 
     def _answer_ended(self, goal_id: str) -> None:
-        """Answer who waits for a goal that has ended or is not known."""
+        """Answer the requests for the result of a goal that has ended or is unknown."""
         entry, body = self._listener.find_end(goal_id)
         if entry.status == Status.REJECTED and goal_id in self._undecided:
-            return  # about to be answered by who refuses it
+            return  # the thread that refuses it is about to answer
         if body is not None:
             self._answer(goal_id, self._response(entry, body))
         elif entry.status in TERMINAL or entry.status == Status.LOST:
@@ -406,12 +415,12 @@ class RosServerPort:
 
     def _answer(self, goal_id: str, response: bytes) -> None:
         with self._lock:
-            askers = self._waiting.pop(goal_id, ())
-        for asker in askers:
-            self._reply(asker, response)
+            requests = self._waiting.pop(goal_id, ())
+        for request in requests:
+            self._reply(request, response)
 
     def _answer_forgotten(self, listed: set[str]) -> None:
-        """Answer who waits for goals that were given up and are no longer in the list."""
+        """Answer requests for the results of goals that the server has dropped from its list."""
         with self._lock:
             missing = self._waiting.keys() - listed
         for goal_id in missing:
@@ -420,26 +429,27 @@ class RosServerPort:
     # -- cancels -------------------------------------------------------------------------------
 
     def _on_cancel(self, query: Query) -> None:
-        asker = self._asker("a cancel", query)
-        if asker is None:
+        request = self._read_request("a cancel", query)
+        if request is None:
             return
         try:
             asked = unpack_cancel(query.payload)
         except ValueError as error:
-            self._refuse_unreadable("a cancel", asker, error)
+            self._refuse_unreadable("a cancel", request, error)
             return
-        self._reply(asker, pack_canceling(self._cancel(asked)))
+        self._reply(request, pack_cancel_response(self._cancel(asked)))
 
-    def _cancel(self, asked: Asked) -> Canceling:
-        """Ask goals to stop; answers with those that now are, and were not before."""
+    def _cancel(self, asked: CancelRequest) -> CancelResponse:
+        """Cancel goals; the response names those that are canceling only since now."""
         goal_id = goal_id_text(asked.uuid)
+        # One goal, by its id alone, has error codes of its own; other requests choose from a list.
         if asked.uuid != NO_GOAL and not asked.stamp_ns:
             code = self._code(self._listener.find_end(goal_id)[0])
             if code == GoalCode.UNKNOWN:
-                return Canceling(CancelCode.UNKNOWN_GOAL, ())
+                return CancelResponse(CancelCode.UNKNOWN_GOAL, ())
             asked_now = [] if code in ENDED else self._listener.on_cancel(goal_id, 0)
             if not asked_now:
-                return Canceling(CancelCode.GOAL_TERMINATED, ())
+                return CancelResponse(CancelCode.GOAL_TERMINATED, ())
         else:
             asked_now = [
                 now_asked
@@ -447,14 +457,17 @@ class RosServerPort:
                 for now_asked in self._listener.on_cancel(entry.id, 0)
             ]
         goals = tuple((goal_uuid(entry.id), entry.stamp_ns) for entry in asked_now)
-        return Canceling(CancelCode.NONE, goals)
+        return CancelResponse(CancelCode.NONE, goals)
 
     # -- requests ------------------------------------------------------------------------------
 
-    def _asker(self, what: str, query: Query) -> _Asker | None:
-        """Return who asks; one that does not say so as ROS 2 does gets an error."""
+    def _read_request(self, what: str, query: Query) -> _Request | None:
+        """Return a request with its attachment; without a valid one it is answered with an error.
+
+        The reply's attachment is made from the request's, so no other answer is possible.
+        """
         try:
-            return _Asker(query, unpack_attachment(query.attachment))
+            return _Request(query, unpack_attachment(query.attachment))
         except ValueError as error:
             text = f"action '{self._name}': {what} cannot be answered: {error}"
             self._readable.report(what, ActionlibError(text))
@@ -462,20 +475,20 @@ class RosServerPort:
             query.finish()
             return None
 
-    def _refuse_unreadable(self, what: str, asker: _Asker, error: Exception) -> None:
-        """Answer a request that cannot be read; a sender that goes on like this is told of once."""
-        sender = asker.attachment.gid.hex()
+    def _refuse_unreadable(self, what: str, request: _Request, error: Exception) -> None:
+        """Answer a request that cannot be read with an error, and log that once per sender."""
+        sender = request.attachment.gid.hex()
         text = f"action '{self._name}': {what} of client {sender} cannot be read: {error}"
         self._readable.report(f"{sender} {what}", ActionlibError(text))
-        asker.query.reply_error(text)
-        asker.query.finish()
+        request.query.reply_error(text)
+        request.query.finish()
 
-    def _reply(self, asker: _Asker, payload: bytes) -> None:
-        attachment = answer_to(asker.attachment, self._clock.time_ns())
-        asker.query.reply(payload, attachment=attachment)
-        asker.query.finish()
+    def _reply(self, request: _Request, payload: bytes) -> None:
+        attachment = answer_to(request.attachment, self._clock.time_ns())
+        request.query.reply(payload, attachment=attachment)
+        request.query.finish()
 
-    # -- who is there --------------------------------------------------------------------------
+    # -- clients and other servers -------------------------------------------------------------
 
     def _on_token(self, token: Token, key: str, alive: bool) -> None:
         if any(token == end.token for end in self._ends.values()):
@@ -502,12 +515,12 @@ class RosServerPort:
         return ServerConflictError(self._name, *((there, own) if stays else (own, there)))
 
 
-def choose_cancelled(goals: Iterable[StatusEntry], asked: Asked) -> list[StatusEntry]:
-    """Return the goals that a cancel of several is about: all, or those up to a stamp and one more.
+def choose_cancelled(goals: Iterable[StatusEntry], asked: CancelRequest) -> list[StatusEntry]:
+    """Return the active goals that a request to cancel several selects.
 
     Args:
         goals: All goals of the server.
-        asked: A cancel with a stamp, or without both.
+        asked: With a stamp: the goals up to it, and the one with the id. Without both: all goals.
     """
     everything = asked.uuid == NO_GOAL and not asked.stamp_ns
     goal_id = goal_id_text(asked.uuid)

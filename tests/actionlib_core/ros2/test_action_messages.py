@@ -12,21 +12,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actionlib_core.wire.ros2.action_messages import (
-    FRONT,
-    Asked,
-    Canceling,
+    CDR_HEADER,
+    CancelRequest,
+    CancelResponse,
     GoalState,
     find_states,
     pack_accepted,
     pack_cancel,
-    pack_canceling,
+    pack_cancel_response,
     pack_id,
     pack_statuses,
     pack_with_id,
     status_in,
     unpack_accepted,
     unpack_cancel,
-    unpack_canceling,
+    unpack_cancel_response,
     unpack_id,
     unpack_statuses,
     unpack_with_id,
@@ -44,7 +44,7 @@ CALLS = [line for line in GOLDEN if line["kind"] == "call" and "_action" in line
 
 uuids = st.binary(min_size=16, max_size=16)
 stamps = st.integers(0, (2**31 - 1) * 10**9)
-readers = [unpack_with_id, unpack_id, unpack_accepted, unpack_cancel, unpack_canceling]
+readers = [unpack_with_id, unpack_id, unpack_accepted, unpack_cancel, unpack_cancel_response]
 readers += [unpack_statuses, status_in]
 
 
@@ -88,12 +88,12 @@ def answers(line: dict[str, Any]) -> tuple[Any, bytes, Any]:
             stamp_of(values["stamp"]) if values["accepted"] else None,
         )
     if "cancel_goal" in line["key"]:
-        answer = unpack_canceling(raw)
+        answer = unpack_cancel_response(raw)
         goals = tuple(
             (bytes.fromhex(info["goal_id"]), stamp_of(info["stamp"]))
             for info in values["goals_canceling"]
         )
-        return answer, pack_canceling(answer), Canceling(values["return_code"], goals)
+        return answer, pack_cancel_response(answer), CancelResponse(values["return_code"], goals)
     return status_in(raw), with_status(raw, status_in(raw)), values["status"]
 
 
@@ -128,9 +128,9 @@ def test_status_lists_survive(goals: list[GoalState]) -> None:
 
 @given(uuids, stamps, st.binary(max_size=40))
 def test_requests_survive(uuid: bytes, stamp_ns: int, body: bytes) -> None:
-    assert unpack_with_id(pack_with_id(uuid, FRONT + body)) == (uuid, FRONT + body)
+    assert unpack_with_id(pack_with_id(uuid, CDR_HEADER + body)) == (uuid, CDR_HEADER + body)
     assert unpack_id(pack_id(uuid)) == uuid
-    assert unpack_cancel(pack_cancel(Asked(uuid, stamp_ns))) == (uuid, stamp_ns)
+    assert unpack_cancel(pack_cancel(CancelRequest(uuid, stamp_ns))) == (uuid, stamp_ns)
 
 
 @given(
@@ -140,7 +140,10 @@ def test_answers_survive(
     stamp: int | None, code: int, goals: tuple[tuple[bytes, int], ...]
 ) -> None:
     assert unpack_accepted(pack_accepted(stamp)) == stamp
-    assert unpack_canceling(pack_canceling(Canceling(code, goals))) == (code, goals)
+    assert unpack_cancel_response(pack_cancel_response(CancelResponse(code, goals))) == (
+        code,
+        goals,
+    )
 
 
 @given(st.integers(-(2**80), 2**80))
@@ -168,9 +171,9 @@ def test_big_endian_is_read() -> None:
 def test_an_id_of_another_length_is_not_written(uuid: bytes) -> None:
     for write in (
         lambda: pack_id(uuid),
-        lambda: pack_with_id(uuid, FRONT),
-        lambda: pack_cancel(Asked(uuid, 0)),
-        lambda: pack_canceling(Canceling(0, ((uuid, 0),))),
+        lambda: pack_with_id(uuid, CDR_HEADER),
+        lambda: pack_cancel(CancelRequest(uuid, 0)),
+        lambda: pack_cancel_response(CancelResponse(0, ((uuid, 0),))),
         lambda: pack_statuses([GoalState(uuid, 0, 1)]),
     ):
         with pytest.raises(ValueError, match="goal id"):

@@ -22,12 +22,11 @@ from actionlib_core.node import Node
 from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.action_messages import pack_accepted
-from actionlib_core.wire.ros2.client_port import AT_ONCE
+from actionlib_core.wire.ros2.client_port import ANSWER_S, MAX_IN_FLIGHT
 from actionlib_core.wire.ros2.goal_exchange import SETTLED_S
 from actionlib_core.wire.ros2.graph import RosNode
 from actionlib_core.wire.ros2.link_probe import LinkProbe
 from actionlib_core.wire.ros2.names import Kind, goal_uuid
-from actionlib_core.wire.ros2.question import ANSWER_S
 from tests.ros2_server import Ros2Server
 
 
@@ -282,7 +281,7 @@ def test_many_goals_never_overfill_the_queue_of_a_server(world):
     handles = [client.send_goal(Fibonacci.Goal(order=1)) for _ in range(100)]
     assert all(handle.wait(30.0) for handle in handles)
     assert {handle.get_goal_status() for handle in handles} == {Status.SUCCEEDED}
-    assert most <= AT_ONCE
+    assert most <= MAX_IN_FLIGHT
     assert len(server.sent) == len(set(server.sent)) == 100
 
 
@@ -296,7 +295,7 @@ def test_goals_that_end_before_their_acceptance_arrives_make_room_for_others(wor
 
     server.on_goal = end_first
     server.on_result = lambda query, uuid: server.answer_result(query, server.states.get(uuid, 0))
-    handles = [client.send_goal(Fibonacci.Goal(order=1)) for _ in range(5 * AT_ONCE)]
+    handles = [client.send_goal(Fibonacci.Goal(order=1)) for _ in range(5 * MAX_IN_FLIGHT)]
     assert all(handle.wait(5.0) for handle in handles)
     assert len(server.sent) == len(handles)
 
@@ -541,8 +540,8 @@ def test_look_that_rounding_makes_come_too_early_lets_time_pass(clock):
     clock.sleep(26.5)
     probe.watch()
     clock.sleep(4.8)
-    probe.hear()
-    assert clock.now() + 0.2 + (5.0 - 0.2) - probe.heard < 5.0
+    probe.note_received()
+    assert clock.now() + 0.2 + (5.0 - 0.2) - probe.last_received < 5.0
     clock.sleep(5.5)
     probe.close()
     assert asked == [pytest.approx(36.3)]

@@ -19,9 +19,9 @@ def sent(now=0.0):
 
 def test_accepted_goal_is_told_and_its_result_asked_for_at_once():
     goal = sent()
-    assert goal.on_answer(accepted=True) == Step.TELL | Step.ASK
+    assert goal.on_answer(accepted=True) == Step.NOTIFY | Step.ASK
     assert (goal.phase, goal.status) == (Phase.TAKEN, Status.PENDING)
-    assert goal.on_state(2) == Step.TELL
+    assert goal.on_state(2) == Step.NOTIFY
     assert goal.status is Status.ACTIVE
     assert goal.on_result(4, 1.0) == Step.END
     assert goal.status is Status.SUCCEEDED
@@ -33,7 +33,7 @@ def test_refusal_of_the_only_sending_is_a_refusal():
 
 def test_refusal_whose_state_came_first_is_a_refusal_too():
     goal = sent()
-    assert goal.on_state(1) & Step.TELL
+    assert goal.on_state(1) & Step.NOTIFY
     assert goal.on_answer(accepted=False) == Step.REFUSED
 
 
@@ -49,7 +49,7 @@ def test_doubt_is_settled_by_the_result_of_the_same_id():
     goal = sent()
     assert goal.on_unanswered() == Step.ASK
     assert goal.want() == Step.NOTHING  # the question is open: the server has the goal, or is slow
-    assert goal.on_state(2) == Step.TELL
+    assert goal.on_state(2) == Step.NOTIFY
     assert goal.on_result(6, 1.0) == Step.END
     assert goal.status is Status.ABORTED
 
@@ -69,7 +69,7 @@ def test_refused_repetition_of_a_goal_that_runs_is_followed():
     goal.on_result(0, 1.0)
     goal.on_sent(1.0)
     goal.on_answer(accepted=False)
-    assert goal.on_state(2) & Step.TELL
+    assert goal.on_state(2) & Step.NOTIFY
     assert goal.on_result(5, 3.0) == Step.END
 
 
@@ -97,7 +97,7 @@ def test_accepted_goal_that_the_server_forgot_is_lost():
 
 def test_feedback_before_the_answer_shows_that_the_goal_runs():
     goal = sent()
-    assert goal.on_feedback() == Step.TELL | Step.ASK
+    assert goal.on_feedback() == Step.NOTIFY | Step.ASK
     assert goal.status is Status.ACTIVE
     assert goal.on_answer(accepted=True) == Step.NOTHING
     assert goal.on_state(1) == Step.NOTHING
@@ -106,7 +106,7 @@ def test_feedback_before_the_answer_shows_that_the_goal_runs():
 def test_states_that_were_overtaken_say_nothing():
     goal = sent()
     goal.on_answer(accepted=True)
-    assert goal.on_state(3) == Step.TELL
+    assert goal.on_state(3) == Step.NOTIFY
     assert goal.status is Status.PREEMPTING  # a list that was skipped may have shown that it ran
     assert goal.on_state(2) == Step.NOTHING
     assert goal.on_state(99) == Step.NOTHING
@@ -157,9 +157,9 @@ def test_cancel_of_what_no_server_has_recalls_it():
 def test_cancel_before_the_answer_goes_out_with_the_acceptance():
     goal = sent()
     assert goal.cancel() == Step.NOTHING
-    assert goal.on_answer(accepted=True) == Step.TELL | Step.ASK | Step.CANCEL
+    assert goal.on_answer(accepted=True) == Step.NOTIFY | Step.ASK | Step.CANCEL
     assert goal.cancel(again=True) == Step.NOTHING
-    assert goal.on_cancel_answer(0, listed=True) == Step.TELL
+    assert goal.on_cancel_answer(0, listed=True) == Step.NOTIFY
     assert goal.status is Status.PREEMPTING
     assert goal.cancel() == Step.NOTHING
 

@@ -123,7 +123,7 @@ def test_a_token_survives_the_way_through_its_key(token: Token) -> None:
         token_pattern(token.domain),
         token_pattern(token.domain, token.kind),
         token_pattern(token.domain, name=token.name),
-        token_pattern(token.domain, token.kind, name=token.name, session=token.session),
+        token_pattern(token.domain, token.kind, name=token.name),
     ):
         assert key_matches(pattern, key)
     assert not key_matches(token_pattern(token.domain + 1), key)

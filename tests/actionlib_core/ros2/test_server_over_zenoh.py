@@ -17,7 +17,7 @@ from actionlib_core.action.server import ActionServer, ServerGoalHandle
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
-from actionlib_core.wire.ros2.action_messages import unpack_accepted, unpack_canceling
+from actionlib_core.wire.ros2.action_messages import unpack_accepted, unpack_cancel_response
 from actionlib_core.wire.ros2.attachment import unpack_attachment
 from tests.ros2_client import Ros2Client
 from tests.ros2_robot import DOMAIN
@@ -118,9 +118,9 @@ def test_captured_conversations_word_by_word(robot: Ros2Robot) -> None:
             assert found == (values["status"], values["result"]["sequence"]), line["what"]
         elif "refused" in line["what"] or "none cancelable" in line["what"]:
             # Servers here cannot refuse a cancel; the list names what is canceling, and truly.
-            assert unpack_canceling(payload).code == 0
+            assert unpack_cancel_response(payload).code == 0
         else:
-            found = unpack_canceling(payload)
+            found = unpack_cancel_response(payload)
             assert found.code == values["return_code"], line["what"]
             asked = [uuid.hex() for uuid, _ in found.goals]
             assert asked == [goal["goal_id"] for goal in values["goals_canceling"]], line["what"]

@@ -22,8 +22,8 @@ from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.action_messages import (
-    Asked,
-    Canceling,
+    CancelRequest,
+    CancelResponse,
     pack_id,
     pack_with_id,
     unpack_accepted,
@@ -207,7 +207,7 @@ def test_a_refused_goal_is_no_goal(world: World) -> None:
     assert unpack_accepted(pending.answer().payload) is None
     assert client.end_of(result) == (0, Fibonacci.Result())
     assert client.end_of(client.result(uuid)) == (0, Fibonacci.Result())
-    assert client.cancel(uuid) == Canceling(2, ())
+    assert client.cancel(uuid) == CancelResponse(2, ())
     world.settle()
     assert codes(client) == {}
 
@@ -224,7 +224,7 @@ def test_who_decides_late_has_accepted_and_a_later_refusal_is_an_abort(world: Wo
     assert client.end_of(client.result(uuid)) == (6, Fibonacci.Result(sequence=[7]))
     world.settle()
     assert codes(client) == {uuid: 6}
-    assert client.cancel(uuid) == Canceling(3, ())
+    assert client.cancel(uuid) == CancelResponse(3, ())
 
 
 def test_a_callback_that_blocks_holds_up_nobody_else(world: World) -> None:
@@ -283,21 +283,21 @@ def test_cancel_of_one_goal(world: World) -> None:
     uuid, other = world.send(client), world.send(client)
     goal, untouched = world.goals
     answer = client.cancel(uuid)
-    assert answer == Canceling(0, ((uuid, goal.record.stamp_ns),))
-    assert client.cancel(uuid) == Canceling(3, ())
-    assert client.cancel(new_id()) == Canceling(2, ())
+    assert answer == CancelResponse(0, ((uuid, goal.record.stamp_ns),))
+    assert client.cancel(uuid) == CancelResponse(3, ())
+    assert client.cancel(new_id()) == CancelResponse(2, ())
     world.settle()
     assert world.cancelled == [goal]
     assert codes(client) == {uuid: 3, other: 2}
     goal.set_canceled()
-    assert client.cancel(uuid) == Canceling(3, ())
+    assert client.cancel(uuid) == CancelResponse(3, ())
     assert untouched.record.status is Status.ACTIVE
 
 
 def test_cancel_of_all_and_by_stamp(world: World) -> None:
     world.serve()
     client = world.client()
-    assert client.cancel(NO_GOAL) == Canceling(0, ())
+    assert client.cancel(NO_GOAL) == CancelResponse(0, ())
     ids = []
     for _ in range(4):
         ids.append(world.send(client))
@@ -307,7 +307,7 @@ def test_cancel_of_all_and_by_stamp(world: World) -> None:
     assert client.cancel(NO_GOAL, stamps[1]).goals == tuple(zip(ids[:2], stamps[:2], strict=True))
     assert client.cancel(ids[3], stamps[1]).goals == ((ids[3], stamps[3]),)
     assert client.cancel(NO_GOAL).goals == ((ids[2], stamps[2]),)
-    assert client.cancel(NO_GOAL) == Canceling(0, ())
+    assert client.cancel(NO_GOAL) == CancelResponse(0, ())
     late = world.send(client)
     assert world.goals[-1].record.status is Status.ACTIVE
     far = client.cancel(NO_GOAL, world.clock.time_ns() + 10**18)
@@ -333,7 +333,7 @@ def test_a_cancel_of_an_unknown_goal_does_not_reach_one_that_comes_later(world: 
     world.serve()
     client = world.client()
     uuid = new_id()
-    assert client.cancel(uuid) == Canceling(2, ())
+    assert client.cancel(uuid) == CancelResponse(2, ())
     assert client.accepted(uuid, Fibonacci.Goal()) is not None
 
 
@@ -575,10 +575,13 @@ def test_which_goals_a_cancel_is_about() -> None:
         for number, status in enumerate([Status.ACTIVE, Status.SUCCEEDED, Status.PENDING] * 2, 1)
     ]
     running = [goal for goal in goals if goal.status is not Status.SUCCEEDED]
-    assert choose_cancelled(goals, Asked(NO_GOAL, 0)) == running
-    assert choose_cancelled(goals, Asked(NO_GOAL, 300)) == [goals[0], goals[2]]
-    assert choose_cancelled(goals, Asked(bytes.fromhex(goals[5].id), 100)) == [goals[0], goals[5]]
-    assert choose_cancelled(goals, Asked(NO_GOAL, 99)) == []
+    assert choose_cancelled(goals, CancelRequest(NO_GOAL, 0)) == running
+    assert choose_cancelled(goals, CancelRequest(NO_GOAL, 300)) == [goals[0], goals[2]]
+    assert choose_cancelled(goals, CancelRequest(bytes.fromhex(goals[5].id), 100)) == [
+        goals[0],
+        goals[5],
+    ]
+    assert choose_cancelled(goals, CancelRequest(NO_GOAL, 99)) == []
 
 
 @pytest.mark.parametrize("accepted", [True, False])
