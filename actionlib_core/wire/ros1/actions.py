@@ -1,4 +1,4 @@
-"""One bridged action, with its server on either side."""
+"""One bridged action, whose server is on either network."""
 
 from __future__ import annotations
 
@@ -53,19 +53,25 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("actionlib_core")
 
-OVERTAKEN_S = 0.05
-STATUS_S = 0.005  # changes within so long are one list
-NEXT_S = 2.0  # a server here that has left may be followed by another
-ACKNOWLEDGE_S = 5.0  # results: clients in ROS 1 take a goal that is no longer listed for lost
+OVERTAKEN_S = 0.05  # longest wait for feedback that was sent before a result
+STATUS_S = 0.005  # of the status lists within this time only the last is passed on
+NEXT_S = 2.0  # a server here that has left may be replaced by another within this time
+# Results are acknowledged after this time, since our servers then stop listing the goal, and a
+# client in ROS 1 counts a goal that is not listed as lost.
+ACKNOWLEDGE_S = 5.0
 GOAL_ID = Typed(GoalID._type, GoalID._md5sum)
 STATUS_ARRAY = Typed(GoalStatusArray._type, GoalStatusArray._md5sum)
 _PARTS = {"action_goal": "goal", "action_result": "result", "action_feedback": "feedback"}
 
 
 def action_type(parts: dict[str, Typed]) -> Typed:
-    """Return the type of an action from those of its topics, by their last word.
+    """Return the type of an action from the types of its topics.
 
-    Source: ROS 1's checksum of a message whose three fields are messages.
+    The checksum follows from ROS 1's rule: the fields of XAction are messages, and in the text that
+    is hashed the checksum of a message stands in place of its type.
+
+    Args:
+        parts: Last word of the topic -> its type.
 
     Raises:
         Ros1Error: the goal's type is not "pkg/XActionGoal".
@@ -79,14 +85,14 @@ def action_type(parts: dict[str, Typed]) -> Typed:
 
 
 class ActionBridge:
-    """An action on both sides. Its server is looked for in ROS 1 unless it shows a token here.
+    """An action on both networks. Its server is expected in ROS 1 unless there is one here.
 
     Args:
         sides: The two networks.
         name: Its name in ROS 1.
-        type_name: "pkg/XAction" if it is known; "" if not.
-        definitions: Texts of types.
-        status_timeout: A server in ROS 1 that says nothing for so long is not there [s].
+        type_name: "pkg/XAction"; "" if it is unknown.
+        definitions: The definitions of types.
+        status_timeout: A server in ROS 1 without a status list for this time counts as gone [s].
 
     Threads: `look` and `close` from one thread.
     """
@@ -107,11 +113,11 @@ class ActionBridge:
         self._side: ServerInRos | ServerHere | None = None
 
     def look(self, ends: Collection[Endpoint], state: SystemState) -> None:
-        """Bridge what is there now.
+        """Update what is bridged.
 
         Args:
-            ends: The ends of that name here that belong to no bridge.
-            state: Who is there in ROS 1.
+            ends: The endpoints of that name on our network, without those of bridges.
+            state: The master's registrations.
         """
         ends = [end for end in ends if end.kind in {Kind.ACTION_CLIENT, Kind.ACTION_SERVER}]
         servers = [end for end in ends if end.kind is Kind.ACTION_SERVER]
@@ -121,6 +127,7 @@ class ActionBridge:
             text = f"got {sorted(rivals)} in ROS 1 and one of node '{servers[0].node}' here"
             error = Ros1Error(f"action {self._name}", f"two servers: {text}; expected one.")
             self._sides.ros.report(f"two servers of {self._name}", error)
+        # With a server on both networks, the one that is bridged already stays.
         here = bool(servers) and not (rivals and isinstance(side, ServerInRos))
         stays = side.look(servers) if isinstance(side, ServerHere) else not here
         if side is not None and not stays:
@@ -138,7 +145,7 @@ class ActionBridge:
             side.check_silence()
 
     def close(self) -> None:
-        """Bridge no more; does not wait."""
+        """End the bridge; does not wait."""
         if self._side is not None:
             self._side.close()
 
@@ -148,14 +155,17 @@ def _eldest(servers: Collection[Endpoint]) -> Endpoint:
 
 
 class ServerInRos:
-    """An action whose server is in ROS 1: shown here while all five connections to it last.
+    """An action whose server is in ROS 1: shown here while all five connections to it are open.
+
+    The five are its topics: `goal` and `cancel`, to which it subscribes, and `status`, `feedback`
+    and `result`, which it publishes.
 
     Args:
         sides: The two networks.
         name: The action's name in ROS 1.
-        definitions: Learns the texts of its types.
+        definitions: Gets the definitions of its types.
         status_timeout: See `ActionBridge`.
-        type_name: "pkg/XAction"; "" if it is not known.
+        type_name: "pkg/XAction"; "" if it is unknown.
     """
 
     def __init__(
@@ -172,17 +182,18 @@ class ServerInRos:
         self._definitions = definitions
         self._status_timeout = status_timeout
         self._lock = threading.Lock()
-        # Node in ROS 1 -> which of the five -> links with their types, the newest last.
+        # Node in ROS 1 -> last word of the topic -> links with their types, the newest last. There
+        # may be several: those to a process that hangs, and those to its successor.
         self._links: dict[str, dict[str, dict[object, Typed]]] = {}
         self._shown: _Shown | None = None
-        self._silent = ""  # node that was there but says nothing any more
-        self._heard = 0.0
+        self._silent = ""  # the node that was hidden because it sends no status lists
+        self._last_status = 0.0
         self._closed = False
         goal_type = f"{type_name}Goal" if type_name else ""
         self._goals = self._advertise("goal", goal_type, "")
         self._cancels = self._advertise("cancel", *GOAL_ID)
         self._subscriptions = {
-            word: sides.ros.subscribe(f"{name}/{word}", partial(_Part, self, word))
+            word: sides.ros.subscribe(f"{name}/{word}", partial(_ServerTopic, self, word))
             for word in ("status", "feedback", "result")
         }
 
@@ -198,7 +209,7 @@ class ServerInRos:
         )
 
     def close(self) -> None:
-        """Bridge no more; does not wait."""
+        """End the bridge; does not wait."""
         with self._lock:
             self._closed = True
             self._hide()
@@ -207,21 +218,21 @@ class ServerInRos:
         for subscription in self._subscriptions.values():
             subscription.close()
 
-    # -- who is there in ROS 1 -----------------------------------------------------------------
+    # -- the server in ROS 1 -------------------------------------------------------------------
 
     def _accept(self, word: str, header: Header) -> Callable[[], object]:
-        """Take a subscriber of goals or cancels."""
+        """Handle a new subscriber of goals or cancels."""
         if ANY in {header.get("type"), header.get("md5sum")}:
-            return lambda: None  # it takes any message, to record it: no server
+            return lambda: None  # it accepts any type, as rosbag does to record: it is no server
         node, link = header.get("callerid", ""), object()
         self.connect(node, word, link, type_of(header, f"{self._name}/{word}"))
         return partial(self.disconnect, node, word, link)
 
     def connect(self, node: str, word: str, link: object, typed: Typed) -> None:
-        """Note that a node is connected with one of the five; with all, it is the server.
+        """Note a link to a node for one of the five topics; a node with all five is the server.
 
-        A process that comes under the name of another one, which ROS 1 ends then, takes its place
-        even if the links to that one have not ended: its computer may have lost its power.
+        A new process under the name of the server takes its place even if the old links have not
+        ended: the old process may hang, or its computer may have lost power.
         """
         with self._lock:
             self._links.setdefault(node, {}).setdefault(word, {})[link] = typed
@@ -238,7 +249,7 @@ class ServerInRos:
                 self._show(node)
 
     def disconnect(self, node: str, word: str, link: object) -> None:
-        """Note that one of the five has ended: the server is not there any more."""
+        """Note that a link has ended: without all five, a node is no server."""
         with self._lock:
             words = self._links[node]
             del words[word][link]
@@ -246,6 +257,7 @@ class ServerInRos:
                 del words[word]
             if not words:
                 del self._links[node]
+            # Another node, or a successor of the same name, may be complete already.
             if self._shown is not None and link in self._shown.links:
                 self._hide()
                 whole = (n for n in self._links if len(self._newest(n)) == len(ACTION_WORDS))
@@ -254,11 +266,11 @@ class ServerInRos:
                     self._show(other)
 
     def _newest(self, node: str) -> dict[str, object]:
-        """Return the newest link of each of the five to a node; with the lock held."""
+        """Return the newest link to a node for each topic that has one. Needs the lock."""
         return {word: next(reversed(links)) for word, links in self._links.get(node, {}).items()}
 
     def _show(self, node: str) -> None:
-        """Show the server; with the lock held."""
+        """Show the server on our network. Needs the lock."""
         newest = self._newest(node)
         types = {word: self._links[node][word][link] for word, link in newest.items()}
         try:
@@ -266,7 +278,7 @@ class ServerInRos:
         except Ros1Error as error:
             self._sides.ros.report(f"type of {self._name}", error)
             return
-        self._heard, self._silent = self._clock.now(), ""
+        self._last_status, self._silent = self._clock.now(), ""
         links = frozenset(newest.values())
         to_server = self._goals, self._cancels
         self._shown = _Shown(self._sides, self._name, typed, types, node, links, to_server)
@@ -277,10 +289,10 @@ class ServerInRos:
             shown.close()
 
     def check_silence(self) -> None:
-        """Hide a server whose status lists have stopped: it hangs, and so would its clients."""
+        """Hide a server that sends no status lists: it hangs, and its clients would wait for it."""
         with self._lock:
             shown, now = self._shown, self._clock.now()
-            if shown is None or now < self._heard + self._status_timeout:
+            if shown is None or now < self._last_status + self._status_timeout:
                 return
             self._silent = shown.ros_node
             self._hide()
@@ -289,10 +301,10 @@ class ServerInRos:
             *(self._name, self._silent, self._status_timeout),
         )
 
-    # -- what it says --------------------------------------------------------------------------
+    # -- its messages --------------------------------------------------------------------------
 
     def take(self, node: str, word: str, link: object, payload: bytes) -> None:
-        """Pass on what a node says on `status`, `feedback` or `result`."""
+        """Pass on a message of a node on `status`, `feedback` or `result`."""
         with self._lock:
             if word == "status" and node == self._silent and self._shown is None:
                 newest = self._newest(node)
@@ -302,8 +314,10 @@ class ServerInRos:
             if shown is None or link not in shown.links:
                 return
             if word == "status":
-                self._heard = self._clock.now()
-        if word == "result":  # what was sent before on another connection comes before, here too
+                self._last_status = self._clock.now()
+        # Each topic has its own connection and thread: let feedback that was sent before the result
+        # go first.
+        if word == "result":
             self._subscriptions["feedback"].wait_idle(OVERTAKEN_S)
         try:
             getattr(shown, f"on_{word}")(payload)
@@ -312,17 +326,18 @@ class ServerInRos:
             self._sides.ros.report(about, Ros1Error(about, str(error)))
 
     def learn(self, header: Header, typed: Typed) -> None:
-        """Learn the text of a type from a publisher."""
+        """Keep the definition of a type from a publisher's header."""
         self._definitions.learn(typed, header.get("message_definition", ""))
 
 
-class _Part:
-    """One of the three topics that a server in ROS 1 publishes on."""
+class _ServerTopic:
+    """A server's connection for one of the three topics that it publishes."""
 
     def __init__(self, server: ServerInRos, word: str, header: Header) -> None:
         typed = type_of(header, word)
-        # Long lists are slow to read, and in ROS 1 one comes right before a result: it goes first.
-        self.within = STATUS_S if word == "status" else 0.0
+        # A server in ROS 1 sends a status list right before each result. Reading long lists is
+        # slow, so the list waits here and the result is passed on first.
+        self.coalesce_s = STATUS_S if word == "status" else 0.0
         self._server = server
         self._word = word
         self._node = header.get("callerid", "")
@@ -337,7 +352,7 @@ class _Part:
 
 
 class _Shown:
-    """A server in ROS 1 as it is here: token, topics, and answers about its goals."""
+    """A server in ROS 1, shown on our network: token, topics, and answers about its goals."""
 
     def __init__(
         self,
@@ -375,11 +390,12 @@ class _Shown:
             transport.subscribe(keys.ack, self._on_ack, history=False),
             transport.queryable(keys.result, self._on_query),
         ]
+        # Last, and in this order: clients that see the token may send at once, and look here first.
         in_process.servers[self._own_key] = self
         self._declared.append(transport.declare_alive(self._own_key))
 
     def close(self) -> None:
-        """Show it no more: its clients' goals are LOST at once."""
+        """Withdraw it: its clients' goals are LOST at once."""
         in_process.servers.pop(self._own_key, None)
         for each in reversed(self._declared):
             each.close()
@@ -387,16 +403,16 @@ class _Shown:
     # -- from ROS 1 ----------------------------------------------------------------------------
 
     def on_status(self, payload: bytes) -> None:
-        """Pass on a status list, but for those of an idle server, which say nothing."""
+        """Pass on a status list, except the empty lists that an idle server keeps sending."""
         entries = unpack_statuses(payload)
         with self._lock:
             news = self._goals.on_statuses(entries)
         if news:
-            with contextlib.suppress(TransportError):  # hidden meanwhile
+            with contextlib.suppress(TransportError):  # withdrawn meanwhile
                 self._status.put(payload)
 
     def on_feedback(self, payload: bytes) -> None:
-        """Take feedback."""
+        """Pass on feedback."""
         if self._clients:
             sample = self._sample("feedback", payload)
             for client in list(self._clients):
@@ -404,7 +420,7 @@ class _Shown:
         self._feedback.put(payload)
 
     def on_result(self, payload: bytes) -> None:
-        """Take a result."""
+        """Keep a result and pass it on."""
         entry, _ = unpack_report(payload)
         with self._lock:
             self._goals.on_result(entry, payload, self._clock.now())
@@ -434,13 +450,13 @@ class _Shown:
         """See `in_process.ServerInProcess`."""
         self._pass_on(sample, self._goals.on_direct_goal)
 
-    # -- from clients here ---------------------------------------------------------------------
+    # -- from clients on our network -----------------------------------------------------------
 
     def _on_goal(self, sample: Sample) -> None:
         if not self._sides.is_own(sample):
             self._pass_on(sample, self._goals.on_goal)
 
-    def _pass_on(self, sample: Sample, judge: Callable[[str], Verdict]) -> None:
+    def _pass_on(self, sample: Sample, decide: Callable[[str], Verdict]) -> None:
         if not self._sides.fits(sample, self._types["goal"]):
             return
         try:
@@ -450,9 +466,9 @@ class _Shown:
             return
         other = parse_token(frame) if frame and frame != self._own_key else None
         if other is not None and other.kind is Kind.ACTION_SERVER and other.name == self._name:
-            return  # a late copy of a goal for a server that was here before
+            return  # a late repetition of a goal for the server before this one
         with self._lock:
-            verdict = judge(goal_id)
+            verdict = decide(goal_id)
             result = self._goals.result(goal_id)
         if verdict is Verdict.PASS:
             self._to_server[0].put(sample.payload)
@@ -473,7 +489,7 @@ class _Shown:
             self._goals.on_acknowledged(entry.id for entry in entries)
 
     def _on_query(self, query: Query) -> None:
-        """Answer what became of a goal; without an id, the status list."""
+        """Answer with the result or status of a goal; without an id, with the status list."""
         try:
             goal_id = unpack_goal_id(query.payload)[0]
         except ValueError as error:
@@ -503,8 +519,8 @@ class ServerHere:
     Args:
         sides: The two networks.
         name: The action's name in ROS 1.
-        server: What its token says.
-        definitions: Texts of types.
+        server: The server's endpoint.
+        definitions: The definitions of types.
     """
 
     def __init__(self, sides: Sides, name: str, server: Endpoint, definitions: Definitions) -> None:
@@ -515,13 +531,13 @@ class ServerHere:
         self._keys = action_keys(sides.key(name))
         self._lock = threading.Lock()
         self._goals = GoalsOfClients()
-        self._clients: dict[str, Closable] = {}  # token's key -> token
+        self._clients: dict[str, Closable] = {}  # key of the token -> token, of clients in ROS 1
         self._publishers: dict[tuple[str, Quality], PublisherPort] = {}
         self._goal_encoding = ""
         self._timer: Timer | None = None
         self._acks: list[str] = []
-        self._has_said_farewell = False
-        self._is_next_heard = False  # the server that follows it has sent a status list
+        self._farewell_received = False
+        self._next_server_seen = False  # after the farewell, its successor has sent a status list
         self._gone_since: float | None = None
         self._closed = False
         self._publications: dict[str, Publication] = {}
@@ -535,8 +551,8 @@ class ServerHere:
                 latching=word == "status",
                 accept=lambda _header: lambda: None,
             )
-        # Clients in ROS 1 wait for a status list, and an idle server here sends none.
-        self._say_nothing_runs()
+        # Clients in ROS 1 find a server by its status list, and an idle server here sends none.
+        self._publish_empty_status()
         transport, keys = sides.node.transport, self._keys
         self._subscribed: list[Closable] = [
             transport.subscribe(keys.status, self._on_status, history=False),
@@ -549,13 +565,13 @@ class ServerHere:
         ]
 
     def look(self, servers: Collection[Endpoint]) -> bool:
-        """Follow the server; return whether to go on.
+        """Follow the server or its successor; return whether to go on bridging.
 
-        Goals are LOST with their server. Those that it had not taken when it said farewell, and
-        those that come now, are for the next one, which has `NEXT_S` to come.
+        Goals are LOST with their server. The goals that it had not accepted when it sent its
+        farewell, and goals that arrive now, are for a successor that appears within `NEXT_S`.
 
         Args:
-            servers: The servers of the action here.
+            servers: The servers of the action on our network.
         """
         now = self._clock.now()
         if self.server in servers:
@@ -563,26 +579,30 @@ class ServerHere:
         if self._gone_since is None:
             self._gone_since = now
             with self._lock:
-                if not self._has_said_farewell:
-                    self._goals.lose_unheard()
-                if not self._is_next_heard:  # else it would hide the goals that the next one has
-                    self._say_nothing_runs()
+                # A farewell lists all goals that the server has accepted; without one, it may have
+                # started any of them.
+                if not self._farewell_received:
+                    self._goals.drop_unacknowledged()
+                # Clients in ROS 1 count goals that are not listed as lost. Not when the successor
+                # has already listed its goals.
+                if not self._next_server_seen:
+                    self._publish_empty_status()
         typed = self.server.type, self.server.md5
         fitting = [end for end in servers if (end.type, end.md5) == typed]
         if fitting:
             self.server, self._gone_since = _eldest(fitting), None
-            self._has_said_farewell = self._is_next_heard = False
+            self._farewell_received = self._next_server_seen = False
             return True
         return not servers and now < self._gone_since + NEXT_S
 
     def close(self) -> None:
-        """Bridge no more: clients in ROS 1 hear that no goal is left; does not wait."""
+        """End the bridge: clients in ROS 1 get an empty status list; does not wait."""
         with self._lock:
             self._closed = True
             if self._timer is not None:
                 self._timer.cancel()
             publishers = list(self._publishers.values())
-        self._say_nothing_runs()
+        self._publish_empty_status()
         for part in (*self._subscribed, *publishers):
             part.close()
         for subscription in self._subscriptions:
@@ -590,14 +610,14 @@ class ServerHere:
         for publication in self._publications.values():
             publication.close()
 
-    def _say_nothing_runs(self) -> None:
+    def _publish_empty_status(self) -> None:
         empty = pack_statuses(self._clock.time_ns(), ())
         self._publications["status"].put(empty, keep="")
 
     # -- from clients in ROS 1 -----------------------------------------------------------------
 
     def join(self, ros_node: str) -> tuple[str, Closable]:
-        """Show a client in ROS 1 here; returns its token's key, and the token."""
+        """Show a client in ROS 1 on our network; return its token's key, and the token."""
         node = self._sides.node
         typed = self.server.type, self.server.md5
         end = node.endpoint(Kind.ACTION_CLIENT, self.server.name, *typed)
@@ -608,14 +628,14 @@ class ServerHere:
         return key, token
 
     def leave(self, key: str) -> None:
-        """Show a client no more."""
+        """Withdraw a client."""
         with self._lock:
             token = self._clients.pop(key, None)
         if token is not None:
             token.close()
 
     def on_goal(self, typed: Typed, payload: bytes) -> None:
-        """Pass on a goal; blocks while our network has no room."""
+        """Pass on a goal; blocks while a link of our network is full."""
         goal_id, _, _ = unpack_goal(payload)
         with self._lock:
             self._goal_encoding = typed.encoding
@@ -628,7 +648,7 @@ class ServerHere:
         self._publisher(self._keys.cancel, typed.encoding, GOAL).put(payload)
 
     def report(self, about: str, error: ValueError) -> None:
-        """Report what cannot be read."""
+        """Report a message that cannot be read."""
         self._sides.ros.report(about, Ros1Error(about, str(error)))
 
     def _publisher(self, key: str, encoding: str, quality: Quality) -> PublisherPort:
@@ -660,9 +680,9 @@ class ServerHere:
                 self._goals.on_status(entry, self._clock.now())
             self._arm()
             is_farewell = parse_token(frame) is not None
-            if self._has_said_farewell and not is_farewell:
-                self._is_next_heard = True
-            self._has_said_farewell |= is_farewell
+            if self._farewell_received and not is_farewell:
+                self._next_server_seen = True
+            self._farewell_received |= is_farewell
             clients = list(self._clients) if is_farewell else []
         self._publications["status"].put(sample.payload, keep="")
         with contextlib.suppress(TransportError):  # closed meanwhile
@@ -685,6 +705,7 @@ class ServerHere:
             return
         with self._lock:
             first = self._goals.on_result(entry.id)
+            # Goals of clients on our network are acknowledged by these themselves.
             if self._goals.is_ours(entry.id):
                 self._acks.append(entry.id)
                 if len(self._acks) == 1:
@@ -692,7 +713,7 @@ class ServerHere:
         if first:
             self._publications["result"].put(payload)
 
-    # -- what is sent again --------------------------------------------------------------------
+    # -- acknowledgements and repetitions ------------------------------------------------------
 
     def _send_acks(self) -> None:
         with self._lock:
@@ -706,7 +727,7 @@ class ServerHere:
         self._publisher(self._keys.ack, STATUS_ARRAY.encoding, ACK).put(message)
 
     def _arm(self) -> None:
-        """Have `_send_due` called when something is due; with the lock held."""
+        """Start the timer for the next repetition, if it does not run. Needs the lock."""
         due = self._goals.next_due()
         if due is None or self._timer is not None or self._closed:
             return
@@ -741,7 +762,7 @@ class ServerHere:
 class _Client:
     """A publisher of goals or cancels in ROS 1."""
 
-    within = 0.0
+    coalesce_s = 0.0
 
     def __init__(self, server: ServerHere, word: str, header: Header) -> None:
         self._typed = type_of(header, word)
@@ -752,6 +773,7 @@ class _Client:
 
     def take(self, payload: bytes) -> None:
         """Pass on a goal or cancel."""
+        # Called in the connection's thread: while it waits for our network, ROS 1 buffers.
         try:
             if self._word == "goal":
                 self._server.on_goal(self._typed, payload)
@@ -761,13 +783,13 @@ class _Client:
             self._server.report(self._about, error)
 
     def gone(self) -> None:
-        """Show the client no more."""
+        """Withdraw the client."""
         if self._token:
             self._server.leave(self._token)
 
 
 def _types_of(server: Endpoint) -> dict[str, Typed]:
-    """Return the types of the topics of an action of ours; checksums "" where it is not known."""
+    """Return the types of the topics of an action on our network; checksum "" if it is unknown."""
     types = {"status": STATUS_ARRAY}
     fits = _known(server.type) == (server.type, server.md5)
     for word in ("feedback", "result"):
@@ -777,7 +799,7 @@ def _types_of(server: Endpoint) -> dict[str, Typed]:
 
 
 def _known(type_name: str) -> Typed | None:
-    """Return a type with the checksum that it has in this program, None if it has none."""
+    """Return a type with its checksum in this program; None if this program does not have it."""
     from actionlib_core.interfaces import get_message
 
     try:

@@ -1,4 +1,4 @@
-"""What the XML-RPC interfaces of master and nodes answer, read and checked. No network.
+"""Reads and checks the answers of the XML-RPC interfaces of master and nodes. No network.
 
 Source:
     https://wiki.ros.org/ROS/Master_API and https://wiki.ros.org/ROS/Slave_API.
@@ -24,7 +24,7 @@ def read_answer(peer: str, method: str, answer: object) -> Any:
     """Return the value of an answer `[code, text, value]`.
 
     Raises:
-        Ros1Error: it is none, or its code is not that of success.
+        Ros1Error: it is malformed, or its code is not `SUCCESS`.
     """
     if not isinstance(answer, (list, tuple)) or len(answer) != _PARTS:
         raise Ros1Error(peer, f"{method}: got {answer!r:.200}; expected [code, text, value].")
@@ -35,7 +35,7 @@ def read_answer(peer: str, method: str, answer: object) -> Any:
 
 
 def read_texts(peer: str, method: str, value: object) -> list[str]:
-    """Return a list of texts; raises as `read_answer`."""
+    """Return `value` if it is a list of texts; raises as `read_answer`."""
     if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
         raise Ros1Error(peer, f"{method}: got {value!r:.200}; expected a list of texts.")
     return list(value)
@@ -45,13 +45,13 @@ def split_address(peer: str, uri: object, scheme: str) -> tuple[str, int]:
     """Return host and port of `http://host:port/` or `rosrpc://host:port`.
 
     Raises:
-        Ros1Error: it is none.
+        Ros1Error: it is not such an address.
     """
     try:
         parts = urlsplit(uri if isinstance(uri, str) else "")
         if parts.scheme == scheme and parts.hostname and parts.port:
             return parts.hostname, parts.port
-    except ValueError:  # a port that is no number
+    except ValueError:  # raised by `parts.port` when it is not a number
         pass
     raise Ros1Error(peer, f"address: got {uri!r:.200}; expected {scheme}://HOST:PORT.")
 
@@ -71,7 +71,7 @@ def read_tcpros(peer: str, value: object) -> tuple[str, int]:
 
 @dataclass(frozen=True)
 class SystemState:
-    """Who publishes, subscribes and serves what, as the master knows it: name -> nodes' names."""
+    """The master's registrations: names of topics and services -> names of nodes."""
 
     publishers: dict[str, list[str]] = field(default_factory=dict)
     subscribers: dict[str, list[str]] = field(default_factory=dict)
@@ -87,7 +87,7 @@ class SystemState:
         try:
             parts = [
                 {str(name): [str(node) for node in nodes] for name, nodes in part}
-                for part in value  # type: ignore[attr-defined]  # that is what is tried
+                for part in value  # type: ignore[attr-defined]  # checked by trying
             ]
             return cls(*parts)
         except (TypeError, ValueError) as error:
@@ -108,7 +108,7 @@ def read_types(peer: str, value: object) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Names:
-    """The names that a node is registered with, or is to be."""
+    """The topics and services with which a node is registered, or wants to be."""
 
     published: frozenset[str] = frozenset()
     subscribed: frozenset[str] = frozenset()
@@ -123,7 +123,7 @@ class Names:
 
 
 def registered(state: SystemState, node: str) -> Names:
-    """Return what the master has registered under the name of a node."""
+    """Return what the master has registered for a node."""
 
     def of(part: dict[str, list[str]]) -> frozenset[str]:
         return frozenset(name for name, nodes in part.items() if node in nodes)
@@ -135,11 +135,13 @@ ACTION_WORDS = ("goal", "cancel", "status", "feedback", "result")
 
 
 def find_actions(types: dict[str, str], names: Iterable[str]) -> dict[str, str]:
-    """Return the actions among topics, name -> type "pkg/XAction".
+    """Return the actions among topics: name -> type "pkg/XAction".
+
+    The master knows no actions, only their five topics.
 
     Args:
         types: Topic -> its type.
-        names: The topics that are there.
+        names: The topics that have publishers or subscribers.
     """
     there: Collection[str] = set(names)
     found = {}

@@ -1,4 +1,4 @@
-"""The bridge: looks at both networks, decides which names are bridged, and keeps them so."""
+"""The bridge: watches both networks, decides which names are bridged, and bridges them."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ B = TypeVar("B", ActionBridge, TopicBridge, ServiceBridge)
 
 log = logging.getLogger("actionlib_core")
 
-LOOK_S = 1.0  # a ROS 1 master tells nobody of new services, subscribers, or that it was restarted
-BRIDGES = "@smachpy_ros1"
+# A ROS 1 master announces neither new services and subscribers nor its own restart, so it is asked.
+LOOK_S = 1.0
+BRIDGES = "@smachpy_ros1"  # prefix of the tokens by which bridges find each other
 CLOSE_S = 5.0
 
 
@@ -42,24 +43,25 @@ class Ros1Bridge:
     """Carries actions, topics and services between a ROS 1 robot and our network.
 
     Args:
-        node: On our network, the bridge's alone: what its session sends is not bridged. It is
-            closed with the bridge.
+        node: The node on our network, for the bridge only: messages of its session are not bridged.
+            The bridge closes it.
         master: Address of the robot's master, "http://robot:11311".
-        wanted: What is bridged.
-        namespace: What the robot's names live under here, "robot_1"; "" is nothing.
+        wanted: The names to bridge.
+        namespace: Prefix of the robot's names on our network, "robot_1"; "" for none.
         host: Name or address under which the robot finds this computer; see `Ros1Node`.
-        status_timeout: An action server in ROS 1 that says nothing for so long is gone [s].
+        status_timeout: An action server in ROS 1 without a status list for this time counts as
+            gone [s].
         service_timeout: Longest time of a service call through the bridge [s].
 
     Attributes:
-        name: The bridge's node in ROS 1.
-        plan: What is bridged now.
+        name: Name of the bridge's node in ROS 1.
+        plan: The names that are bridged now.
 
     Raises:
         Ros1Error: the master's address cannot be used.
         TransportError: the node is closed.
 
-    Threads: its own. Every method may be called from any thread.
+    Threads: has its own. Every method may be called from any thread.
     """
 
     def __init__(
@@ -120,15 +122,15 @@ class Ros1Bridge:
     def wait_for_master(self, timeout: float | None = None) -> bool:
         """Wait until the master has answered once; return whether it has.
 
-        Blocks: `timeout` [s] at most; None: until then, or until the bridge is closed.
+        Blocks: `timeout` [s] at most; None: until it has answered or the bridge is closed.
         """
         self._looked.wait(timeout)
         return self._answered
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the bridge has ended, by itself or closed; return whether it has.
+        """Wait until the bridge has ended by itself or was closed; return whether it has.
 
-        Blocks: `timeout` [s] at most; None: until then.
+        Blocks: `timeout` [s] at most; None: until it has ended.
         """
         return self._over.wait(timeout)
 
@@ -136,10 +138,10 @@ class Ros1Bridge:
         """Return a parameter of the robot's parameter server, or a tree of them as a dict.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no parameter of that name.
             Ros1Error: the master does not answer.
 
-        Blocks: some seconds at most.
+        Blocks: a few seconds at most.
         """
         full = name if name.startswith("/") else f"/{name}"
         if not self._ros.ask("hasParam", full):
@@ -151,25 +153,25 @@ class Ros1Bridge:
         return sorted(map(str, self._ros.ask("getParamNames")))
 
     def state(self) -> SystemState:
-        """Return which nodes of the robot publish, listen and serve, by name.
+        """Return the nodes of the robot that publish, subscribe and serve, by name.
 
         Raises:
             Ros1Error: the master does not answer.
 
-        Blocks: some seconds at most.
+        Blocks: a few seconds at most.
         """
         return without(self._ros.state(), BRIDGE)
 
     def published_topics(self) -> dict[str, str]:
-        """Return the topics that nodes of the robot publish, name -> type; as `state`."""
+        """Return the topics that nodes of the robot publish, name -> type; raises as `state`."""
         topics = self.state().publishers
         types = self._ros.types()
         return {topic: types.get(topic, ANY) for topic in sorted(topics)}
 
     def close(self) -> None:
-        """Bridge no more; everything is unregistered in ROS 1. A second call does nothing.
+        """End the bridge and unregister everything in ROS 1; a second call does nothing.
 
-        Blocks: under a second with a master that answers, `CLOSE_S` at most.
+        Blocks: less than a second if the master answers, `CLOSE_S` at most.
         """
         with self._lock:
             if self._closing:
@@ -201,7 +203,7 @@ class Ros1Bridge:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # -- who is there here ---------------------------------------------------------------------
+    # -- our network ---------------------------------------------------------------------------
 
     def _wake(self) -> None:
         self._changed.set()
@@ -225,7 +227,7 @@ class Ros1Bridge:
         self._changed.set()
 
     def _ends_by_name(self) -> tuple[dict[str, list[Endpoint]], set[str]]:
-        """Return the ends here by name in ROS 1, and the names that another bridge shows."""
+        """Return our network's endpoints by name in ROS 1, and names that another bridge has."""
         own = self._node.transport.session_id
         with self._lock:
             ends, bridges = list(self._ends.values()), set(self._bridges)
@@ -237,7 +239,7 @@ class Ros1Bridge:
                 continue
             if end.session not in bridges:
                 found.setdefault(name, []).append(end)
-            elif end.session < own:  # of two bridges one has to give way, and both say the same
+            elif end.session < own:  # of two bridges the one with the lower session id has the name
                 elsewhere.add(name)
         return found, elsewhere
 
@@ -257,10 +259,10 @@ class Ros1Bridge:
                 self._note_master(None)
             except Ros1Error as error:
                 self._note_master(error)
-                self._look(state, types)
-            except ActionlibError as error:  # our own network has been left
+                self._look(state, types)  # with the last known state: ours may have changed
+            except ActionlibError as error:  # our own session is closed
                 self._ros.report("bridge", error)
-            except Exception:  # noqa: BLE001  a border: reported, and looked at again
+            except Exception:  # noqa: BLE001  report it; the bridge goes on
                 report_thread_exception()
             self._changed.wait(LOOK_S)
         if self.ended:
@@ -268,7 +270,7 @@ class Ros1Bridge:
             self._over.set()
 
     def _note_master(self, error: Ros1Error | None) -> None:
-        """Log once that the master does not answer, and that it does again."""
+        """Log once when the master does not answer, and once when it answers again."""
         if error is not None:
             self._ros.report("master", error)
         else:
@@ -280,8 +282,8 @@ class Ros1Bridge:
         self._is_there = error is None
 
     def _look(self, state: SystemState, types: Mapping[str, str]) -> None:
-        """Bridge what is to be bridged now."""
-        state = without(state, BRIDGE)
+        """Update what is bridged."""
+        state = without(state, BRIDGE)  # two bridges must not serve each other
         ends, elsewhere = self._ends_by_name()
         names = [*looked_for.actions.names(), *looked_for.services.names()]
         ros_names = set(filter(None, map(self._sides.ros_name, names)))
@@ -311,7 +313,7 @@ class Ros1Bridge:
 
 
 def _keep(there: dict[str, B], wanted: Iterable[str], make: Callable[[str], B]) -> None:
-    """Close what is wanted no more, and make what is new."""
+    """Close the bridges of names that are no longer wanted, and make those of new names."""
     names = set(wanted)
     for name in there.keys() - names:
         there.pop(name).close()

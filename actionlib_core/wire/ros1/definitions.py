@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable, Query
     from actionlib_core.wire.ros1.sides import Typed
 
-MOST_TYPES = 2000  # a robot has some hundred
+MOST_TYPES = 2000  # a robot has a few hundred; limited, as a node can send types without end
 
 
 class Definitions:
-    """Knows the text of a type from this program's own, from ROS 1, or from whoever has it here.
+    """Definitions of types: this program's, those learned in ROS 1, and those of other programs.
 
-    What was learned from ROS 1 is told to those who ask on our network.
+    Programs on our network can query the definitions that were learned in ROS 1.
 
     Threads: any.
     """
@@ -32,7 +32,7 @@ class Definitions:
         self._closed = False
 
     def learn(self, typed: Typed, text: str) -> None:
-        """Take the text that a publisher in ROS 1 tells of its type; "" is none."""
+        """Keep the definition in a connection header of ROS 1; "" when it has none."""
         with self._lock:
             full = len(self._texts) >= MOST_TYPES
             if not text or typed in self._texts or full or self._closed:
@@ -49,7 +49,7 @@ class Definitions:
             self._offers.append(offer)
 
     def text(self, typed: Typed) -> str:
-        """Return the text of a type, "" when nobody knows it; blocks 1 s at most."""
+        """Return the definition of a type, "" when it is unknown; blocks 1 s at most."""
         from actionlib_core.interfaces import get_message
 
         if typed in self._texts:
@@ -61,7 +61,7 @@ class Definitions:
         return str(known._full_text) if known._md5sum == typed.md5 else ""
 
     def close(self) -> None:
-        """Tell no more."""
+        """Answer no more queries."""
         with self._lock:
             self._closed = True
             offers = list(self._offers)

@@ -1,4 +1,4 @@
-"""The bytes of TCPROS: lengths, connection headers, answers of services. No sockets.
+"""The bytes of TCPROS: lengths, connection headers, service responses. No sockets.
 
 Source:
     https://wiki.ros.org/ROS/TCPROS and https://wiki.ros.org/ROS/Connection%20Header.
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 LENGTH = struct.Struct("<I")
-LARGEST_HEADER = 1 << 20  # message definitions are in it; the largest of ROS's own has 25 kB
+LARGEST_HEADER = 1 << 20  # it contains the message definition; ROS's own have 25 kB at most
 LARGEST_MESSAGE = 256 << 20  # a colour image of 80 megapixels
 
 Header = dict[str, str]
 
 
 def read_length(raw: bytes, limit: int) -> int:
-    """Return the length that four bytes announce.
+    """Return the length in the four bytes before a message or field.
 
     Raises:
-        ValueError: they are fewer than four, or announce more than `limit` bytes.
+        ValueError: there are fewer than four bytes, or the length exceeds `limit`.
     """
     if len(raw) < LENGTH.size:
         raise ValueError(f"length: got {len(raw)} bytes; expected {LENGTH.size}")
@@ -44,10 +44,10 @@ def pack_header(fields: Mapping[str, str]) -> bytes:
 
 
 def unpack_header(raw: bytes) -> Header:
-    """Read a connection header, without the length in front.
+    """Read a connection header without the length in front.
 
     Raises:
-        ValueError: a field is cut short, is no text, or has no `=`.
+        ValueError: a field is incomplete, is not UTF-8, or has no `=`.
     """
     fields: Header = {}
     at = 0
@@ -66,5 +66,5 @@ def unpack_header(raw: bytes) -> Header:
 
 
 def pack_service_answer(payload: bytes, *, good: bool) -> bytes:
-    """Return what a service sends back: a byte that says whether it is a response, or an error."""
+    """Return a service's answer: 1 and the response, or with `good=False` 0 and an error text."""
     return bytes([good]) + pack_frame(payload)

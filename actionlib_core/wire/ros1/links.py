@@ -1,8 +1,7 @@
-"""TCP connections of a ROS 1 node: one object each, with a bounded buffer for what is sent.
+"""TCP connections of a ROS 1 node: one object each, with a limited buffer for sending.
 
-A connection that is received on has a thread that waits in `read_frame`, until the other side
-closes it: that is how a process that was killed is noticed. Connections that are only sent on wait
-likewise for their end.
+Each connection has a thread that reads until the other side closes it, even if only the other
+direction carries messages: this is how the death of a process is noticed.
 """
 
 from __future__ import annotations
@@ -39,14 +38,15 @@ log = logging.getLogger("actionlib_core")
 
 CONNECT_S = 3.0  # longest wait for a connection
 HEADER_S = 5.0  # longest wait for the other side's connection header
-BUFFER = 16 << 20  # bytes that wait for a subscriber; beyond, the oldest messages are dropped
-FULL_S = 0.1
-MOST_CONNECTIONS = 2000  # each has a thread
+BUFFER = 16 << 20  # unsent bytes for one subscriber; beyond, the oldest messages are dropped
+FULL_S = 0.1  # pause when the system has no file descriptor for another connection
+MOST_CONNECTIONS = 2000  # limited, as each has a thread
 MOST_SKIPPED = 100
 READ_SIZE = 1 << 16
-LARGEST_READ = 1 << 20
-# A peer whose computer has gone is noticed after 11 s: 5 s of silence, then three questions.
+LARGEST_READ = 1 << 20  # limit for one system call, so that a wrong length allocates no more
+# A peer whose computer is gone is noticed after 11 s: 5 s of silence, then three probes 2 s apart.
 _KEEPALIVE = ((socket.TCP_KEEPIDLE, 5), (socket.TCP_KEEPINTVL, 2), (socket.TCP_KEEPCNT, 3))
+# The same limit for sent data without an acknowledgement, during which no probes are sent.
 _GONE_MS = 11_000
 
 
@@ -54,13 +54,13 @@ class Connection:
     """One TCP connection to another node.
 
     Args:
-        sock: The connected socket, which is this object's from now on.
+        sock: The connected socket; this object closes it.
         peer: The other side, for error texts.
-        clock: Starts the thread that sends what did not fit at once.
+        clock: Starts the thread that sends messages which do not fit into the system's buffer.
 
     Attributes:
-        peer: See above; the node's name once it is known.
-        dropped: Messages that were dropped because the other side reads too slowly.
+        peer: See above; later the node's name.
+        dropped: Number of messages that were dropped because the other side reads too slowly.
 
     Threads: `put` and `close` may be called from any thread and never wait; one thread reads, and
         calls `release` at the end.
@@ -77,7 +77,7 @@ class Connection:
         self._sender: Task | None = None
         self._closed = False
         sock.settimeout(HEADER_S)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # small messages leave at once
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         for option, value in _KEEPALIVE:
             sock.setsockopt(socket.IPPROTO_TCP, option, value)
@@ -86,8 +86,8 @@ class Connection:
         self._poll.register(sock, select.POLLIN)
         self._limit: float | None = HEADER_S
         self._buffer = bytearray()
-        self._received = 0  # bytes in all
-        self._taken = 0  # of them, those that the thread that reads has dealt with
+        self._received = 0  # bytes, in total
+        self._taken = 0  # of these, the bytes of messages that the reading thread has handled
         self._waits = clock.event(f"the end of what {peer} has sent")
 
     @classmethod
@@ -97,7 +97,7 @@ class Connection:
         Raises:
             Ros1Error: nobody answers there, or the host's name is not known here.
 
-        Blocks: `CONNECT_S` at most, and as long as the system looks for the host's name.
+        Blocks: `CONNECT_S` at most, and while the system looks up the host's name.
         """
         try:
             return cls(socket.create_connection((host, port), CONNECT_S), peer, clock)
@@ -118,7 +118,7 @@ class Connection:
         """Return the other side's connection header.
 
         Raises:
-            Ros1Error: it did not come, is malformed, or is an error.
+            Ros1Error: none arrived, or it is malformed, or it contains an error.
 
         Blocks: `HEADER_S` at most between two parts of it.
         """
@@ -157,9 +157,9 @@ class Connection:
         return self.read(length)
 
     def read_latest(self, within: float) -> bytes | None:
-        """Return the last of the messages that come within so long [s]; see `read_frame`.
+        """Return the last of the messages that arrive within this time [s]; see `read_frame`.
 
-        Of a peer that sends without end, `MOST_SKIPPED` are left out at most.
+        At most `MOST_SKIPPED` are skipped, in case the peer sends without a pause.
         """
         payload = self.read_frame()
         if payload is not None:
@@ -171,7 +171,7 @@ class Connection:
         return payload
 
     def read(self, size: int) -> bytes | None:
-        """Return `size` bytes; None when the connection has ended; raises and blocks as above."""
+        """Return `size` bytes; None when the connection has ended; as `read_frame`."""
         while len(self._buffer) < size:
             missing = size - len(self._buffer)
             part = self._receive(min(max(missing, READ_SIZE), LARGEST_READ))
@@ -183,34 +183,38 @@ class Connection:
         return raw
 
     def _receive(self, most: int) -> bytes:
-        """Return what has come, some bytes at least; b"" at the end."""
+        """Return the bytes that have arrived, at least one; b"" at the end."""
+        # The reading thread asks for more bytes when it has handled all messages before.
         self._taken = self._received - len(self._buffer)
         self._waits.set()
         try:
             if not self._poll.poll(None if self._limit is None else self._limit * 1000):
                 raise Ros1Error(self.peer, f"silent for {self._limit:g} s; expected an answer.")
-            with self._lock:  # `wait_idle` counts what was received and what was not
+            # With the lock, so that `wait_idle` counts these bytes once: as received or as waiting
+            # in the system's buffer.
+            with self._lock:
                 part = self._sock.recv(most, socket.MSG_DONTWAIT)
                 self._received += len(part)
-        except BlockingIOError:  # the system thought better of it
+        except BlockingIOError:  # poll may report data that the system then discards
             return self._receive(most)
         except OSError:  # reset by the other side
             return b""
         return part
 
     def wait_idle(self, timeout: float) -> None:
-        """Wait until the thread that reads has dealt with what has come so far.
+        """Wait until the reading thread has handled everything that has arrived so far.
 
         Blocks: `timeout` [s] at most.
         """
         deadline = self._clock.now() + timeout
         try:
             with self._lock:
+                # FIONREAD: the number of bytes in the system's buffer.
                 there = fcntl.ioctl(self._sock, termios.FIONREAD, bytes(LENGTH.size))
-                come = self._received + int(LENGTH.unpack(there)[0])
-        except (OSError, ValueError):  # it has ended
+                arrived = self._received + int(LENGTH.unpack(there)[0])
+        except (OSError, ValueError):  # the connection has ended
             return
-        while self._taken < come and (left := deadline - self._clock.now()) > 0:
+        while self._taken < arrived and (left := deadline - self._clock.now()) > 0:
             self._waits.wait(left)
             self._waits.clear()
 
@@ -221,12 +225,12 @@ class Connection:
         self.send(pack_header(fields))
 
     def send(self, data: bytes) -> None:
-        """Send bytes at once.
+        """Send bytes.
 
         Raises:
             Ros1Error: the connection has ended, or the other side does not read.
 
-        Blocks: while the other side has no room; see `limit`.
+        Blocks: while the other side's buffer is full; see `limit`.
         """
         try:
             self._sock.sendall(data)
@@ -234,20 +238,22 @@ class Connection:
             raise Ros1Error(self.peer, f"cannot send: {error.strerror or error}.") from error
 
     def put(self, payload: bytes) -> None:
-        """Send a message now, or when the other side has room; never waits.
+        """Send a message now, or in another thread when the buffer is full; never waits.
 
-        Of what waits, the oldest are dropped beyond `BUFFER` bytes.
+        Beyond `BUFFER` unsent bytes, the oldest messages are dropped.
         """
         data = pack_frame(payload)
         with self._lock:
             if self._closed:
                 return
+            # Usually the message fits into the system's buffer and no thread is needed. While the
+            # sending thread exists, everything goes through the queue: the order is kept.
             if self._sender is None:
                 try:
                     sent = self._sock.send(data, socket.MSG_DONTWAIT)
                 except BlockingIOError:
                     sent = 0
-                except OSError:  # its end is noticed by who reads
+                except OSError:  # the reading thread handles the end of the connection
                     return
                 if sent == len(data):
                     return
@@ -263,11 +269,11 @@ class Connection:
                     log.warning("%s: reads too slowly: messages for it are dropped", self.peer)
 
     def _send(self, data: bytes) -> None:
-        """Send what did not fit at once, and what has come since."""
+        """Send the rest of a message, then those that were queued meanwhile."""
         while True:
             try:
                 self._sock.sendall(data)
-            except OSError:  # its end is noticed by who reads
+            except OSError:  # the reading thread handles the end of the connection
                 return
             with self._lock:
                 if not self._waiting:
@@ -279,14 +285,16 @@ class Connection:
     # -- the end -------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """End the connection: who waits in a call is woken."""
+        """End the connection: calls that wait on it return."""
         with self._lock:
             self._closed = True
+        # Not `close`: that would not wake a thread that waits on the socket, and the system could
+        # give its number to another file.
         with contextlib.suppress(OSError):
             self._sock.shutdown(socket.SHUT_RDWR)
 
     def release(self) -> None:
-        """End the connection and give its socket back; for the thread that reads."""
+        """End the connection and free its socket; for the reading thread."""
         self.close()
         sender = self._sender
         if sender is not None:
@@ -301,16 +309,16 @@ class Connection:
 
 
 class Listener:
-    """Takes connections at a free port, each in a thread of its own.
+    """Accepts connections at a free port and handles each in its own thread.
 
     Args:
-        host: Address to listen at; "" is all of this computer's.
+        host: Address to listen at; "": all addresses of this computer.
         clock: Starts the threads.
-        name: Of the threads.
-        handle: Gets each socket and the address at the other side; the socket is closed after it.
+        name: Name of the threads.
+        handle: Gets each socket and the other side's address; afterwards the socket is closed.
 
     Attributes:
-        port: Where it listens.
+        port: The port.
     """
 
     def __init__(
@@ -331,7 +339,7 @@ class Listener:
             try:
                 sock, address = self._sock.accept()
             except OSError:
-                if not self._is_closed():  # no file descriptor is left; others may give some back
+                if not self._is_closed():  # no file descriptor is free; wait for one
                     self._clock.sleep(FULL_S)
                 continue
             with self._lock:
@@ -344,7 +352,7 @@ class Listener:
                 )
                 sock.close()
                 continue
-            if self._is_closed():
+            if self._is_closed():  # `close` may have missed this one
                 sock.shutdown(socket.SHUT_RDWR)
             self._clock.spawn(lambda s=sock, a=address: self._run(s, a), name=self._name)  # type: ignore[misc]  # mypy: lambda defaults
 
@@ -362,9 +370,9 @@ class Listener:
         return self._closed
 
     def close(self, timeout: float) -> None:
-        """Take no more connections and end those there are.
+        """Accept no more connections and end the open ones.
 
-        Blocks: until the thread that takes them has ended, `timeout` [s] at most.
+        Blocks: until the accepting thread has ended, `timeout` [s] at most.
         """
         self._closed = True
         with self._lock:

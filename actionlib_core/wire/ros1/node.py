@@ -1,7 +1,7 @@
-"""A ROS 1 node of the standard library's parts: topics and services, as bytes, both ways.
+"""A ROS 1 node made from parts of the standard library; it sends and receives bytes.
 
-What is wanted of it (`advertise`, `subscribe`, `provide`) is noted at once; `register` makes the
-master know what it does not know yet, which after a restart of the master is everything.
+`advertise`, `subscribe` and `provide` only note what is wanted. `register` then registers at the
+master what is missing there; after a restart of the master that is everything.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from actionlib_core.wire.ros1.answers import (
     registered,
     split_address,
 )
+from actionlib_core.wire.ros1.backoff import Backoff
 from actionlib_core.wire.ros1.frames import Header, pack_service_answer
 from actionlib_core.wire.ros1.links import Connection, Listener
 from actionlib_core.wire.ros1.publishers import Publishers
@@ -41,48 +42,50 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("actionlib_core")
 
-RETRY_FIRST_S = 0.2  # a publisher that cannot be reached is tried again, twice as late each time
+RETRY_FIRST_S = 0.2  # pause before a publisher is tried again; doubled each time
 RETRY_LONGEST_S = 10.0
-UNREGISTER_S = 1.0  # longest silence of a master when a node leaves it
+UNREGISTER_S = 1.0  # longest silence of the master while a node leaves
 CLOSE_S = 1.0
 PROBE_S = 0.5
-REMIND_FIRST_S = 3.0  # a subscriber that does not connect is told of us again, as RETRY above
+REMIND_FIRST_S = 3.0  # pause before a subscriber that has not connected is notified; doubled
 REMIND_LONGEST_S = 60.0
+MAX_REPORTED = 1000  # remembered reports; limited, since a sender can invent names without end
 ANY = "*"
-PORT = 11311  # a master's by custom
+PORT = 11311  # the usual port of a master
 
 
 class Receiver(Protocol):
-    """What hears one publisher.
+    """Gets the messages of one publisher.
 
     Attributes:
-        within: Of the messages that come within so long [s] the last will do; 0.0: it takes all.
+        coalesce_s: Of the messages that arrive within this time [s] only the last is delivered;
+            0.0: all of them.
     """
 
-    within: float
+    coalesce_s: float
 
     def take(self, payload: bytes) -> None:
-        """Take a message."""
+        """Handle a message."""
 
     def gone(self) -> None:
-        """Take notice that the connection has ended."""
+        """Handle the end of the connection."""
 
 
 class Subscription:
-    """A topic that the node listens to.
+    """A topic to which the node subscribes.
 
     Args:
-        node: Listens.
+        node: The node.
         topic: Its name, with a slash in front.
-        accept: Gets the connection header of each publisher and returns what hears it; may refuse
-            with a `Ros1Error`. It runs in the connection's thread.
+        accept: Gets the connection header of each publisher and returns the receiver of its
+            messages; may refuse with a `Ros1Error`. It runs in the connection's thread.
     """
 
     def __init__(self, node: Ros1Node, topic: str, accept: Callable[[Header], Receiver]) -> None:
         self.topic = topic
         self.accept = accept
         self.publishers = Publishers(node.uri)
-        self.nodes: frozenset[str] = frozenset()  # those that the master had when it was asked last
+        self.nodes: frozenset[str] = frozenset()  # publishers when the master was last asked
         self._node = node
         self._lock = threading.Lock()
         self._links: dict[str, _Link] = {}
@@ -103,13 +106,13 @@ class Subscription:
                     link.start()
 
     def update(self, uris: Iterable[str]) -> None:
-        """Take the list of publishers that the master sends."""
+        """Handle a list of publishers from the master."""
         with self._lock:
             change = self.publishers.update(uris)
         self.apply(change)
 
     def leave(self, link: _Link) -> bool:
-        """Forget a link if its publisher has left; return whether that is so."""
+        """Return whether a link's publisher has left; if so, forget the link."""
         with self._lock:
             if link.uri in self.publishers.there and not self._closed:
                 return False
@@ -117,7 +120,10 @@ class Subscription:
             return True
 
     def wait_idle(self, timeout: float) -> None:
-        """Wait until all that has come so far has been taken; blocks `timeout` [s] at most each."""
+        """Wait until all messages that have arrived are handled.
+
+        Blocks: `timeout` [s] at most for each publisher.
+        """
         with self._lock:
             connections = [link.connection for link in self._links.values()]
         for connection in connections:
@@ -126,11 +132,11 @@ class Subscription:
 
     @property
     def closed(self) -> bool:
-        """Whether the node listens no more."""
+        """Whether the subscription has ended."""
         return self._closed
 
     def close(self) -> None:
-        """Listen no more; does not wait."""
+        """End the subscription; does not wait."""
         with self._lock:
             self._closed = True
             links = list(self._links.values())
@@ -140,7 +146,7 @@ class Subscription:
 
 
 class _Link:
-    """What a subscription has for one publisher: a thread that connects, reads, and tries again."""
+    """A subscription's link to one publisher: a thread that connects, reads, and tries again."""
 
     def __init__(self, node: Ros1Node, subscription: Subscription, uri: str) -> None:
         self.uri = uri
@@ -166,10 +172,11 @@ class _Link:
                 self._read(about)
                 pause = RETRY_FIRST_S
             except ActionlibError as error:
-                if not self._subscription.closed:  # else we have ended the connection
+                if not self._subscription.closed:  # else the error comes from our own `close`
+                    # An unreachable node is reported once, not for each of its topics.
                     whole = isinstance(error, Ros1Error) and error.peer == self.uri
                     self._node.report(self.uri if whole else about, error)
-            except Exception:  # noqa: BLE001  a border: reported, and the publisher is tried again
+            except Exception:  # noqa: BLE001  an error of a receiver: report it and try again
                 report_thread_exception()
             if self._subscription.leave(self):
                 break
@@ -178,7 +185,7 @@ class _Link:
         self._node.forget_report(about)
 
     def _read(self, about: str) -> None:
-        """Connect, and read until the connection ends."""
+        """Connect, and read messages until the connection ends."""
         node, subscription = self._node, self._subscription
         topic = subscription.topic
         where = read_tcpros(
@@ -192,11 +199,12 @@ class _Link:
             fields = {"topic": topic, "type": ANY, "md5sum": ANY, "message_definition": ""}
             connection.send_header({"callerid": node.name, **fields, "tcp_nodelay": "1"})
             header = connection.read_header()
-            self._wait_until_counted(where, header)
+            self._wait_until_accepted(where, header)
             receiver = subscription.accept(header)
             node.forget_report(about)
-            within = receiver.within
-            read = partial(connection.read_latest, within) if within else connection.read_frame
+            read = connection.read_frame
+            if receiver.coalesce_s:
+                read = partial(connection.read_latest, receiver.coalesce_s)
             try:
                 while (payload := read()) is not None:
                     receiver.take(payload)
@@ -204,18 +212,20 @@ class _Link:
                 self.connection = None
                 receiver.gone()
 
-    def _wait_until_counted(self, where: tuple[str, int], header: Header) -> None:
-        """Wait until the publisher sends us what it publishes: it counts us after it has answered.
+    def _wait_until_accepted(self, where: tuple[str, int], header: Header) -> None:
+        """Wait until the publisher has added us to its subscribers.
 
-        It takes one connection after the other, so the answer to another one tells. That one asks
-        for a service which nodes have and says at once that it calls nothing.
+        A node of rospy does so only after it has sent its header, and messages that it publishes in
+        between are lost for us. It handles one new connection after the other, so an answer on a
+        second connection shows that the first one is done. The second one asks for a service that
+        every node has, as a probe, which calls nothing.
 
-        Blocks: for one exchange, as `Connection.read_header`.
+        Blocks: for one exchange of headers, as `Connection.read_header`.
         """
         node = header.get("callerid", "")
         fields = {"callerid": self._node.name, "service": f"{node}/get_loggers"}
         with (
-            contextlib.suppress(Ros1Error),  # no such service: that is an answer too
+            contextlib.suppress(Ros1Error),  # an error ("no such service") is an answer as well
             Connection.open(*where, node, self._node.clock) as probe,
         ):
             probe.send_header({**fields, "md5sum": ANY, "probe": "1"})
@@ -223,18 +233,19 @@ class _Link:
 
 
 class Publication:
-    """A topic that the node publishes on.
+    """A topic on which the node publishes.
 
     Args:
-        node: Publishes.
+        node: The node.
         topic: Its name, with a slash in front.
-        type_name: "pkg/Type"; "" takes what each subscriber expects.
-        md5: Its checksum; "" with `type_name`.
-        definition: Its text, with that of all nested types.
-        latching: What subscribers are told.
-        guess: Type and checksum that a subscriber of any type is told while no other has told any.
-        accept: Gets the connection header of each subscriber and returns what is called when its
-            connection has ended; may refuse with a `Ros1Error`. It runs in the connection's thread.
+        type_name: "pkg/Type"; "": the type that each subscriber expects.
+        md5: Its checksum; "": the one that each subscriber expects.
+        definition: The text of the type, with those of all nested types.
+        latching: Whether subscribers are told that it latches.
+        guess: Type and checksum for a subscriber of any type while the type is unknown.
+        accept: Gets the connection header of each subscriber and returns a function that is called
+            when the connection has ended; may refuse with a `Ros1Error`. It runs in the
+            connection's thread.
 
     Attributes:
         kept: Sender -> its last message, which later subscribers get first. Guarded by `lock`.
@@ -275,7 +286,7 @@ class Publication:
 
         Args:
             payload: The message.
-            keep: Sender whose last message it is from now on, for later subscribers.
+            keep: The sender, to keep the message for later subscribers; None: do not keep it.
         """
         with self.lock:
             if keep is not None:
@@ -284,7 +295,7 @@ class Publication:
                 connection.put(payload)
 
     def serve(self, connection: Connection, header: Header) -> None:
-        """Send to a subscriber until it leaves; in the connection's thread."""
+        """Serve a subscriber until it leaves; runs in the connection's thread."""
         theirs = header.get("type", ANY), header.get("md5sum", ANY)
         known = self._seen if ANY in theirs else theirs
         ours = self.type or known[0], self.md5 or known[1]
@@ -306,10 +317,10 @@ class Publication:
                 for payload in self.kept.values():
                     connection.put(payload)
                 self._connections.add(connection)
-            gone = self._accept(header)  # not earlier: who hears of it may send at once
+            gone = self._accept(header)  # last: it shows the subscriber, and messages may come
             try:
                 while connection.read_frame() is not None:
-                    pass  # subscribers say nothing; this waits for their end
+                    pass  # subscribers send nothing; this waits for the end of the connection
             finally:
                 gone()
         finally:
@@ -317,7 +328,7 @@ class Publication:
                 self._connections.discard(connection)
 
     def close(self) -> None:
-        """Publish no more; does not wait."""
+        """Stop publishing; does not wait."""
         with self.lock:
             self._closed = True
             connections = list(self._connections)
@@ -326,16 +337,16 @@ class Publication:
         self._node.forget(self)
 
 
-class Offer:
-    """A service that the node answers.
+class ServiceServer:
+    """A service that the node offers.
 
     Args:
-        node: Answers.
+        node: The node.
         name: Its name, with a slash in front.
         type_name: "pkg/Type".
         md5: Its checksum.
-        answer: Gets a request and the caller's name, returns the response; what it raises goes to
-            the caller as text. It runs in the connection's thread.
+        answer: Gets a request and the caller's name, returns the response; the text of an exception
+            goes to the caller. It runs in the connection's thread.
     """
 
     def __init__(
@@ -353,7 +364,7 @@ class Offer:
         self._node = node
 
     def serve(self, connection: Connection, header: Header) -> None:
-        """Answer a caller until it leaves; in the connection's thread."""
+        """Serve a caller until it leaves; runs in the connection's thread."""
         if header.get("md5sum") not in {ANY, self.md5}:
             text = f"got {header.get('md5sum')!r:.80}; expected {self.md5} ({self.type})."
             connection.send_header({"error": f"{self.name}: md5sum: {text}"})
@@ -366,50 +377,34 @@ class Offer:
         while (request := connection.read_frame()) is not None:
             try:
                 answer = pack_service_answer(self._answer(request, connection.peer), good=True)
-            except Exception as error:  # noqa: BLE001  a border: the caller gets it
+            except Exception as error:  # noqa: BLE001  every error is sent to the caller
                 answer = pack_service_answer(str(error).encode(), good=False)
             connection.send(answer)
             if header.get("persistent") != "1":
                 return
 
     def close(self) -> None:
-        """Answer no more calls; does not wait for those under way."""
+        """Accept no more calls; does not wait for running ones."""
         self._node.forget(self)
-
-
-class _Reminder:
-    """When a node is told again."""
-
-    def __init__(self, now: float) -> None:
-        self._pause = REMIND_FIRST_S
-        self._due = now + self._pause
-
-    def is_due(self, now: float) -> bool:
-        """Return whether to tell it now; then it is due again later, each time twice as late."""
-        if now < self._due:
-            return False
-        self._pause = min(2 * self._pause, REMIND_LONGEST_S)
-        self._due = now + self._pause
-        return True
 
 
 class Ros1Node:
     """A node in a ROS 1 system.
 
     Args:
-        name: Its full name, with a slash in front; no other node may have it, or the master ends
-            that one.
+        name: Its full name, with a slash in front. It must be unique: the master shuts down an
+            older node of the same name.
         master: Address of the master, "http://robot:11311".
-        clock: A real one, which starts the threads.
-        host: Name or address under which the robot finds this computer; "" takes `ROS_HOSTNAME`,
-            then `ROS_IP`, then the address from which the master is reached.
+        clock: A real clock; it starts the threads.
+        host: Name or address under which the robot finds this computer; "": `ROS_HOSTNAME`, else
+            `ROS_IP`, else the address from which the master is reached.
 
     Attributes:
-        uri: Address of the node's own interface.
-        ended: Why the master has ended the node, "" while it has not.
+        uri: Address of the node's XML-RPC interface.
+        ended: Why the master has shut the node down; "" while it has not.
 
     Raises:
-        Ros1Error: the master's address is none, or its host is not known here.
+        Ros1Error: the master's address is malformed, or its host is not known here.
     """
 
     def __init__(self, name: str, master: str, *, clock: Clock, host: str = "") -> None:
@@ -421,10 +416,10 @@ class Ros1Node:
         self._lock = threading.Lock()
         self._published: dict[str, Publication] = {}
         self._subscribed: dict[str, Subscription] = {}
-        self._served: dict[str, Offer] = {}
+        self._served: dict[str, ServiceServer] = {}
         self._tasks: set[Task] = set()
-        self._told: dict[str, str] = {}
-        self._unconnected: dict[tuple[str, str], _Reminder] = {}
+        self._reported: dict[str, str] = {}
+        self._unconnected: dict[tuple[str, str], Backoff] = {}  # (topic, subscribing node)
         own = find_host(master, host)
         bind = "127.0.0.1" if is_loopback(own) else ""
         self._rpc = RpcServer(bind, clock, self._methods())
@@ -432,10 +427,10 @@ class Ros1Node:
         self._address = own, self._data.port
         self.uri = f"http://{own}:{self._rpc.port}/"
 
-    # -- what is wanted ------------------------------------------------------------------------
+    # -- its topics and services ---------------------------------------------------------------
 
     def subscribe(self, topic: str, accept: Callable[[Header], Receiver]) -> Subscription:
-        """Listen to a topic, of whatever type; see `Subscription`."""
+        """Subscribe to a topic of any type; see `Subscription`."""
         made = Subscription(self, topic, accept)
         with self._lock:
             self._subscribed[topic] = made
@@ -448,15 +443,15 @@ class Ros1Node:
             self._published[topic] = made
         return made
 
-    def provide(self, name: str, *args: Any) -> Offer:
-        """Answer a service; see `Offer`."""
-        made = Offer(self, name, *args)
+    def provide(self, name: str, *args: Any) -> ServiceServer:
+        """Offer a service; see `ServiceServer`."""
+        made = ServiceServer(self, name, *args)
         with self._lock:
             self._served[name] = made
         return made
 
-    def forget(self, made: Subscription | Publication | Offer) -> None:
-        """Want something no more; `register` tells the master."""
+    def forget(self, made: Subscription | Publication | ServiceServer) -> None:
+        """Drop a topic or service; `register` unregisters it at the master."""
         kinds: tuple[dict[str, Any], ...] = self._published, self._subscribed, self._served
         with self._lock:
             for kind in kinds:
@@ -471,25 +466,26 @@ class Ros1Node:
         return call(self.master, method, self.name, *args, **more)
 
     def state(self) -> SystemState:
-        """Return who is there; raises and blocks as `ask`."""
+        """Return the master's registrations; raises and blocks as `ask`."""
         return SystemState.read(self.master, self.ask("getSystemState"))
 
     def types(self) -> dict[str, str]:
-        """Return the types of all topics that the master has ever heard of; raises as `ask`."""
+        """Return the types of all topics that the master has ever known; raises as `ask`."""
         return read_types(self.master, self.ask("getTopicTypes"))
 
-    def register(self, state: SystemState, kin: str = "") -> None:
-        """Make the master know what is wanted, and forget what is not.
+    def register(self, state: SystemState, ignored: str = "") -> None:
+        """Register at the master what is missing there, and unregister what is no longer wanted.
 
-        A topic that is listened to is registered again when other nodes publish on it than
-        before: an update of the master's may have been lost.
+        A subscription is registered again when the topic has other publishers than before, as an
+        update of the master may have been lost.
 
         Args:
-            state: What the master knows.
-            kin: How the names of nodes begin that are not told of us; "" for none.
+            state: The master's registrations.
+            ignored: Prefix of the names of nodes that are not notified of our topics; "": only this
+                node.
 
         Raises:
-            Ros1Error: the master does not answer, or refuses; what is left is tried the next time.
+            Ros1Error: the master does not answer, or refuses; the next call continues.
         """
         with self._lock:
             published, subscribed = dict(self._published), dict(self._subscribed)
@@ -505,40 +501,42 @@ class Ros1Node:
         for topic, subscription in subscribed.items():
             nodes = frozenset(state.publishers.get(topic, ())) - {self.name}
             if topic in missing.subscribed or nodes != subscription.nodes:
-                asked = subscription.publishers.ask()
+                asked = subscription.publishers.ask()  # before the call: see `Publishers`
                 uris = self.ask("registerSubscriber", topic, ANY, self.uri)
                 uris = read_texts(self.master, "registerSubscriber", uris)
                 subscription.apply(subscription.publishers.answer(asked, uris))
                 subscription.nodes = nodes
         self._unregister(there - wanted)
-        self._remind(state, published, kin or self.name)
+        self._remind(state, published, ignored or self.name)
 
-    def _remind(self, state: SystemState, published: dict[str, Publication], kin: str) -> None:
-        """Tell nodes of us that listen to what we publish, by the master, but have not connected.
+    def _remind(self, state: SystemState, published: dict[str, Publication], ignored: str) -> None:
+        """Notify subscribers that are registered at the master but have not connected to us.
 
-        rospy gives a publisher up for ever whose connection is reset, and the master's word about
-        a new one may be lost. A node connects when it hears of a publisher that was not there.
+        rospy never connects again to a publisher whose connection was reset, and the master's
+        update about a new publisher may be lost.
         """
         missing = {
             (topic, node)
             for topic, made in published.items()
             for node in set(state.subscribers.get(topic, ())) - made.subscribers()
-            if not node.startswith(kin)
+            if not node.startswith(ignored)
         }
         for there in self._unconnected.keys() - missing:
             del self._unconnected[there]
         now = self.clock.now()
         for topic, node in sorted(missing):
-            reminder = self._unconnected.setdefault((topic, node), _Reminder(now))
-            if not reminder.is_due(now):
+            first = Backoff(now, REMIND_FIRST_S, REMIND_LONGEST_S)
+            if not self._unconnected.setdefault((topic, node), first).is_due(now):
                 continue
             try:
                 uri = str(self.ask("lookupNode", node))
                 others = sorted(set(state.publishers.get(topic, ())) - {self.name})
                 uris = [str(self.ask("lookupNode", other)) for other in others]
+                # A node connects only to publishers that its last list did not contain: so first a
+                # list without us, then one with us.
                 for known in (uris, [*uris, self.uri]):
                     call(uri, "publisherUpdate", "/master", topic, known, timeout=PROBE_S)
-            except Ros1Error as error:  # it has died, or will be told later
+            except Ros1Error as error:  # the node has died, or it is tried again later
                 log.debug("ROS 1 bridge %s: %s of %s: %s", self.name, topic, node, error)
 
     def _unregister(self, names: Names, timeout: float | None = None) -> None:
@@ -550,14 +548,14 @@ class Ros1Node:
             self.ask("unregisterService", name, self._rosrpc, timeout=timeout)
 
     def clean(self, state: SystemState, prefix: str) -> None:
-        """Unregister nodes of our kind that were killed: subscribers would try them for ever.
+        """Unregister bridges that were killed: subscribers would try to reach them for ever.
 
         Args:
-            state: What the master knows.
-            prefix: How the names of such nodes begin.
+            state: The master's registrations.
+            prefix: Prefix of the names of bridges.
 
         Source:
-            `rosnode cleanup`, which does so for all nodes.
+            `rosnode cleanup`, which does this for all nodes.
         """
         parts = state.publishers, state.subscribers, state.services
         nodes = {node for part in parts for there in part.values() for node in there}
@@ -583,17 +581,17 @@ class Ros1Node:
         host, port = self._address
         return f"rosrpc://{host}:{port}"
 
-    # -- services of others --------------------------------------------------------------------
+    # -- services of other nodes ---------------------------------------------------------------
 
     def open_service(self, name: str, **fields: str) -> tuple[Connection, Header]:
-        """Connect to a service, of whatever type.
+        """Connect to a service of any type.
 
         Args:
             name: Its name, with a slash in front.
-            fields: More of the connection header: `persistent="1"`.
+            fields: More fields of the connection header, such as `persistent="1"`.
 
         Returns:
-            The connection, which the caller releases, and the header that tells type and node.
+            The connection, which the caller releases, and the header with type and node.
 
         Raises:
             Ros1Error: there is no such service, or it does not answer.
@@ -605,7 +603,8 @@ class Ros1Node:
         try:
             wanted = {"callerid": self.name, "service": name, "md5sum": ANY, **fields}
             connection.send_header(wanted)
-            # Not earlier than this answer: rospy drops what shares a segment with the header.
+            # The caller must not send a request before this answer: rospy drops bytes that arrive
+            # in the same segment as the header.
             return connection, connection.read_header()
         except BaseException:
             connection.release()
@@ -615,10 +614,10 @@ class Ros1Node:
         """Call a service and return the bytes of its response.
 
         Raises:
-            Ros1Error: there is no such service, it is of another type, its handler raised, or it
-                went away before it answered. `reason` is the handler's text if that raised.
+            Ros1Error: there is no such service, it has another type, its handler raised, or its
+                node left before it answered. `reason` is the handler's error text.
 
-        Blocks: `timeout` [s] at most for the answer; see `open_service` for what is before.
+        Blocks: `timeout` [s] at most for the answer, and as `open_service`.
         """
         connection, _ = self.open_service(name, md5sum=md5)
         with connection:
@@ -632,7 +631,7 @@ class Ros1Node:
             raise Ros1Error(name, payload.decode(errors="replace"))
         return payload
 
-    # -- what others ask -----------------------------------------------------------------------
+    # -- calls of other nodes and the master ---------------------------------------------------
 
     def _methods(self) -> dict[str, Callable[..., Any]]:
         return {
@@ -699,20 +698,20 @@ class Ros1Node:
             self._tasks.add(task)
 
     def report(self, about: str, error: ActionlibError) -> None:
-        """Log an error, unless the same was logged about it before."""
+        """Log an error, unless the last one with the same `about` had the same text."""
         text = str(error)
         with self._lock:
-            known = self._told.get(about) == text
-            self._told[about] = text
-            while len(self._told) > MOST_TOLD:
-                del self._told[next(iter(self._told))]
+            known = self._reported.get(about) == text
+            self._reported[about] = text
+            while len(self._reported) > MAX_REPORTED:
+                del self._reported[next(iter(self._reported))]
         if not known:
             log.error("ROS 1 bridge %s: %s", self.name, text)
 
     def forget_report(self, about: str) -> None:
-        """Log the next error about it, even if it is the same."""
+        """Log the next error with this `about`, even if it is the same."""
         with self._lock:
-            self._told.pop(about, None)
+            self._reported.pop(about, None)
 
     def close(self) -> None:
         """Leave the ROS 1 system: unregister everything, end all connections.
@@ -721,14 +720,14 @@ class Ros1Node:
             one that does not.
         """
         with self._lock:
-            made: list[Subscription | Publication | Offer] = [
+            made: list[Subscription | Publication | ServiceServer] = [
                 *self._subscribed.values(),
                 *self._published.values(),
                 *self._served.values(),
             ]
         for wanted in made:
             wanted.close()
-        with contextlib.suppress(Ros1Error):  # a master that is not there has nothing to forget
+        with contextlib.suppress(Ros1Error):  # a master that does not run has no registrations
             state = SystemState.read(self.master, self.ask("getSystemState", timeout=UNREGISTER_S))
             self._unregister(registered(state, self.name), UNREGISTER_S)
         self._data.close(CLOSE_S)
@@ -741,7 +740,7 @@ class Ros1Node:
 
 
 def _is_dead(uri: str) -> bool:
-    """Tell whether nobody listens where a node was, on a computer that is there."""
+    """Return whether a node has died: its computer answers, but nothing listens at its port."""
     try:
         socket.create_connection(split_address(uri, uri, "http"), PROBE_S).close()
     except ConnectionRefusedError:
@@ -751,16 +750,13 @@ def _is_dead(uri: str) -> bool:
     return False
 
 
-MOST_TOLD = 1000  # what was logged; beyond, the oldest is forgotten
-
-
 def find_host(master: str, host: str = "") -> str:
     """Return the name or address under which the robot finds this computer.
 
     Source:
-        https://wiki.ros.org/ROS/NetworkSetup for the order of the variables; past them ROS takes
-        the computer's name, which few robots can look up: the address on the way to the master is
-        one that it can reach.
+        https://wiki.ros.org/ROS/NetworkSetup for the order of the variables. Without them ROS uses
+        the computer's name, which few robots can look up; here it is the local address of the route
+        to the master, which the robot can reach.
 
     Raises:
         Ros1Error: the master's host is not known here.
@@ -771,7 +767,7 @@ def find_host(master: str, host: str = "") -> str:
     there, port = split_address(master, master, "http")
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect((there, port))  # sends nothing
+            probe.connect((there, port))  # only chooses a route: UDP sends nothing yet
             address: str = probe.getsockname()[0]
             return address
     except OSError as error:
@@ -784,7 +780,7 @@ def find_host(master: str, host: str = "") -> str:
 
 @functools.lru_cache(maxsize=64)
 def is_loopback(host: str) -> bool:
-    """Tell whether only this computer reaches `host`."""
+    """Return whether `host` can be reached only from this computer."""
     if host == "localhost":
         return True
     try:
@@ -794,10 +790,10 @@ def is_loopback(host: str) -> bool:
 
 
 def check_master(uri: str) -> str:
-    """Return the address of a master in full: `robot` is "http://robot:11311".
+    """Return the full address of a master: "http://robot:11311" for `robot`.
 
     Raises:
-        Ros1Error: it is none.
+        Ros1Error: it is malformed.
     """
     full = uri if "//" in uri else f"http://{uri}"
     if not re.search(r":\d+/?\Z", full):

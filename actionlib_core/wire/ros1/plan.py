@@ -1,4 +1,4 @@
-"""Which names are bridged: from what was asked for and who is there. No threads, no network."""
+"""Decides which names are bridged, from the options and both networks. No threads, no network."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 _ACTION = {Kind.ACTION_CLIENT, Kind.ACTION_SERVER}
 _TOPIC = {Kind.PUBLISHER, Kind.SUBSCRIBER}
 _OF_EVERY_NODE = ("get_loggers", "set_logger_level")  # services that every node has
-_LOGS = ("/rosout", "/rosout_agg")
+_LOGS = ("/rosout", "/rosout_agg")  # every node publishes its log on the first
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be bridged. Names are those in ROS 1, with a slash in front.
+    """The names to bridge. They are those in ROS 1, with a slash in front.
 
     Attributes:
-        actions: Name -> type "pkg/XAction", "" when it is to be learned.
+        actions: Name -> type "pkg/XAction"; "" when the type is to be learned.
         topics: Names.
         services: Names.
-        used: Also all actions and services of the robot, which programs look for before they use
-            them, and the topics that programs on our network use.
-        all: Also everything that there is.
-        on_demand: Also the actions and topics that programs on our network use, and the actions
-            and services that this program looks for, from then on; nothing else of the robot's.
-        leave_out: Patterns, as `fnmatch` has them, of names that are not, whatever else is asked.
+        used: In addition all actions and services of the robot, as programs look for them before
+            they use them, and the topics that programs on our network use.
+        all: In addition everything on both networks.
+        on_demand: In addition the actions and topics that programs on our network use, and the
+            actions and services that this program looks for, from their first use on.
+        leave_out: Patterns (`fnmatch`) of names that are never bridged.
     """
 
     actions: Mapping[str, str] = field(default_factory=dict)
@@ -47,11 +47,11 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is bridged now. Names are those in ROS 1.
+    """The names that are bridged now, as in ROS 1.
 
     Attributes:
-        actions: Name -> type, "" when it is not known.
-        topics: Name -> whether what is published in ROS 1 is brought here.
+        actions: Name -> type; "" when it is unknown.
+        topics: Name -> whether messages from ROS 1 are passed to our network.
         services: Name -> whether a node in ROS 1 serves it.
     """
 
@@ -61,7 +61,7 @@ class Plan:
 
 
 def without(state: SystemState, prefix: str) -> SystemState:
-    """Return a state without the nodes whose names begin so."""
+    """Return a state without the nodes whose names begin with `prefix`."""
 
     def of(part: dict[str, list[str]]) -> dict[str, list[str]]:
         kept = {
@@ -82,17 +82,19 @@ def make_plan(
     """Decide what is bridged.
 
     Args:
-        wanted: What was asked for.
-        ends: Name in ROS 1 -> the ends of it on our network that belong to no bridge.
-        state: Who is there in ROS 1, without bridges.
+        wanted: The names that were chosen.
+        ends: Name in ROS 1 -> its endpoints on our network, without those of bridges.
+        state: The master's registrations, without those of bridges.
         types: Topic -> type, as the master knows it.
-        looked_for: The actions and services that this program looks for.
+        looked_for: Names in ROS 1 of the actions and services that this program looks for.
     """
     shows = wanted.used or wanted.all
     follow = shows or wanted.on_demand
     kinds = {name: {end.kind for end in there} for name, there in ends.items()} if follow else {}
     topics_there = state.publishers.keys() | state.subscribers.keys()
     learned = find_actions(dict(types), topics_there)
+    # Actions: those chosen, those with an endpoint here, and those in ROS 1 as the options say. A
+    # type that was given counts; else the one that was learned in ROS 1.
     actions = dict(wanted.actions)
     for name, there in kinds.items():
         if there & _ACTION:
@@ -104,6 +106,7 @@ def make_plan(
     actions = {name: given or learned.get(name, "") for name, given in actions.items()}
     parts = {f"{name}/{word}" for name in actions for word in ACTION_WORDS}
 
+    # Topics: messages from ROS 1 are needed only if a program here subscribes, or on request.
     topics = dict.fromkeys(wanted.topics, True)
     for name, there in kinds.items():
         if there & _TOPIC:
@@ -120,6 +123,7 @@ def make_plan(
     def goes(name: str) -> bool:
         return not any(fnmatchcase(name, pattern) for pattern in wanted.leave_out)
 
+    # The five topics of an action belong to its bridge and are not bridged once more.
     return Plan(
         {name: type_name for name, type_name in actions.items() if goes(name)},
         {name: listen for name, listen in topics.items() if name not in parts and goes(name)},

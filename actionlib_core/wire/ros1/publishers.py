@@ -1,8 +1,8 @@
-"""Who publishes on a topic, from two sources that may overtake each other. No threads, no network.
+"""The publishers of a topic, from two sources that may overtake each other. No threads, no network.
 
-The master tells all publishers of a topic in its answer to `registerSubscriber`, and again in a
-`publisherUpdate` whenever they change. An update that arrives while the answer is on its way is
-newer than it.
+The master lists all publishers of a topic in its answer to `registerSubscriber`, and again in a
+`publisherUpdate` whenever they change. An update that arrives before the answer is newer than the
+answer.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 class Change(NamedTuple):
-    """What a list of publishers means for our connections.
+    """What to do with our connections after a new list of publishers.
 
     Attributes:
-        connect: Nodes to connect to, by their address.
-        give_up: Nodes that publish no more: those that cannot be reached need no more trying.
+        connect: Addresses of nodes to connect to.
+        give_up: Addresses of nodes that no longer publish: attempts to connect to them end.
     """
 
     connect: frozenset[str]
@@ -29,10 +29,10 @@ class Publishers:
     """The publishers of one topic.
 
     Args:
-        own: Our own address: a node does not listen to itself.
+        own: Our own address: a node does not subscribe to itself.
 
     Attributes:
-        there: Addresses of the nodes that publish, as far as they were told.
+        there: Addresses of the nodes that publish, from the newest list.
     """
 
     def __init__(self, own: str) -> None:
@@ -41,17 +41,17 @@ class Publishers:
         self.there: frozenset[str] = frozenset()
 
     def ask(self) -> int:
-        """Note that the master is being asked; returns what to give `answer`."""
+        """Note that the master is being asked; return the first argument of `answer`."""
         return self._updates
 
     def answer(self, asked: int, addresses: Iterable[str]) -> Change:
-        """Take the master's answer, unless an update has come since it was asked."""
+        """Handle the master's answer, unless an update has arrived since it was asked."""
         if asked != self._updates:
             return Change(frozenset(), frozenset())
         return self._take(addresses)
 
     def update(self, addresses: Iterable[str]) -> Change:
-        """Take an update."""
+        """Handle an update."""
         self._updates += 1
         return self._take(addresses)
 

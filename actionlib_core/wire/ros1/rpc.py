@@ -1,4 +1,4 @@
-"""XML-RPC as ROS 1 uses it, with deadlines and bounded lengths: calls, and a node's own interface.
+"""XML-RPC as in ROS 1, with deadlines and limited lengths: calls, and the interface of a node.
 
 Source:
     https://wiki.ros.org/ROS/Master_API and https://wiki.ros.org/ROS/Slave_API.
@@ -21,14 +21,18 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock
 
-CALL_S = 3.0  # longest silence of a master or node that was asked
+CALL_S = 3.0  # longest silence of a master or node that is called
 LARGEST_ANSWER = 64 << 20  # all parameters of a robot, maps included
-LARGEST_QUESTION = 1 << 20
-SILENCE_S = 10.0  # longest silence of one that asks us
+LARGEST_REQUEST = 1 << 20
+SILENCE_S = 10.0  # longest silence of a caller
 
 
 class _HttpConnection(http.client.HTTPConnection):
-    """Knows its answer, which has the socket once the other side is to close it."""
+    """Keeps its response, to close it.
+
+    `http.client` hands the socket over to the response when the server announces that it closes the
+    connection; closing only the connection would leak it.
+    """
 
     answer: http.client.HTTPResponse | None = None
 
@@ -38,9 +42,9 @@ class _HttpConnection(http.client.HTTPConnection):
 
 
 class _Transport(xmlrpc.client.Transport):
-    """Waits no longer than a time-out and reads no more than a limit; for one call."""
+    """The transport of one call: waits `timeout` and reads `LARGEST_ANSWER` at most."""
 
-    accept_gzip_encoding = False  # packed bytes may grow beyond any limit
+    accept_gzip_encoding = False  # a small compressed answer could unpack to any size
 
     def __init__(self, timeout: float) -> None:
         super().__init__(use_builtin_types=True)
@@ -73,12 +77,12 @@ def call(uri: str, method: str, *args: Any, timeout: float = CALL_S) -> Any:
 
     Args:
         uri: Its address, "http://robot:11311".
-        method: What is called.
-        args: With what; the caller's name first, by ROS's custom.
+        method: The method's name.
+        args: Its arguments; in ROS the first is the caller's name.
         timeout: Longest silence [s].
 
     Raises:
-        Ros1Error: nobody answers, or the answer is an error or none.
+        Ros1Error: there is no answer, or it is an error or malformed.
 
     Blocks: `timeout` at most between two parts of the answer.
     """
@@ -93,24 +97,24 @@ def call(uri: str, method: str, *args: Any, timeout: float = CALL_S) -> Any:
         raise Ros1Error(uri, f"{method}: got no answer within {timeout:g} s.") from error
     except OSError as error:
         raise Ros1Error(uri, f"{method}: cannot be reached: {error.strerror or error}.") from error
-    except Exception as error:  # whatever a parser says of bytes that are no answer
+    except Exception as error:  # malformed bytes raise many types: of XML, HTTP, Unicode, numbers
         raise Ros1Error(uri, f"{method}: got no XML-RPC answer: {error!s:.200}.") from error
     return read_answer(uri, method, answer)
 
 
 class _Handler(SimpleXMLRPCRequestHandler):
-    rpc_paths = ()  # any: "/" and "/RPC2" are in use
+    rpc_paths = ()  # accepts every path, as nodes use "/" as well as "/RPC2"
     timeout = SILENCE_S
 
     def do_POST(self) -> None:  # noqa: N802  the library's name
         length = self.headers.get("content-length", "")
-        if not (length.isascii() and length.isdigit() and int(length) <= LARGEST_QUESTION):
-            self.send_error(413, f"content-length: expected at most {LARGEST_QUESTION}")
+        if not (length.isascii() and length.isdigit() and int(length) <= LARGEST_REQUEST):
+            self.send_error(413, f"content-length: expected at most {LARGEST_REQUEST}")
             return
         super().do_POST()
 
-    def log_message(self, *_: Any) -> None:  # what others send wrong is theirs to see
-        pass
+    def log_message(self, *_: Any) -> None:
+        """Log nothing: the caller gets the error."""
 
 
 class RpcServer(SimpleXMLRPCDispatcher):
@@ -119,8 +123,7 @@ class RpcServer(SimpleXMLRPCDispatcher):
     Args:
         host: Address to listen at.
         clock: Starts the threads.
-        methods: Name -> function; it returns the value, which is answered as a success. What it
-            raises goes to the caller.
+        methods: Name -> function; its return value is sent as a success, its exception as a fault.
 
     Threads: each call has a thread of its own.
     """
@@ -135,7 +138,7 @@ class RpcServer(SimpleXMLRPCDispatcher):
         self.port = self._listener.port
 
     def _handle(self, sock: socket.socket, peer: str) -> None:
-        _Handler(sock, peer, self)  # type: ignore[arg-type]  # all that it uses of a server is here
+        _Handler(sock, peer, self)  # type: ignore[arg-type]  # this has what it needs of a server
 
     def _dispatch(self, method: str, params: Any) -> Any:
         function = self._methods.get(method)
@@ -144,5 +147,5 @@ class RpcServer(SimpleXMLRPCDispatcher):
         return [1, "", function(*params)]
 
     def close(self, timeout: float) -> None:
-        """Answer no more; blocks `timeout` [s] at most."""
+        """Stop answering; blocks `timeout` [s] at most."""
         self._listener.close(timeout)

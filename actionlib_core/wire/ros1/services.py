@@ -1,4 +1,4 @@
-"""One bridged service, one way or the other."""
+"""One bridged service, in one direction or the other."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Query, Reply
     from actionlib_core.wire.presence import Endpoint
     from actionlib_core.wire.ros1.links import Connection
-    from actionlib_core.wire.ros1.node import Offer
+    from actionlib_core.wire.ros1.node import ServiceServer
     from actionlib_core.wire.ros1.sides import Sides
 
-CALLS_AT_ONCE = 500  # of one service; each has a thread, as in our own services
+CALLS_AT_ONCE = 500  # limit for one service, as each call has a thread
 _BUSY = f"{CALLS_AT_ONCE} calls are under way; expected fewer. Try ending calls sooner."
 
 
 class ServiceBridge:
-    """A service that has its server on either side.
+    """A service whose server is on either network.
 
     Args:
         sides: The two networks.
@@ -50,11 +50,11 @@ class ServiceBridge:
         self._to_ros: _ToRos | None = None
 
     def look(self, ends: Collection[Endpoint], *, served: bool) -> None:
-        """Bridge what is there now.
+        """Update what is bridged.
 
         Args:
-            ends: The ends of that name here that belong to no bridge.
-            served: A node in ROS 1 has it, which then stays the one that is used.
+            ends: The endpoints of that name on our network, without those of bridges.
+            served: A node in ROS 1 offers it; that one is used even if there is one here.
         """
         key = self._sides.key(self._name)
         servers = (end for end in ends if end.kind is Kind.SERVICE)
@@ -76,14 +76,17 @@ class ServiceBridge:
             self._from_ros = _FromRos(self._sides, key, self._name, self._timeout)
 
     def close(self) -> None:
-        """Bridge no more; does not wait."""
+        """End the bridge; does not wait."""
         for each in (self._from_ros, self._to_ros):
             if each is not None:
                 each.close()
 
 
 class _FromRos:
-    """A service in ROS 1, shown here while a connection to its node lasts: so its end is seen."""
+    """A service in ROS 1, shown on our network while a connection to its node is open.
+
+    The connection carries no calls; its end shows that the node has left.
+    """
 
     def __init__(self, sides: Sides, key: str, name: str, timeout: float) -> None:
         self._sides = sides
@@ -97,7 +100,7 @@ class _FromRos:
         sides.ros.spawn(self._follow, f"ros1-service{name}")
 
     def close(self) -> None:
-        """Show it no more; does not wait."""
+        """Withdraw it; does not wait."""
         self._closed.set()
         if self._connection is not None:
             self._connection.close()
@@ -124,7 +127,7 @@ class _FromRos:
             ros.forget_report(about)
             answer = transport.queryable(self._key, partial(self._on_query, typed))
             token = self._sides.show(Kind.SERVICE, self._key, typed, header.get("callerid", ""))
-            connection.read(1)  # a service says nothing unasked: this waits for its end
+            connection.read(1)  # a service sends nothing without a request: this waits for the end
             self._connection = None
             token.close()
             answer.close()
@@ -159,31 +162,31 @@ class _FromRos:
 
 
 def _refuse(query: Query, error: Exception) -> None:
-    """Answer with an error, as our own services do."""
-    told = error.reason if isinstance(error, Ros1Error) else str(error)
-    query.reply_error(json.dumps({"type": type(error).__name__, "text": told}))
+    """Answer with an error, in the format of our own services."""
+    text = error.reason if isinstance(error, Ros1Error) else str(error)
+    query.reply_error(json.dumps({"type": type(error).__name__, "text": text}))
     query.finish()
 
 
 class _ToRos:
-    """A service of ours, for callers in ROS 1."""
+    """A service on our network, for callers in ROS 1."""
 
     def __init__(self, sides: Sides, key: str, name: str, typed: Typed, timeout: float) -> None:
         self.typed = typed
         self._sides = sides
         self._key = key
         self._timeout = timeout
-        self._offer: Offer = sides.ros.provide(name, *typed, self._answer)
+        self._offer: ServiceServer = sides.ros.provide(name, *typed, self._answer)
 
     def close(self) -> None:
-        """Offer it no more; does not wait."""
+        """Withdraw it; does not wait."""
         self._offer.close()
 
     def _answer(self, request: bytes, caller: str) -> bytes:
-        """Call our service; in the thread of the caller's connection.
+        """Call the service; runs in the thread of the caller's connection.
 
         Raises:
-            Ros1Error: it raised, is gone, or does not answer in time.
+            Ros1Error: it raised, has left, or does not answer in time.
         """
         node = self._sides.node
         replies: list[Reply] = []
@@ -212,10 +215,10 @@ class _ToRos:
 
 
 def _read_error(payload: bytes) -> str:
-    """Return the text of an error reply: JSON with type and text, if the server is ours."""
+    """Return the text of an error reply; our own services send JSON with type and text."""
     text = payload.decode(errors="replace")
     try:
-        told = json.loads(text)
-        return f"{told['type']}: {told['text']}"
+        error = json.loads(text)
+        return f"{error['type']}: {error['text']}"
     except (ValueError, TypeError, KeyError):
         return text

@@ -1,4 +1,4 @@
-"""What every bridged name needs of the two sides: their nodes, and how names correspond."""
+"""What every bridged name uses: the nodes on both networks, and the mapping of names."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros1.node import Ros1Node
 
 BRIDGE = "/smachpy_bridge_"
-"""How the names of bridges in ROS 1 begin: they do not listen to each other."""
+"""Prefix of the names of bridges in ROS 1, by which they ignore each other."""
 
 
 class Typed(NamedTuple):
-    """A type as a connection header tells it.
+    """A type as in a connection header.
 
     Attributes:
         type: "pkg/Type".
@@ -40,12 +40,12 @@ class Typed(NamedTuple):
 
 @dataclass(frozen=True)
 class Sides:
-    """The two networks, for all that is bridged between them.
+    """The two networks of a bridge.
 
     Attributes:
-        node: On ours.
-        ros: In ROS 1.
-        namespace: What the robot's names live under on our side, "robot_1"; "" is nothing.
+        node: The node on our network.
+        ros: The node in ROS 1.
+        namespace: Prefix of the robot's names on our network, "robot_1"; "" for none.
     """
 
     node: Node
@@ -53,17 +53,17 @@ class Sides:
     namespace: str
 
     def key(self, ros_name: str) -> str:
-        """Return our name of a name in ROS 1."""
+        """Return the name on our network of a name in ROS 1."""
         plain = ros_name.lstrip("/")
         return f"{self.namespace}/{plain}" if self.namespace else plain
 
     def ros_name(self, key: str) -> str | None:
-        """Return the name in ROS 1 of one of ours; None: it belongs to another robot."""
+        """Return the name in ROS 1 of a name on our network; None: it is another robot's."""
         front = f"{self.namespace}/" if self.namespace else ""
         return f"/{key.removeprefix(front)}" if key.startswith(front) else None
 
     def show(self, kind: Kind, key: str, typed: Typed, ros_node: str) -> Closable:
-        """Show the token of an end in ROS 1, under the name of its node there."""
+        """Declare the token of an endpoint in ROS 1, with the name of its node there."""
         end = self.node.endpoint(kind, key, typed.type, typed.md5)
         end = end._replace(node=self.key(ros_node) or "-")
         return self.node.transport.declare_alive(
@@ -71,11 +71,11 @@ class Sides:
         )
 
     def is_own(self, sample: Sample) -> bool:
-        """Tell whether a message came from this bridge."""
+        """Return whether this bridge has sent a message."""
         return sample.source == self.node.transport.session_id
 
     def fits(self, sample: Sample, typed: Typed) -> bool:
-        """Tell whether a message has a type; one that has not is reported."""
+        """Return whether a message has the type `typed`; if not, report it."""
         if sample.encoding in {"", typed.encoding}:
             return True
         found = parse_encoding(sample.encoding)
@@ -86,10 +86,10 @@ class Sides:
 
 
 def type_of(header: Header, about: str) -> Typed:
-    """Return the type that a connection header tells.
+    """Return the type in a connection header.
 
     Raises:
-        Ros1Error: it tells none, or comes from another bridge.
+        Ros1Error: it has none, or comes from another bridge.
     """
     node = header.get("callerid", "")
     if node.startswith(BRIDGE):
@@ -97,6 +97,6 @@ def type_of(header: Header, about: str) -> Typed:
     typed = Typed(header.get("type", ANY), header.get("md5sum", ANY))
     if ANY in typed or not all(typed):
         raise Ros1Error(f"{about} of {node}", f"type: got {typed}; expected one with its checksum.")
-    if any(set(part) & set("%;$*?# ") for part in typed):
+    if any(set(part) & set("%;$*?# ") for part in typed):  # reserved in keys and encodings
         raise Ros1Error(f"{about} of {node}", f"type: got {typed!r:.200}; expected 'pkg/Type'.")
     return typed

@@ -1,4 +1,4 @@
-"""One bridged topic, both ways."""
+"""One bridged topic, in both directions."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros1.sides import Sides
 
 LATCHED = "1"
-MOST_SENDERS = 64  # of a topic, whose last messages are kept until it is known whether they latch
+MOST_SENDERS = 64  # their last messages are kept, as it is not known at once who of them latches
 
 
 class TopicBridge:
-    """A topic on both sides.
+    """A topic on both networks.
 
-    Each publisher in ROS 1 has a publisher and a token of its own here, with its node's name, so
-    that several latched ones keep a message each. All publishers here are one in ROS 1.
+    Each publisher in ROS 1 gets its own publisher and token on our network, with its node's name,
+    so that each latched publisher keeps a message. All publishers on our network are one in ROS 1.
 
     Args:
         sides: The two networks.
         topic: Its name in ROS 1.
-        definitions: Texts of types, of which more are learned here.
+        definitions: Gets the definitions that publishers send.
 
     Threads: `look` and `close` from one thread.
     """
@@ -46,17 +46,18 @@ class TopicBridge:
         self._to_ros: _ToRos | None = None
 
     def look(self, ends: Collection[Endpoint], *, listen: bool) -> None:
-        """Bridge what is wanted now.
+        """Update what is bridged.
 
         Args:
-            ends: The publishers and subscribers of the topic here that belong to no bridge.
-            listen: Bring here what is published in ROS 1.
+            ends: The endpoints of the topic on our network, without those of bridges.
+            listen: Pass messages from ROS 1 to our network.
         """
         if listen and self._from_ros is None:
             self._from_ros = self._sides.ros.subscribe(self._topic, self._accept)
         elif not listen and self._from_ros is not None:
             self._from_ros.close()
             self._from_ros = None
+        # A topic has one type in ROS 1. Keep the current one as long as a publisher here has it.
         types = sorted({Typed(end.type, end.md5) for end in ends if end.kind is Kind.PUBLISHER})
         if self._to_ros is not None and self._to_ros.typed not in types:
             self._to_ros.close()
@@ -65,7 +66,7 @@ class TopicBridge:
             self._to_ros = _ToRos(self._sides, self._topic, types[0], self._definitions)
 
     def close(self) -> None:
-        """Bridge no more; does not wait."""
+        """End the bridge; does not wait."""
         for each in (self._from_ros, self._to_ros):
             if each is not None:
                 each.close()
@@ -77,9 +78,9 @@ class TopicBridge:
 
 
 class _FromRos:
-    """One publisher in ROS 1, as it is here."""
+    """A publisher in ROS 1, shown on our network."""
 
-    within = 0.0
+    coalesce_s = 0.0
 
     def __init__(self, sides: Sides, key: str, typed: Typed, header: Header) -> None:
         latch = header.get("latching") == LATCHED
@@ -88,17 +89,17 @@ class _FromRos:
         self._token = sides.show(Kind.PUBLISHER, key, typed, header.get("callerid", ""))
 
     def take(self, payload: bytes) -> None:
-        """Pass a message on; blocks while our network has no room, as ROS 1 buffers too."""
+        """Pass a message on; blocks while a link is full: ROS 1 then buffers or drops messages."""
         self._port.put(payload)
 
     def gone(self) -> None:
-        """Leave the topic."""
+        """Withdraw the publisher."""
         self._token.close()
         self._port.close()
 
 
 class _ToRos:
-    """The publishers here, as one in ROS 1."""
+    """The publishers on our network, as one publisher in ROS 1."""
 
     def __init__(self, sides: Sides, topic: str, typed: Typed, definitions: Definitions) -> None:
         self.typed = typed
@@ -106,9 +107,9 @@ class _ToRos:
         self._key = sides.key(topic)
         self._lock = threading.Lock()
         self._latched: dict[str, set[str]] = {}  # session -> keys of its latched publishers' tokens
-        self._last: dict[
-            str, bytes
-        ] = {}  # session -> its last message, which may precede the token
+        # Session -> its last message. The message of a latched publisher may arrive before its
+        # token, so the last one of every session is kept.
+        self._last: dict[str, bytes] = {}
         transport = sides.node.transport
         self._publication: Publication = sides.ros.advertise(
             topic, *typed, definitions.text(typed), latching=False, accept=self._accept
@@ -117,13 +118,13 @@ class _ToRos:
         self._parts: list[Closable] = [latches, transport.subscribe(self._key, self._on_sample)]
 
     def close(self) -> None:
-        """Publish no more; does not wait."""
+        """Stop publishing; does not wait."""
         for part in self._parts:
             part.close()
         self._publication.close()
 
     def _on_latch(self, presence: Presence) -> None:
-        """Note who latches: subscribers in ROS 1 that come later get their last messages."""
+        """Note which sessions latch: later subscribers in ROS 1 get their last messages."""
         session = presence.key.rsplit("/", 2)[1]
         if session == self._sides.node.transport.session_id:
             return

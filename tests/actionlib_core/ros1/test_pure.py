@@ -191,7 +191,7 @@ def test_goals_of_clients_are_sent_again_until_the_server_speaks_of_them():
 def test_goals_that_a_dead_server_may_have_taken_are_not_sent_to_the_next():
     goals = GoalsOfClients()
     goals.on_goal("g", b"goal", now=0.0)
-    goals.lose_unheard()
+    goals.drop_unacknowledged()
     goals.on_goal("g", b"goal", now=0.0)  # a repetition
     assert goals.next_due() is None
 
