@@ -1,4 +1,4 @@
-"""Programs for ROS 1, as they are: `rospy`, `smach`, `tf` and the others under their old names.
+"""Runs unchanged programs for ROS 1: `rospy`, `smach`, `tf` and others under their old names.
 
     import smachpy.ros1
 

@@ -1,8 +1,8 @@
-"""Keep a program that is only built from doing anything: files, processes and questions.
+"""Disables side effects while a script is run only to build its machine.
 
-While `nothing_done` is on, files are opened for writing as the null device, processes and shell
-commands end at once without having run, questions are answered with an empty line, and what would
-change the file system does nothing.
+Inside `nothing_done`, files opened for writing are the null device, processes and shell commands
+end at once without running, `input` returns an empty line, and functions that change the file
+system do nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+# `fsync` is there because it fails on the null device.
 _CHANGES: tuple[tuple[Any, str], ...] = (
     *((os, name) for name in ("mkdir", "makedirs", "remove", "unlink", "rename", "replace")),
     *(
@@ -30,7 +31,7 @@ _CHANGES: tuple[tuple[Any, str], ...] = (
 
 
 class _NoOutput(str):
-    """The output of a process that did not run, as text and, for `decode()`, as bytes."""
+    """The empty output of a process; it can be used as text and, with `decode()`, as bytes."""
 
     __slots__ = ()
 
@@ -40,7 +41,7 @@ class _NoOutput(str):
 
 
 class _NoProcess:
-    """A process that has ended before it began."""
+    """A process that has already ended, successfully and without output."""
 
     pid = 0
     returncode = 0
@@ -80,9 +81,9 @@ class _NoProcess:
 
 @contextlib.contextmanager
 def nothing_done() -> Iterator[None]:
-    """Let nothing be written, started or asked in the `with` block.
+    """Disable writing, starting processes and asking the user in the `with` block.
 
-    Threads: it holds for the whole process.
+    Threads: it affects all threads of the process.
     """
     real_open = builtins.open
 
@@ -101,6 +102,7 @@ def nothing_done() -> Iterator[None]:
         *((module, name, lambda *_args, **_kwargs: None) for module, name in _CHANGES),
     ]
     before = [(module, name, getattr(module, name)) for module, name, _ in places]
+    # Python writes __pycache__ with functions of its own, which the replacements do not reach.
     bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         for module, name, value in places:

@@ -1,4 +1,4 @@
-"""What only old programs need, and so comes with the extra `ros1`."""
+"""Imports of packages that come with the extra `ros1`, as only old programs need them."""
 
 from __future__ import annotations
 
@@ -40,6 +40,7 @@ def import_extra(module: str, what: str) -> ModuleType:
         return import_module(module)
     except ModuleNotFoundError as error:
         package = module.partition(".")[0]
+        # The package is there, but something that it imports is not: not an extra of ours.
         if error.name is None or error.name.partition(".")[0] != package:
             raise
         raise MissingExtraError(package, what) from error

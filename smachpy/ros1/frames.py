@@ -1,11 +1,11 @@
-"""A tree of coordinate frames over time: add transforms, look up the way from one frame to another.
+"""A tree of coordinate frames over time: add transforms, look up transforms between two frames.
 
 A transform of (parent, child) holds translation [m] and rotation (quaternion x, y, z, w) that take
 coordinates in the child frame to the parent frame, as in geometry_msgs/TransformStamped. Between
 two known times translations are interpolated linearly and rotations along the shortest arc.
 
 Source:
-    https://wiki.ros.org/tf2 for meaning, names of errors and the ten seconds of history.
+    https://wiki.ros.org/tf2 for the meaning, the texts of errors and the ten seconds of history.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 CACHE_S: Final = 10.0
-"""How long a transform is kept after newer ones have come [s]."""
+"""A transform is dropped when it is older than the newest one by this time [s]."""
 
 
 class FrameError(Exception):
-    """A transform cannot be had."""
+    """A transform cannot be added or looked up."""
 
 
 class UnknownFrameError(FrameError):
@@ -29,11 +29,11 @@ class UnknownFrameError(FrameError):
 
 
 class UnconnectedFramesError(FrameError):
-    """No way leads from one frame to the other."""
+    """Two frames are not in the same tree."""
 
 
 class OutOfTimeError(FrameError):
-    """The time that was asked for is before or after what is known."""
+    """The requested time is before the first or after the last known transform."""
 
 
 class Transform(NamedTuple):
@@ -48,7 +48,7 @@ class Transform(NamedTuple):
     qw: float = 1.0
 
     def then(self, other: Transform) -> Transform:
-        """Return this one applied after `other`: self * other."""
+        """Return the product self * other: it applies `other` first."""
         x, y, z = self.apply(other.x, other.y, other.z)
         ax, ay, az, aw = self[3:]
         bx, by, bz, bw = other[3:]
@@ -63,13 +63,14 @@ class Transform(NamedTuple):
         )
 
     def inverse(self) -> Transform:
-        """Return the way back."""
+        """Return the inverse transform."""
         back = Transform(0.0, 0.0, 0.0, -self.qx, -self.qy, -self.qz, self.qw)
         x, y, z = back.apply(-self.x, -self.y, -self.z)
         return Transform(x, y, z, *back[3:])
 
     def apply(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         """Return a point of the child frame in the parent frame [m]."""
+        # Rotation of v by the unit quaternion (q, w): v + w * t + q x t with t = 2 * (q x v).
         qx, qy, qz, qw = self[3:]
         tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
         return (
@@ -83,14 +84,15 @@ IDENTITY: Final = Transform()
 
 
 def interpolate(before: Transform, after: Transform, share: float) -> Transform:
-    """Return what lies between two transforms: 0 is `before`, 1 is `after`."""
+    """Return the transform between two others; `share` is 0 at `before` and 1 at `after`."""
     x, y, z = (a + (b - a) * share for a, b in zip(before[:3], after[:3], strict=True))
     one, two = before[3:], after[3:]
     dot = sum(a * b for a, b in zip(one, two, strict=True))
+    # q and -q are the same rotation; of the two, take the one that gives the shorter arc.
     if dot < 0:
         two, dot = (-two[0], -two[1], -two[2], -two[3]), -dot
     angle = math.acos(min(dot, 1.0))
-    if angle < 1e-6:  # noqa: PLR2004  nothing to turn
+    if angle < 1e-6:  # noqa: PLR2004  the same rotation; the division below would be by 0
         return Transform(x, y, z, *one)
     left, right = math.sin((1 - share) * angle), math.sin(share * angle)
     whole = math.sin(angle)
@@ -100,7 +102,7 @@ def interpolate(before: Transform, after: Transform, share: float) -> Transform:
 
 @dataclass(slots=True)
 class _Edge:
-    """What is known of a frame below its parent: times [ns], in order, and transforms."""
+    """The history of a frame relative to its parent: times [ns] in order, and transforms."""
 
     parent: str
     static: bool = False
@@ -109,10 +111,10 @@ class _Edge:
 
 
 class Frames:
-    """The tree.
+    """The tree of frames.
 
     Args:
-        cache_s: How long transforms are kept [s].
+        cache_s: Length of the history [s].
 
     Threads: every method may be called from any thread.
     """
@@ -125,10 +127,10 @@ class Frames:
     def add(
         self, parent: str, child: str, stamp_ns: int, transform: Transform, *, static: bool = False
     ) -> None:
-        """Take a transform over; one with another parent than before replaces the history.
+        """Add a transform; with another parent than before, it replaces the frame's history.
 
         Raises:
-            FrameError: a frame is its own parent, or a number is none.
+            FrameError: a frame is its own parent, or a number is not finite.
         """
         parent, child = _clean(parent), _clean(child)
         if not child or parent == child:
@@ -162,17 +164,17 @@ class Frames:
             return sorted({*self._edges, *(edge.parent for edge in self._edges.values())})
 
     def look_up(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Transform, int]:
-        """Return what takes coordinates in `source` to `target`, and its time [ns].
+        """Return the transform of coordinates from `source` to `target`, and its time [ns].
 
         Args:
             target: Frame of the result.
             source: Frame of the coordinates.
-            stamp_ns: When; 0 is the latest time at which all of the way is known.
+            stamp_ns: The time; 0: the latest time for which all transforms in between are known.
 
         Raises:
-            UnknownFrameError: one of them is not known.
+            UnknownFrameError: one of the frames is not known.
             UnconnectedFramesError: they have no common ancestor.
-            OutOfTimeError: a part of the way is not known at that time.
+            OutOfTimeError: a transform in between is not known at that time.
         """
         target, source = _clean(target), _clean(source)
         with self._lock:
@@ -181,6 +183,8 @@ class Frames:
                 edges = [self._edges[name] for name in (*up, *down)]
                 times = [edge.times[-1] for edge in edges if not edge.static]
                 stamp_ns = min(times, default=0)
+            # From source up to the common ancestor, and from target up to it; the second is
+            # inverted, as it is needed downwards.
             there, back = IDENTITY, IDENTITY
             for name in up:
                 there = self._at(name, stamp_ns).then(there)
@@ -189,7 +193,10 @@ class Frames:
         return back.inverse().then(there), stamp_ns
 
     def _way(self, target: str, source: str) -> tuple[list[str], list[str]]:
-        """Return the frames whose edges lead up from source, and up from target, to their top."""
+        """Return the frames from source, and from target, up to their common ancestor.
+
+        The ancestor itself is in neither list.
+        """
         for name, other in ((target, source), (source, target)):
             known = name in self._edges or any(e.parent == name for e in self._edges.values())
             if not known and name != other:
@@ -210,6 +217,7 @@ class Frames:
 
     def _ancestors(self, name: str) -> list[str]:
         found = [name]
+        # The second condition ends it where messages have made a cycle.
         while name in self._edges and self._edges[name].parent not in found:
             name = self._edges[name].parent
             found.append(name)
@@ -236,5 +244,5 @@ class Frames:
 
 
 def _clean(name: str) -> str:
-    """Return a frame's name as tf2 has it; tf's names may have a slash in front."""
+    """Return a frame's name as in tf2; in tf, names may have a slash in front."""
     return str(name).lstrip("/")

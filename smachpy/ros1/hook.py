@@ -1,9 +1,10 @@
-"""The import hook that finds what programs for ROS 1 import, while it is installed.
+"""The import hook that finds the modules which programs for ROS 1 import.
 
-In this order: ROS's own names (`rospy`, `smach`, `tf`, ...), which lie in `smachpy.ros1.names`;
-messages of the bundled packages, of the project and of SMACHPY_INTERFACE_PATH; modules of the
-project, converted from Python 2 if need be. What is left is found as ever, or, if a stand-in is
-wanted and a file of the project asks for it, gets one.
+In this order: ROS's own names (`rospy`, `smach`, `tf`, ...) in `smachpy.ros1.names`; messages of
+the bundled packages, of the project and of SMACHPY_INTERFACE_PATH; modules of the project,
+converted from Python 2 if necessary. All other modules are left to Python's own finders. If those
+fail and a file of the project imports the module, it gets a stand-in, if that was chosen, or a
+helpful error.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ OLD_NAMES: Final = frozenset(
         *("tf_conversions", "pnp_cmd_ros"),
     }
 )
-"""The packages of ROS 1 whose modules are here."""
+"""The packages of ROS 1 that `smachpy.ros1.names` provides."""
 
 ALIASES: Final = {
     name.replace("smachpy.", f"{old}.", 1): home
@@ -67,19 +68,19 @@ ALIASES: Final = {
     "tf2_ros.transform_broadcaster": "smachpy.ros1.names.tf2_ros",
     "tf2_ros.transform_listener": "smachpy.ros1.names.tf2_ros",
 }
-"""Other module names -> module here."""
+"""Module names of ROS 1 that have another name here -> the module here."""
 
 _SECTIONS: Final = ("msg", "srv")
 _NEVER_STUBBED: Final = frozenset({"__main__", "sitecustomize", "usercustomize"})
 
 
 class MissingPackageError(ModuleNotFoundError):
-    """A program imports what neither this package nor its surroundings have.
+    """A program imports a module that neither this package nor its project has.
 
     Attributes:
-        name: What it imports.
-        file: Where it does.
-        line: In which line of it.
+        name: The module.
+        file: The file that imports it.
+        line: The line of the import.
     """
 
     def __init__(self, name: str, file: str, line: int) -> None:
@@ -101,7 +102,7 @@ class MissingPackageError(ModuleNotFoundError):
 
 
 class _Alias(Loader):
-    """Puts a module that has another name in place."""
+    """Imports a module under another name."""
 
     def __init__(self, home: str) -> None:
         self._home = home
@@ -110,16 +111,17 @@ class _Alias(Loader):
         """Leave it to Python."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Put the module itself in place of the empty one."""
+        """Replace the new empty module by the real one."""
+        # One module object under both names, so that `isinstance` and module state agree.
         sys.modules[module.__name__] = import_module(self._home)
 
 
 class _Stub(Loader):
-    """Makes a stand-in, or the interfaces of a package that is there."""
+    """Makes a stand-in, or a section (`msg`, `srv`) of a package of interfaces."""
 
     def __init__(self, *, known: bool = False, complete: bool = False) -> None:
-        self._known = known  # there is something of that name, which may lack a part
-        self._complete = complete  # what it lacks is an error
+        self._known = known  # the package exists, but may lack some interfaces
+        self._complete = complete  # a missing interface is an error, and gets no stand-in
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Make a section of interfaces or a module."""
@@ -134,13 +136,13 @@ class _Stub(Loader):
 
 
 class _Generated(Loader):
-    """Makes `pkg.msg._Name`, which ROS 1's generator wrote and some programs import from."""
+    """Makes `pkg.msg._Name`, a module of ROS 1's generator that some programs import directly."""
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Leave it to Python."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Put the class in, and those that belong to a service."""
+        """Add the class, and for a service those of request and response."""
         section, _, name = module.__name__.rpartition("._")
         home = import_module(section)
         setattr(module, name, getattr(home, name))
@@ -150,7 +152,7 @@ class _Generated(Loader):
 
 
 class _Config(Loader):
-    """Makes `pkg.cfg.NameConfig` out of its `.cfg` file, or the packages around it out of none."""
+    """Makes `pkg.cfg.NameConfig` from its `.cfg` file; without a file, the package around it."""
 
     def __init__(self, file: Path | None) -> None:
         self._file = file
@@ -165,7 +167,7 @@ class _Config(Loader):
 
 
 class OldSourceLoader(SourceFileLoader):
-    """Loads a module of the project, converted from Python 2 if need be; leaves no files behind."""
+    """Loads a module of the project, converted from Python 2 if necessary; writes no bytecode."""
 
     def get_code(self, fullname: str) -> CodeType:
         """Compile the source."""
@@ -174,36 +176,40 @@ class OldSourceLoader(SourceFileLoader):
 
 
 class OldNames(MetaPathFinder):
-    """The finder.
+    """The finder of the import hook.
 
     Args:
-        project: What lies around the program.
-        stub_missing: Whether what is missing gets a stand-in.
+        project: The surroundings of the program.
+        stub_missing: Whether missing modules get stand-ins.
     """
 
     def __init__(self, project: Project, *, stub_missing: bool = False) -> None:
         self.project = project
         self._stub_missing = stub_missing
-        self._known: set[str] = set()  # packages of the project whose interfaces were made known
-        self._busy: set[str] = set()
+        self._known: set[str] = set()  # packages of the project whose interfaces are registered
+        self._busy: set[str] = set()  # names that are looked up in the other finders just now
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Find a module; None leaves it to the finders after this one."""
         del target
+        # 1. Names of ROS 1 that are provided here.
         home = self._home_of(fullname)
         if home is not None:
             return _alias(fullname, home)
         top, _, below = fullname.partition(".")
         if top in {"smachpy", "actionlib_core", "viz", "missions"} or fullname in self._busy:
             return None
+        # 2. Interfaces: the project's definitions have to be registered before they are looked up.
         if below.partition("._")[0] in _SECTIONS and "._" in below:
             return ModuleSpec(fullname, _Generated())
         if below and isinstance(sys.modules.get(top), StubModule):
             return self._missing(fullname, path)
-        self._know_interfaces(top)
+        self._register_interfaces(top)
         has_interfaces = find_spec(f"{INTERFACES}.{top}") is not None
+        # 3. Modules of the project. A package may have both modules and interfaces; its `msg` and
+        #    `srv` always are the interfaces here, not generated modules in the project.
         found = None
         if not (has_interfaces and below in _SECTIONS):
             found = self._in_project(fullname, path)
@@ -215,7 +221,7 @@ class OldNames(MetaPathFinder):
         return found or self._config(fullname) or self._missing(fullname, path)
 
     def _config(self, fullname: str) -> ModuleSpec | None:
-        """Find `pkg.cfg.NameConfig` by `cfg/Name.cfg`; `pkg` and `pkg.cfg`, too, if it has one."""
+        """Find `pkg.cfg.NameConfig` by its file `cfg/Name.cfg`; then also `pkg` and `pkg.cfg`."""
         package, _, below = fullname.partition(".")
         section, _, name = below.partition(".")
         folder = self.project.packages().get(package)
@@ -227,25 +233,25 @@ class OldNames(MetaPathFinder):
         return ModuleSpec(fullname, _Config(file if name else None), is_package=not name)
 
     def claims(self, name: str) -> bool:
-        """Tell whether a module name is one of ROS's, so that another module must not have it."""
+        """Return whether a module name belongs to ROS, so that other modules must not have it."""
         top = name.partition(".")[0]
         return top in OLD_NAMES or find_spec(f"{INTERFACES}.{top}") is not None
 
     def made(self, name: str, module: ModuleType) -> bool:
-        """Tell whether a module was found by this finder."""
+        """Return whether a module was found by this finder."""
         if self.claims(name) or isinstance(module, (StubModule, OldSection)):
             return True
-        return self._is_projects(module)
+        return self._is_of_project(module)
 
-    def _is_projects(self, module: Any) -> bool:
-        """Tell whether a module is one of the project's; None is none."""
+    def _is_of_project(self, module: Any) -> bool:
+        """Return whether a module belongs to the project; false for None."""
         if isinstance(getattr(module, "__loader__", None), (OldSourceLoader, _Config)):
             return True
         places = getattr(module, "__path__", ()) if not getattr(module, "__file__", None) else ()
         return any(self.project.holds(place) for place in places)
 
     def _home_of(self, fullname: str) -> str | None:
-        # `from sensor_msgs import point_cloud2` asks by the name that the package has here
+        # `from sensor_msgs import point_cloud2` asks for a submodule of the module's real name.
         old = fullname.removeprefix(f"{INTERFACES}.").removeprefix(f"{NAMES}.")
         alias = ALIASES.get(old)
         if alias is not None or fullname.partition(".")[0] not in OLD_NAMES:
@@ -256,8 +262,8 @@ class OldNames(MetaPathFinder):
         except ModuleNotFoundError:
             return None
 
-    def _know_interfaces(self, package: str) -> None:
-        """Make the definitions of a package of the project known, and of those that it uses."""
+    def _register_interfaces(self, package: str) -> None:
+        """Register the definitions of a package of the project, once."""
         if package in self._known:
             return
         self._known.add(package)
@@ -278,6 +284,8 @@ class OldNames(MetaPathFinder):
         name = fullname.rpartition(".")[2]
         if path is not None:
             places = [Path(place) for place in path if self.project.holds(place)]
+        # A module in the script's own folder hides one of the standard library, as in Python; one
+        # elsewhere in the project does not.
         elif name in sys.stdlib_module_names and not _lies_in(self.project.folder, name):
             return None
         else:
@@ -299,7 +307,7 @@ class OldNames(MetaPathFinder):
     def _namespace(
         self, fullname: str, folders: list[Path], path: Sequence[str] | None
     ) -> ModuleSpec | None:
-        """Find a package without `__init__.py`: folders with modules, that nobody else has."""
+        """Find a package without `__init__.py`: folders with modules, if no other finder has it."""
         found = [
             str(folder)
             for folder in folders
@@ -312,16 +320,20 @@ class OldNames(MetaPathFinder):
         return spec
 
     def _missing(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
-        """Look whether nobody else has it; a stand-in then, or an error that says what to do."""
+        """Handle a module that no finder has: return a stand-in, or raise a helpful error.
+
+        None if another finder has it, or if it is not the project that imports it: libraries try
+        imports and handle the error themselves.
+        """
         importer = _importer()
         if importer is None or not self.project.holds(importer[0]) or fullname in _NEVER_STUBBED:
             return None
         if path is not None:
             above = fullname.rpartition(".")[0]
             parent = sys.modules.get(above)
-            lacks = self._stub_missing and self._is_projects(parent)
+            lacks = self._stub_missing and self._is_of_project(parent)
             if not (lacks or isinstance(parent, StubModule) or self.claims(above)):
-                return None  # its package was found, and Python says what it lacks
+                return None  # its package was found, and Python's own error is clear
         elif self._is_elsewhere(fullname):
             return None
         if self._stub_missing:
@@ -331,8 +343,8 @@ class OldNames(MetaPathFinder):
         raise MissingPackageError(fullname, file, line)
 
     def _is_elsewhere(self, fullname: str) -> bool:
-        """Tell whether the finders after this one have a module."""
-        self._busy.add(fullname)
+        """Return whether the finders after this one have a module."""
+        self._busy.add(fullname)  # `find_spec` asks this finder too, which then declines
         try:
             return find_spec(fullname) is not None
         except (ImportError, ValueError):
@@ -350,8 +362,8 @@ def _lies_in(folder: Path, name: str) -> bool:
 
 
 def _importer() -> tuple[str, int] | None:
-    """Return file and line of the code that imports."""
-    frame: FrameType | None = sys._getframe(1)  # who imports
+    """Return file and line of the import statement."""
+    frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         file = frame.f_code.co_filename
         if file != __file__ and "importlib" not in file:
@@ -361,7 +373,7 @@ def _importer() -> tuple[str, int] | None:
 
 
 def _folder_of_importer(project: Project) -> list[Path]:
-    """Return the folder of the importing module: Python 2 looked there for neighbours first."""
+    """Return the folder of the importing module: in Python 2, `import x` looks there first."""
     importer = _importer()
     if importer is None or not project.holds(importer[0]):
         return []

@@ -1,4 +1,4 @@
-"""Put the old names in place, and take them away again."""
+"""Makes ROS 1's module names importable, and undoes that."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _lock = threading.Lock()
 
 
 class _Installed:
-    """What `install` changed."""
+    """What `install` has changed, to undo it."""
 
     def __init__(self, finder: OldNames) -> None:
         self.finder = finder
@@ -36,13 +36,14 @@ _installed: list[_Installed] = []
 def install(script: str | Path | None = None, *, stub_missing: bool = False) -> None:
     """Make ROS 1's names importable in this process, and accept the slips that SMACH accepted.
 
-    Modules of these names that were imported before, of an installed SMACH for example, are put
-    aside. Calling it again changes what lies around the program, no more.
+    Modules of these names that were imported before, for example those of an installed SMACH, are
+    put aside until `uninstall`. A second call only changes the script.
 
     Args:
-        script: The program; its folder and package are searched for modules and messages. None
-            takes the main module's file, or the working folder.
-        stub_missing: Modules, messages and, in `load`, parameters that nobody has get stand-ins.
+        script: The program; its folder and package are searched for modules and messages. None:
+            the main module's file, or the working folder.
+        stub_missing: Missing modules, messages and, in `load`, parameters are replaced by
+            stand-ins.
 
     Threads: any, one at a time.
     """
@@ -61,9 +62,10 @@ def install(script: str | Path | None = None, *, stub_missing: bool = False) -> 
             if finder.claims(name):
                 made.hidden[name] = sys.modules.pop(name)
         _installed.append(made)
-        sys.meta_path.insert(0, finder)
+        sys.meta_path.insert(0, finder)  # first, before packages that are installed under the names
         slips.set_accepting(True)
-        util.set_shutdown_check(_is_shutdown)  # as `import smach_ros` did in ROS, which some lack
+        # In ROS `import smach_ros` did this; some programs import only `smach`.
+        util.set_shutdown_check(_is_shutdown)
 
 
 def _is_shutdown() -> bool:
@@ -73,7 +75,7 @@ def _is_shutdown() -> bool:
 
 
 def uninstall() -> None:
-    """Undo `install`: the names, and the modules of the program, are as before."""
+    """Undo `install`, and forget the modules that the program has imported."""
     with _lock:
         if not _installed:
             return
@@ -90,13 +92,13 @@ def uninstall() -> None:
 
 
 def current_project() -> Project:
-    """Return what lies around the program."""
+    """Return the project of the program."""
     return _installed[0].finder.project if _installed else Project()
 
 
 @contextlib.contextmanager
 def installed(script: str | Path | None = None, *, stub_missing: bool = False) -> Iterator[None]:
-    """Have the names in a `with` block; arguments as `install`."""
+    """Install the names for a `with` block; arguments as `install`."""
     install(script, stub_missing=stub_missing)
     try:
         yield

@@ -1,4 +1,4 @@
-"""The frames of the network: transforms from `/tf` and `/tf_static`, waited for, and sent."""
+"""Coordinate frames on the network: receives and sends transforms on `/tf` and `/tf_static`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Listener:
-    """Frames that are kept up to date.
+    """Keeps frames up to date with the transforms on the network.
 
     Threads: messages arrive in the subscribers' threads; every method may be called from any.
     """
@@ -49,14 +49,14 @@ class Listener:
         self.changed()
 
     def changed(self) -> None:
-        """Let those who wait look again."""
+        """Wake all calls of `wait`, to check their conditions again."""
         for event in tuple(self._changed):
             event.set()
 
     def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
-        """Wait until `ready`, looking again with each message.
+        """Wait until `ready` returns true; it is called again after each message.
 
-        Blocks: until then, `timeout` [s] at most, or until the program is to end.
+        Blocks: `timeout` [s] at most, or until the program is to end.
         """
         deadline = self._clock.now() + timeout
         event = self._clock.event("a transform")
@@ -76,7 +76,7 @@ class Listener:
 
 
 def add(frames: Frames, stamped: TransformStamped, *, static: bool) -> None:
-    """Take a message over."""
+    """Add the transform of a message."""
     move, turn = stamped.transform.translation, stamped.transform.rotation
     transform = Transform(move.x, move.y, move.z, turn.x, turn.y, turn.z, turn.w)
     parent, child = stamped.header.frame_id, stamped.child_frame_id
@@ -87,7 +87,8 @@ class Broadcaster:
     """Sends transforms.
 
     Args:
-        static: On `/tf_static`, all that were sent so far, latched.
+        static: Use `/tf_static`, latched. Each message then contains all static transforms that
+            were sent so far, since a latched topic keeps only the newest message.
     """
 
     def __init__(self, *, static: bool = False) -> None:

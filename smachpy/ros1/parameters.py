@@ -1,24 +1,24 @@
-"""Parameters: a tree of values by ROS names, as the parameter server of ROS 1 keeps it.
+"""Parameters: a tree of values under ROS names, as on ROS 1's parameter server.
 
 Source:
-    https://wiki.ros.org/Parameter%20Server, for types, names spaces and `search_param`.
+    https://wiki.ros.org/Parameter%20Server for types, namespaces and `search_param`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import copy
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.yaml_text import load_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
-    from actionlib_core.wire.ros1.answers import SystemState
+    from actionlib_core.wire.ros1.bridge import Ros1Bridge
 
 
 class ParameterFileError(ActionlibError):
@@ -33,41 +33,25 @@ class ParameterFileError(ActionlibError):
         super().__init__(f"parameters {str(path)!r}: {problem}")
 
 
-class Robot(Protocol):
-    """A real robot, whose parameters and topics are read."""
-
-    def get_param(self, name: str) -> Any:
-        """Return a value, or a tree of them as a dict; raises KeyError when there is none."""
-
-    def param_names(self) -> list[str]:
-        """Return the full names of all values."""
-
-    def state(self) -> SystemState:
-        """Return which of its nodes publish, listen and serve."""
-
-    def published_topics(self) -> Mapping[str, str]:
-        """Return the topics that it publishes, full name -> type."""
-
-
 class Parameters:
-    """A tree of values. Names are full, with or without the slash in front.
+    """A tree of values. Names are full, with or without a slash in front.
 
     Attributes:
-        robot: Has the values that are not here; None: nobody has. It is only read, and asked at
-            each call.
+        robot: The bridge to a robot, from which values that are missing here are read at each call.
+            It is never written. None: there is no robot.
 
-    Threads: one call at a time is atomic enough for CPython's dicts; a read gets a copy.
+    Threads: any; single operations on dicts are atomic in CPython, and reading returns a copy.
     """
 
     def __init__(self) -> None:
         self._tree: dict[str, Any] = {}
-        self.robot: Robot | None = None
+        self.robot: Ros1Bridge | None = None
 
     def get(self, name: str) -> Any:
-        """Return a copy of a value; a name space is a dict of what is in it.
+        """Return a copy of a value; for a namespace, a dict of its values.
 
         Raises:
-            KeyError: there is none; the text says so.
+            KeyError: there is none.
         """
         try:
             return copy.deepcopy(self._find(name))
@@ -82,7 +66,7 @@ class Parameters:
             ) from None
 
     def set(self, name: str, value: Any) -> None:
-        """Give a name a value; a dict becomes a name space."""
+        """Set a value; a dict becomes a namespace."""
         words = _words(name)
         value = _plain(value)
         if not words:
@@ -99,7 +83,7 @@ class Parameters:
         tree[words[-1]] = value
 
     def merge(self, name: str, values: dict[Any, Any]) -> None:
-        """Set every value of a tree below `name`, and leave its neighbours as they are."""
+        """Set every value of a tree below `name`, and keep the other values there."""
         for key, value in values.items():
             full = f"{_clean(name)}/{key}"
             if isinstance(value, dict) and value:
@@ -108,15 +92,15 @@ class Parameters:
                 self.set(full, value)
 
     def has(self, name: str) -> bool:
-        """Tell whether a name has a value."""
+        """Return whether a name has a value."""
         try:
             self._find(name)
         except KeyError:
-            return self.robot is not None and f"/{_clean(name)}" in self._robots_names()
+            return self.robot is not None and f"/{_clean(name)}" in self._robot_names()
         return True
 
     def delete(self, name: str) -> None:
-        """Forget a value, or a whole name space.
+        """Delete a value, or a whole namespace.
 
         Raises:
             KeyError: there is none.
@@ -131,9 +115,9 @@ class Parameters:
         del tree[words[-1]]
 
     def search(self, namespace: str, key: str) -> str | None:
-        """Return the full name of `key` in the nearest name space from `namespace` upwards.
+        """Return the full name of `key` in the nearest namespace from `namespace` upwards.
 
-        Only the first word of `key` has to be there, as on ROS 1's server.
+        Only the first word of `key` must exist there, as on ROS 1's server.
         """
         words = _words(namespace)
         wanted = _clean(key)
@@ -146,21 +130,21 @@ class Parameters:
             words.pop()
 
     def names(self) -> list[str]:
-        """Return the full names of all values, the robot's included."""
+        """Return the full names of all values, including the robot's."""
         own = [f"/{name}" for name in _leaves(self._tree)]
         return own if self.robot is None else sorted({*own, *self.robot.param_names()})
 
-    def _robots_names(self) -> Collection[str]:
-        """Return the names of the robot's values and of the name spaces that they are in."""
+    def _robot_names(self) -> Collection[str]:
+        """Return the names of the robot's values and of their namespaces."""
         assert self.robot is not None
         words = [_words(name) for name in self.robot.param_names()]
         return {f"/{'/'.join(name[:end])}" for name in words for end in range(1, len(name) + 1)}
 
     def load(self, path: Path, namespace: str = "/") -> None:
-        """Set what a YAML file says, below `namespace`.
+        """Set the values of a YAML file below `namespace`.
 
         Raises:
-            ParameterFileError: it cannot be read, or is no dict.
+            ParameterFileError: the file cannot be read, or is not a dict.
         """
         values = read_file(path)
         self.merge(namespace, values)
@@ -175,10 +159,10 @@ class Parameters:
 
 
 def read_file(path: Path) -> dict[Any, Any]:
-    """Return what a YAML file of parameters says.
+    """Return the values of a YAML file of parameters.
 
     Raises:
-        ParameterFileError: it cannot be read, or is no dict.
+        ParameterFileError: the file cannot be read, or is not a dict.
     """
     try:
         values = load_yaml(path.read_text(encoding="utf-8"))
@@ -208,7 +192,7 @@ def _leaves(tree: dict[str, Any]) -> Iterator[str]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a copy with lists and dicts as the server keeps them: keys are words."""
+    """Return a copy as the server keeps it: tuples are lists, keys of dicts are strings."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,6 +1,7 @@
-"""`smachpy port`: an old script in this package's own words, comments and layout kept.
+"""`smachpy port`: rewrites an old script for this package and keeps its comments and layout.
 
-What has one meaning is rewritten; what needs a person is left as it is and listed, with its line.
+Code with only one meaning is rewritten; code that needs a person's decision stays and is listed
+with its line.
 
     import smach, smach_ros                      import smachpy
     smach.State.__init__(self, outcomes=[...])   super().__init__(outcomes=[...])
@@ -45,7 +46,7 @@ _ROSPY: Final = {
     "wait_for_message": "actionlib_core.wait_for_message",
     "wait_for_service": "actionlib_core.wait_for_service",
 }
-"""Names of rospy with the same arguments here."""
+"""Names of rospy that have a counterpart with the same arguments here."""
 
 _HINTS: Final = {
     "Rate": "a loop with self.sleep(seconds) ends early on a preempt",
@@ -74,11 +75,11 @@ _CONTAINERS: Final = {
 
 @dataclass(slots=True)
 class Ported:
-    """A script in the new form.
+    """A rewritten script.
 
     Attributes:
         text: Its source.
-        notes: What a person must look at: line of the old script, and why.
+        notes: What a person has to check: line in the old script, and why.
     """
 
     text: str
@@ -89,7 +90,7 @@ def port(source: bytes, filename: str) -> Ported:
     """Rewrite a script for ROS 1.
 
     Raises:
-        SyntaxError: it is Python in neither version.
+        SyntaxError: it is neither Python 3 nor Python 2.
         MissingExtraError: libcst is not installed.
     """
     cst = import_extra("libcst", "smachpy port")
@@ -101,11 +102,13 @@ def port(source: bytes, filename: str) -> Ported:
         text = converted
         notes.append((1, "it was Python 2: look at divisions of whole numbers, and at text"))
     wrapper = metadata.MetadataWrapper(cst.parse_module(text))
+    # Decisions about the whole script come first; the transformer then sees one node at a time.
     main = _find_main(ast.parse(text))
     transformer = _transformer(cst, metadata)(_packages(text), main)
     notes += main.notes if main is not None else []
     module = wrapper.visit(transformer)
     code = str(module.code)
+    # `import rospy` stays as long as a use of it is left.
     if not any(isinstance(n, ast.Name) and n.id == "rospy" for n in ast.walk(ast.parse(code))):
         code = str(module.visit(_forget(cst, "rospy")).code)
     left = _old_names(code)
@@ -136,15 +139,15 @@ def port_file(path: Path) -> Ported:
 
 @dataclass(slots=True)
 class _Main:
-    """A function that builds a machine and executes it, and is the script's whole program.
+    """The function that is the script's whole program: it builds a machine and executes it.
 
     Attributes:
         function: Its name.
-        machine: The name of its machine.
-        execute: Line of the statement that executes it.
-        removed: Lines of statements that `smachpy run` makes needless.
-        call: Line of the statement of the module that calls it.
-        notes: What was removed.
+        machine: Name of the variable with its machine.
+        execute: Line of the statement that executes the machine.
+        call: Line of the statement at module level that calls the function.
+        removed: Lines of statements that are not needed with `smachpy run`.
+        notes: Line and reason of what was removed.
     """
 
     function: str
@@ -165,11 +168,15 @@ _NEEDLESS: Final = {
     **dict.fromkeys(("stop", "start", "join", "init_node"), ""),
     **dict.fromkeys(_LOG, "`smachpy run` prints the outcome"),
 }
-"""What may come after `execute()`, by the last word of the call, and why it is not needed then."""
+"""Calls that may follow `execute()`, by their last word -> why `smachpy run` does not need them."""
 
 
 def _find_main(tree: ast.Module) -> _Main | None:
-    """Return the function that can be a mission; None: none can without a person's judgement."""
+    """Return the function that can become a mission; None: a person has to decide.
+
+    There must be exactly one function without parameters that is called exactly once, at module
+    level, and it must execute exactly one machine, in a statement of its own.
+    """
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
     called = {name: node for node in tree.body if (name := _calls(node)) in functions}
     used = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in called]
@@ -177,6 +184,7 @@ def _find_main(tree: ast.Module) -> _Main | None:
         return None
     function = functions[used[0]]
     executed = [(node, machine) for node in function.body if (machine := _executed(node))]
+    # Statements are identified by their lines, so no two may share one.
     if len(executed) != 1 or len({node.lineno for node in function.body}) != len(function.body):
         return None
     execute, machine = executed[0]
@@ -185,7 +193,11 @@ def _find_main(tree: ast.Module) -> _Main | None:
 
 
 def _mark_removed(main: _Main, body: list[ast.stmt], execute: int) -> bool:
-    """Mark what `smachpy run` makes needless; return whether all after `execute` is that."""
+    """Mark statements that `smachpy run` does not need.
+
+    Returns:
+        Whether all statements after `execute` are such, and none before returns early.
+    """
     servers = set()
     for index, node in enumerate(body):
         value = node.value if isinstance(node, ast.Assign | ast.Expr | ast.Return) else None
@@ -210,7 +222,10 @@ def _mark_removed(main: _Main, body: list[ast.stmt], execute: int) -> bool:
 
 
 def _calls(statement: ast.stmt) -> str:
-    """Return the function that a statement of a module calls and nothing else; "" for none."""
+    """Return the function that a statement at module level only calls; "" for other statements.
+
+    The call may stand below `if __name__ == "__main__":` and in a `try` that ignores Ctrl-C.
+    """
     if isinstance(statement, ast.If) and "__name__" in ast.unparse(statement.test):
         body = [n for n in statement.body if not _begins_node(n)]
         return _calls(body[0]) if len(body) == 1 and not statement.orelse else ""
@@ -236,7 +251,7 @@ def _begins_node(statement: ast.stmt) -> bool:
 
 
 def _executed(statement: ast.stmt) -> str:
-    """Return the machine that a plain statement executes, in a thread maybe; "" for none."""
+    """Return the machine that a simple statement executes, maybe in a thread; "" for none."""
     if not isinstance(statement, ast.Assign | ast.Expr | ast.Return):
         return ""
     for node in ast.walk(statement):
@@ -246,14 +261,14 @@ def _executed(statement: ast.stmt) -> str:
 
 
 def _last_word(value: ast.expr | None) -> str:
-    """Return `c` of a call `a.b.c(...)`; "" for everything else."""
+    """Return `c` for a call `a.b.c(...)`; "" for other expressions."""
     if not isinstance(value, ast.Call):
         return ""
     return ast.unparse(value.func).rpartition(".")[2]
 
 
 def _packages(text: str) -> set[str]:
-    """Return the packages of messages that a script imports, of those that are known here."""
+    """Return the message packages that a script imports, if they are known here."""
     from importlib.util import find_spec
 
     found: set[str] = set()
@@ -269,7 +284,7 @@ def _packages(text: str) -> set[str]:
 
 
 def _add_imports(code: str, transformer: Any) -> str:
-    """Put the imports that the new names need where the first import was."""
+    """Add the imports that the new names need, before the first statement of the script."""
     wanted = [f"import {name}" for name in sorted(transformer.needs)]
     if transformer.logs:
         wanted = ["import logging", *wanted]
@@ -297,7 +312,7 @@ def _first_line(statement: ast.stmt) -> int:
 
 
 def _forget(cst: Any, name: str) -> Any:
-    """Return what removes `import name`."""
+    """Return a transformer that removes `import name`."""
 
     class Forget(cst.CSTTransformer):  # type: ignore[misc]
         def leave_Import(self, original_node: Any, updated_node: Any) -> Any:
@@ -312,7 +327,7 @@ def _forget(cst: Any, name: str) -> Any:
 
 
 def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that needs libcst
-    """Return the class that rewrites; libcst is only there with the extra."""
+    """Return the class of the transformer; it is made here, as libcst comes with the extra."""
 
     def dotted(name: str) -> Any:
         parts = name.split(".")
@@ -341,13 +356,13 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
             self.notes: set[tuple[int, str]] = set()
             self.main_line = 0
             self._opened: list[str] = []
-            self._classes: list[tuple[str, bool]] = []  # its base, whether it is a state
-            self._functions: list[str] = []
+            self._classes: list[tuple[str, bool]] = []  # base, and whether it is a state
+            self._functions: list[str] = []  # name of the first parameter of each
 
         def note(self, node: Any, text: str) -> None:
             self.notes.add((self._line_of(node), text))
 
-        # -- where we are ----------------------------------------------------------------------
+        # -- the enclosing classes and functions -----------------------------------------------
 
         def visit_ClassDef(self, node: Any) -> None:
             bases = [text_of(base.value) for base in node.bases]
@@ -383,6 +398,7 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
             )
 
         def visit_SimpleStatementLine(self, node: Any) -> bool:
+            # A statement that is replaced or removed is not visited: nothing in it needs a note.
             return not self._is_in_mission(node)
 
         def leave_SimpleStatementLine(self, original_node: Any, updated_node: Any) -> Any:

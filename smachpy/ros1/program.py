@@ -1,4 +1,4 @@
-"""Run an old script, or only build its machine."""
+"""Runs an old script, or only builds its machine."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from types import FrameType
 
 _MASTER: Final = ("ROS_MASTER_URI", "http://localhost:11311")
-"""What every shell of ROS 1 has in its environment, so that scripts read it unasked."""
+"""Set in every shell of ROS 1, so scripts read it without a check."""
 
 LOAD_S = 10.0
 """Longest time that a script may take to build its machine [s]."""
 
 
 class LoadError(SmachError):
-    """No machine could be had from a script.
+    """A script did not build a machine.
 
     Attributes:
         script: The script.
@@ -57,22 +57,22 @@ class LoadError(SmachError):
 
 
 def run_script(script: Path, argv: Sequence[str] = (), *, call: str = "") -> Any:
-    """Run a script as `python script` would, with ROS 1's names, in the session in force.
+    """Run a script as `python script` would, with ROS 1's names, in the current session.
 
     Args:
         script: The file.
         argv: Its arguments.
-        call: A function of it to call then, as the program that imports the file would; "" for
-            none. The file is no main program then.
+        call: A function of the file to call afterwards, as for a file that another program imports:
+            it then is not the main program. "": none.
 
     Returns:
-        What the function returned.
+        The function's return value.
 
     Raises:
-        LoadError: the file cannot be read, or is no Python.
-        BaseException: what the script raises, `SystemExit` too.
+        LoadError: the file cannot be read, or is not Python.
+        BaseException: any exception of the script, including `SystemExit`.
 
-    Blocks: as long as the script does.
+    Blocks: as long as the script runs.
     """
     path = script.resolve()
     try:
@@ -94,7 +94,7 @@ def run_script(script: Path, argv: Sequence[str] = (), *, call: str = "") -> Any
     sys.argv = [str(path), *argv]
     sys.path.insert(0, str(path.parent))
     try:
-        exec(code, main.__dict__)  # noqa: S102  that is what running it means
+        exec(code, main.__dict__)  # noqa: S102  the user's own script
         if not call:
             return None
         function = getattr(main, call, None)
@@ -124,27 +124,27 @@ def load(
 ) -> Container:
     """Return the machine of a script for ROS 1; the script runs up to its first `execute`.
 
-    Where it calls `execute`, `run_server` or `spin`, it ends. Until then it waits for nothing,
-    sends nothing, writes nothing and starts no process: servers are there, goals succeed at once,
+    It ends where it calls `execute`, `run_server` or `spin`. Until then it waits for nothing, sends
+    nothing, writes nothing and starts no process: servers seem to be there, goals succeed at once,
     messages, results and responses are empty. ROS 1's names stay installed, as the states of the
-    machine may need them; `uninstall` takes them away.
+    machine may need them; `uninstall` removes them.
 
     Args:
-        script: The file, or `file.py:function` for one that another program imports: the function
-            is called after the file has run, and may return the machine.
-        argv: Its arguments; `_name:=value` gives it private parameters.
+        script: The file, or `file.py:function` for a file that another program imports: the
+            function is called after the file has run, and may return the machine.
+        argv: Its arguments; `_name:=value` sets a private parameter.
         params: Parameters by name, also as a tree.
-        stub_missing: Modules, messages and parameters that nobody has get stand-ins.
+        stub_missing: Missing modules, messages and parameters are replaced by stand-ins.
         timeout: Longest time that the script may take [s].
-        stubbed: Gets what got a stand-in.
+        stubbed: Gets the names of what was replaced by stand-ins.
 
     Returns:
-        The machine that it would run first; where it would serve or wait, the outermost one.
+        The machine that it would run first; if it would serve or wait instead, the outermost one.
 
     Raises:
         LoadError: it built none in time, or raised.
 
-    Blocks: as long as the script builds, `timeout` at most.
+    Blocks: as long as the script runs, `timeout` at most.
     """
     place, colon, call = str(script).rpartition(":")
     path, call = (Path(place), call) if colon and place.endswith(".py") else (Path(script), "")
@@ -153,6 +153,8 @@ def load(
         [str(path), *argv], dry=True, make_node=_node_in_force, stub_missing=stub_missing
     )
     made.parameters.merge("/", dict(params or {}))
+    # A script that never executes its machine does not show it: it is the container that the
+    # garbage collector knows afterwards and did not know before.
     known = [thing for thing in gc.get_objects() if isinstance(thing, Container)]
     with contextlib.ExitStack() as stack:
         _go_virtual(stack)
@@ -160,7 +162,7 @@ def load(
         session.forget_loaded()
         session.begin(made)
         stack.callback(made.be_live)
-        OBSERVERS.append(made.stop)
+        OBSERVERS.append(made.stop)  # called when a machine is executed
         stack.callback(OBSERVERS.remove, made.stop)
         late = stack.enter_context(_deadline(made, timeout))
         problem = _build(path, argv, call, made)
@@ -184,7 +186,7 @@ _NOTHING = (
 
 
 def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
-    """Run a dry script; return what went wrong, "" for nothing."""
+    """Run a dry script; return the problem, or ""."""
     try:
         returned = run_script(path, argv, call=call)
         if isinstance(returned, Container):
@@ -196,18 +198,18 @@ def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
         return ""
     except SystemExit as error:
         return f"it ended by sys.exit({error.code!r}) before its machine ran."
-    except Deadlock:
+    except Deadlock:  # it waits for something that nothing can bring: it would wait for ever
         made.stopped = made.stopped or Stop()
         return ""
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) and made.stopped is None:
+        if isinstance(error, KeyboardInterrupt) and made.stopped is None:  # the user's Ctrl-C
             raise
         return where_raised(error, path)
     return ""
 
 
 def where_raised(error: BaseException, script: Path) -> str:
-    """Return an error with the line of the script's project that it comes from."""
+    """Return the text of an error, with the last line of the script's project in its traceback."""
     frames = traceback.extract_tb(error.__traceback__)
     project = Project(script)
     own = [frame for frame in frames if project.holds(frame.filename)]
@@ -220,7 +222,7 @@ def where_raised(error: BaseException, script: Path) -> str:
 
 
 def _ways_out(error: BaseException) -> str:
-    """Return what helps where messages lack something; "" for other errors."""
+    """Return what to try when an interface is missing; "" for other errors."""
     if isinstance(error, InterfaceError) and "unknown type" in str(error):
         return "\nTry --stub-missing for a stand-in."
     module = str(getattr(error, "name", "")).removeprefix(f"{INTERFACES}.")
@@ -234,12 +236,12 @@ def _ways_out(error: BaseException) -> str:
 
 
 def _node_in_force(_name: str) -> Node:
-    """Return the node for a program that is not on the network: it has one already."""
+    """Return the node that `_go_virtual` has made: a dry program gets no node of its own."""
     return get_node()
 
 
 class ScriptNode(Node):
-    """A node of a script in virtual time: a stand-in, say a missing parameter, names itself."""
+    """The node of a script in virtual time; stand-ins may be names, as of missing parameters."""
 
     def resolve(self, name: str, kind: str = "name") -> str:
         """Return the full name, remapped; see `Node.resolve`."""
@@ -247,7 +249,7 @@ class ScriptNode(Node):
 
 
 def _go_virtual(stack: contextlib.ExitStack) -> None:
-    """Enter a clock and a network in memory, unless the caller has such a clock in force."""
+    """Enter a virtual clock and a network in memory, unless the caller already has such a clock."""
     clock = current_clock()
     if isinstance(clock, VirtualClock):
         stack.enter_context(clock.patched())
@@ -264,11 +266,13 @@ def _go_virtual(stack: contextlib.ExitStack) -> None:
 
 @contextlib.contextmanager
 def _deadline(made: Session, seconds: float) -> Iterator[list[bool]]:
-    """End the script after so many real seconds, wherever it is; in the main thread only.
+    """End the script after this real time [s], wherever it is; in the main thread only.
 
-    Yields a list that has an item once it did.
+    Yields a list that gets an item when the time is over.
     """
     late: list[bool] = []
+    # Only a signal interrupts code that computes or waits, and Python handles signals in the main
+    # thread alone.
     if threading.current_thread() is not threading.main_thread():
         yield late
         return
@@ -282,7 +286,7 @@ def _deadline(made: Session, seconds: float) -> Iterator[list[bool]]:
 
     main = threading.main_thread().ident
     assert main is not None
-    before = signal.signal(signal.SIGURG, end)
+    before = signal.signal(signal.SIGURG, end)  # by default it is ignored; few programs use it
     timer = RealClock().call_later(seconds, lambda: signal.pthread_kill(main, signal.SIGURG))
     try:
         yield late
@@ -293,7 +297,7 @@ def _deadline(made: Session, seconds: float) -> Iterator[list[bool]]:
 
 
 def _outermost(known: Sequence[Container]) -> Container | None:
-    """Return the largest of the containers that are not known yet and are in no other one."""
+    """Return the largest new container that is not inside another one."""
     before = {id(container) for container in known}
     made = [
         thing

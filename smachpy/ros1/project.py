@@ -1,7 +1,7 @@
-"""What lies around an old script: its package, the packages beside it, their modules and messages.
+"""The surroundings of a script: its package, neighbouring packages, their modules and messages.
 
-ROS 1 found them through catkin's workspace; here the folders say it: a package is a folder with
-package.xml or manifest.xml, or one with definitions in msg, srv or action.
+ROS 1 finds them through catkin's workspace. Here the folders are searched: a package is a folder
+with package.xml or manifest.xml, or with definitions in msg, srv or action.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MOST_FOLDERS: Final = 5000
-"""Folders that are looked at around a script; a larger tree is not searched further."""
+"""Limit of the search around a script: a folder such as a home directory may hold many more."""
 
 KINDS: Final[tuple[Literal["msg", "srv", "action"], ...]] = ("msg", "srv", "action")
 _MANIFESTS: Final = ("package.xml", "manifest.xml")
@@ -35,11 +35,11 @@ class Project:
     """The folders around a script.
 
     Args:
-        script: The script; None looks around the working folder.
+        script: The script; None: the working folder is used.
 
     Attributes:
-        folder: Where the script lies.
-        root: The top of its repository or workspace, or its package, or its folder.
+        folder: The script's folder.
+        root: The top of its repository or workspace, else its package, else its folder.
     """
 
     def __init__(self, script: Path | None = None) -> None:
@@ -57,7 +57,7 @@ class Project:
         return self._packages
 
     def depends(self, package: str) -> list[str]:
-        """Return what the manifest of a package of the project says that it depends on, sorted."""
+        """Return the dependencies in the manifest of a package of the project, sorted."""
         texts = (_read(self.packages()[package] / name) for name in _MANIFESTS)
         found = (_DEPENDS.findall(_COMMENT.sub("", text)) for text in texts)
         return sorted({a or b for names in found for a, b in names})
@@ -66,7 +66,7 @@ class Project:
         """Return the values of an attribute of the tags in <export> of a package's manifest.
 
         Raises:
-            ValueError: a manifest is no XML.
+            ValueError: a manifest is not XML.
         """
         found = []
         for file in (self.packages()[package] / name for name in _MANIFESTS):
@@ -80,7 +80,7 @@ class Project:
         return found
 
     def interfaces_of(self, package: str) -> dict[str, list[Path]]:
-        """Return kind -> files of the definitions of a package of the project; empty for none."""
+        """Return kind -> files with the definitions of a package of the project."""
         folder = self.packages().get(package)
         if folder is None:
             return {}
@@ -88,9 +88,9 @@ class Project:
         return {kind: files for kind, files in found.items() if files}
 
     def source_roots(self) -> Iterator[Path]:
-        """Yield the folders whose modules the script may import: its own, then those of packages.
+        """Yield the folders whose modules the script may import.
 
-        The script's own package comes before its neighbours.
+        First its own folder, then those of its package, then those of other packages.
         """
         yield self.folder
         own = [folder for folder in self.packages().values() if self.folder.is_relative_to(folder)]
@@ -99,24 +99,25 @@ class Project:
             for below in ("src", *_package_dirs(folder), "scripts", "nodes"):
                 if (folder / below).is_dir():
                     yield folder / below
+        # Last, for imports of a package by its folder's name.
         for folder in own:
             yield folder
             yield folder.parent
         yield self.root
 
     def holds(self, file: str) -> bool:
-        """Tell whether a file belongs to the project."""
+        """Return whether a file belongs to the project."""
         try:
             path = Path(file).resolve()
         except OSError:
             return False
-        if "site-packages" in path.parts or "dist-packages" in path.parts:
+        if "site-packages" in path.parts or "dist-packages" in path.parts:  # a .venv in the project
             return False
         return path.is_relative_to(self.root)
 
 
 def _find_root(folder: Path) -> Path:
-    """Return the repository's top, the outermost package's workspace, or the folder itself."""
+    """Return the top of the repository, else the outermost package's workspace, else `folder`."""
     package: Path | None = None
     for above in (folder, *folder.parents):
         if any((above / mark).exists() for mark in (".git", ".hg", ".catkin_workspace")):
@@ -127,7 +128,7 @@ def _find_root(folder: Path) -> Path:
             break
     if package is None:
         return folder
-    beside = package.parent
+    beside = package.parent  # catkin's workspaces have all packages in `src`
     return beside if beside.name == "src" else package
 
 
@@ -142,20 +143,20 @@ def _walk(root: Path) -> Iterator[Path]:
 
 
 def is_package(folder: Path) -> bool:
-    """Tell whether a folder is a package of ROS."""
+    """Return whether a folder is a ROS package."""
     if any((folder / name).is_file() for name in _MANIFESTS):
         return True
     return any(next((folder / kind).glob(f"*.{kind}"), None) is not None for kind in KINDS)
 
 
 def _name_of(folder: Path) -> str:
-    """Return the name in package.xml, else the folder's."""
+    """Return the package's name in package.xml, else the folder's name."""
     match = _NAME.search(_read(folder / "package.xml"))
     return match[1] if match else folder.name
 
 
 def _package_dirs(folder: Path) -> list[str]:
-    """Return where a package's setup.py says that its modules are."""
+    """Return the folders of modules that a package's setup.py names."""
     match = _PACKAGE_DIR.search(_read(folder / "setup.py"))
     pairs = _PAIR.findall(match[1]) if match else []
     # {"": "lib"}: all in lib; {"robot": "lib/robot"}: this one in lib
@@ -163,7 +164,7 @@ def _package_dirs(folder: Path) -> list[str]:
 
 
 def _read(file: Path) -> str:
-    """Return the text of a file; "" if there is none."""
+    """Return the text of a file; "" if it cannot be read."""
     try:
         return file.read_text(encoding="utf-8", errors="replace")
     except OSError:

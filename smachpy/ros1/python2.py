@@ -1,7 +1,7 @@
-"""Python 2 source as Python 3 code, in memory: the file stays as it is, lines keep their numbers.
+"""Converts Python 2 source to Python 3 code in memory; the code keeps the file's line numbers.
 
-fissix, a maintained fork of lib2to3, does the rewriting. What it cannot know stays Python 3's
-meaning: `/` between whole numbers gives a fraction, strings are text.
+fissix, a maintained fork of lib2to3, rewrites the source. Where it cannot know the intention,
+Python 3's meaning applies: `/` between integers gives a float, strings are text.
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from actionlib_core.exceptions import ActionlibError
 if TYPE_CHECKING:
     from types import CodeType
 
-# Rewriting for looks, what `_GoneNames` does, and implicit relative imports (`hook` finds them).
+# Fixers that are not used: for style only, done better by `_GoneNames`, and for implicit relative
+# imports, which `hook` finds.
 _NOT_WANTED: Final = frozenset(
     {"buffer", "idioms", "import", "set_literal", "types", "ws_comma", "apply"}
 )
-# For source that is Python 3 by its grammar: names that are gone.
+# The fixers for source with Python 3's grammar that uses names of Python 2.
 _NAMES: Final = (
     *("basestring", "dict", "execfile", "getcwdu", "has_key", "imports", "itertools", "long"),
     *("metaclass", "next", "nonzero", "raw_input", "reduce", "reload", "standarderror"),
     *("unicode", "urllib", "xrange"),
 )
+# Such names. A source without any of them is not converted, since conversion is slow.
 _GONE: Final = re.compile(
     r"\b(basestring|execfile|getcwdu|has_key|iteritems|iterkeys|itervalues|raw_input|unicode"
     r"|xrange|unichr|viewitems|viewkeys|viewvalues|StandardError|izip|imap|ifilter"
@@ -38,10 +40,11 @@ _GONE: Final = re.compile(
     r"|(?<!\.)\b(apply|cmp|long|reduce|reload)\s*\(|\.next\(\)"
     r"|\.(keys|values|items)\(\)(\[|\.(sort|index)\()"
 )
-# A print statement that Python 3 reads as a shift.
+# `print >> file, text`, which is valid Python 3: a shift.
 _SHIFTED_PRINT: Final = re.compile(r"^[ ]*print\s*>>", re.MULTILINE)
 _INDENT: Final = re.compile(r"^[ ]*\t[ \t]*", re.MULTILINE)
-# What Python 3 says of Python 2: of such a source the error is the one that Python 2 would find.
+# Errors of Python 3's parser for Python 2 source. If the conversion of such a source fails, too,
+# its error is reported; else the error of Python 3's parser.
 _LOOKS_OLD: Final = re.compile(
     "Missing parentheses in call|multiple exception types|leading zeros in decimal"
     "|invalid decimal literal|inconsistent use of tabs"
@@ -54,7 +57,7 @@ class Python2Error(ActionlibError, SyntaxError):
 
     Attributes:
         filename: The file.
-        lineno: The line that Python 2's grammar does not allow.
+        lineno: The line with the error by Python 2's grammar.
     """
 
     def __init__(self, filename: str, lineno: int, problem: str) -> None:
@@ -63,11 +66,11 @@ class Python2Error(ActionlibError, SyntaxError):
 
 
 def to_code(source: bytes, filename: str) -> CodeType:
-    """Compile a source, converted from Python 2 if need be; lines are those of the file.
+    """Compile a source, converted from Python 2 if necessary; it keeps the file's line numbers.
 
     Raises:
-        SyntaxError: it is Python in neither version; of the version that it looks like.
-        MissingExtraError: it is Python 2, and what converts it is not installed.
+        SyntaxError: it is neither Python 3 nor Python 2; the error is of the likelier version.
+        MissingExtraError: it is Python 2, and fissix is not installed.
     """
     tree = to_tree(source, filename)
     try:
@@ -81,7 +84,7 @@ def to_code(source: bytes, filename: str) -> CodeType:
 
 
 class _GlobalsFirst(ast.NodeTransformer):
-    """Puts a function's `global` lines at its top: Python 2 took them behind the first use, too."""
+    """Moves a function's `global` statements to its top: Python 2 allows them after a use."""
 
     def __init__(self) -> None:
         self._names: list[str] = []
@@ -105,6 +108,7 @@ def to_tree(source: bytes, filename: str) -> ast.Module:
     converted = _convert(text, filename)
     tree = ast.parse(converted, filename)
     _GoneNames(tree).visit(tree)
+    # Conversion may add or remove lines; set the numbers back to those of the file.
     before, after = text.splitlines(), converted.splitlines()
     if len(before) != len(after):
         lines = _line_map(before, after)
@@ -118,20 +122,21 @@ def to_tree(source: bytes, filename: str) -> ast.Module:
 
 
 def to_text(text: str, filename: str) -> str:
-    """Return a source as Python 3 source; what Python 3 takes as it is stays, letter for letter.
+    """Return a source as Python 3 source; lines that are valid Python 3 are not changed at all.
 
     Raises:
-        SyntaxError, MissingExtraError: As `to_code`.
+        SyntaxError, MissingExtraError: as `to_code`.
     """
     converted = _convert(text, filename)
     tree = ast.parse(converted, filename)
     names = _GoneNames(tree)
     names.visit(tree)
-    lines = [line.encode() for line in converted.splitlines(keepends=True)]
+    lines = [line.encode() for line in converted.splitlines(keepends=True)]  # ast counts bytes
     last = (len(lines) + 1, 0)
+    # From the end to the beginning, so that the places of the remaining changes stay valid.
     for (line, column, end_line, end), made in sorted(names.changes, reverse=True, key=_outermost):
         if (end_line, end) > last:
-            continue  # a part of what was written already
+            continue  # inside a change that was already written
         last = (line, column)
         new = "; ".join(ast.unparse(each) for each in made)
         new = f"({new})" if isinstance(made[0], ast.Lambda) else new
@@ -141,13 +146,13 @@ def to_text(text: str, filename: str) -> str:
 
 
 def _outermost(change: tuple[tuple[int, int, int, int], list[ast.AST]]) -> tuple[int, ...]:
-    """Order changes by their end, the larger one first of two that end together."""
+    """Sort key of changes: by their end, and of two with the same end the larger one last."""
     line, column, end_line, end = change[0]
     return end_line, end, -line, -column
 
 
 def read(source: bytes) -> str:
-    """Return the text of a source in the encoding that it declares, with plain line ends."""
+    """Return the text of a source in its declared encoding, with line ends as in Unix."""
     encoding = "utf-8-sig"
     for line in source.splitlines()[:2]:
         match = _CODING.match(line)
@@ -157,18 +162,18 @@ def read(source: bytes) -> str:
     try:
         text = source.decode(encoding)
     except (UnicodeDecodeError, LookupError):
-        text = source.decode("latin-1")
+        text = source.decode("latin-1")  # this never fails
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def straight(text: str) -> str:
-    """Indent with spaces only: Python 2 took a tab for the way to the next multiple of eight."""
+    """Indent with spaces only: in Python 2 a tab leads to the next multiple of eight columns."""
     return _INDENT.sub(lambda match: match[0].expandtabs(8), text)
 
 
-@lru_cache(maxsize=64)  # star imports of what is missing look at their file again and again
+@lru_cache(maxsize=64)  # each star import from a stand-in reads its file again
 def _convert(text: str, filename: str) -> str:
-    """Return what Python 3 can parse: as it stands, with spaces for tabs, or from Python 2."""
+    """Return source that Python 3 can parse: unchanged, with spaces for tabs, or converted."""
     try:
         ast.parse(text, filename)
     except SyntaxError as error:
@@ -179,6 +184,7 @@ def _convert(text: str, filename: str) -> str:
 
 
 def _from_python2(text: str, filename: str, error: SyntaxError) -> str:
+    # Python 3 with mixed tabs and spaces parses now; anything else is converted.
     with contextlib.suppress(SyntaxError):
         ast.parse(text, filename)
         return text
@@ -197,10 +203,10 @@ def convert(text: str, names: tuple[str, ...] | None = None) -> str:
 
     Args:
         text: The source, without tabs in its indents.
-        names: Only these fixers, for source that parses as Python 3.
+        names: Only these fixers, for source that parses as Python 3; None: all.
 
     Raises:
-        Python2Error: it is no Python 2.
+        Python2Error: it is not Python 2.
         MissingExtraError: fissix is not installed.
     """
     ended = text if text.endswith("\n") else f"{text}\n"
@@ -225,12 +231,12 @@ def _tool(names: tuple[str, ...] | None) -> tuple[Any, type[Exception]]:
     fixers = [f"fissix.fixes.fix_{name}" for name in wanted]
     tool = refactor.RefactoringTool(fixers, options)
     tool.log_message = tool.log_debug = lambda *_args: None
-    tool.log_error = _raise_on  # it would log what is no Python 2, and return None
+    tool.log_error = _raise_on  # by default it logs a syntax error and returns None
     return tool, (parse.ParseError, tokenize.TokenError)  # type: ignore[return-value]
 
 
 def _raise_on(*_args: Any, **_kwargs: Any) -> None:
-    """Raise what the caller has just caught."""
+    """Raise the exception that the caller has just caught."""
     raise  # noqa: PLE0704  called where it was caught
 
 
@@ -252,7 +258,7 @@ _TYPES: Final = {
     "UnboundMethodType": "type(lambda: None)",
     "XRangeType": "range",
 }
-"""What the module `types` had, as an expression."""
+"""Names of the module `types` in Python 2 -> an expression."""
 _ABSTRACT: Final = (
     *("Callable", "Container", "Hashable", "Iterable", "Iterator", "Mapping", "MutableMapping"),
     *("MutableSequence", "MutableSet", "Sequence", "Set", "Sized"),
@@ -273,18 +279,19 @@ _MOVED: Final = {
     "sys.maxint": "sys.maxsize",
     "time.clock": "time.process_time",
 }
-"""Attributes of modules that are gone, in Python 3 or since, as an expression."""
+"""Attributes of modules that Python 3 or NumPy have removed -> an expression."""
 
 
 class _GoneNames(ast.NodeTransformer):
-    """Puts what there is in place of what is gone: names, functions, arguments.
+    """Replaces names, functions and arguments that no longer exist.
 
-    Functions of the module `string` become methods of text. `reload(sys)` and
-    `sys.setdefaultencoding("utf-8")` do nothing: text has no encoding any more. `cmp` is there
-    unless the module has one, also as an argument of `sorted` and `sort`; so is `apply`.
+    Functions of the module `string` become methods of str. `reload(sys)` and
+    `sys.setdefaultencoding("utf-8")` are removed, since Python 3's strings need no encoding. `cmp`
+    and `apply` are replaced, unless the module defines them, and `cmp` also as an argument of
+    `sorted` and `sort`.
 
     Attributes:
-        changes: Where something was, (line, column, end line, end column), and what it is now.
+        changes: Place of each change, (line, column, end line, end column), and the new nodes.
     """
 
     _METHODS = frozenset({
@@ -307,7 +314,7 @@ class _GoneNames(ast.NodeTransformer):
         }
 
     def visit(self, node: ast.AST) -> Any:
-        """Visit a node, and note it when it is another one then."""
+        """Visit a node; if it was replaced or changed, add it to `changes`."""
         place: Any = node
         before = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
         known = [each.arg for each in node.keywords] if isinstance(node, ast.Call) else []
@@ -387,18 +394,18 @@ class _GoneNames(ast.NodeTransformer):
         return node
 
     def _use_today(self, node: ast.Call, function: ast.Attribute, name: str) -> None:
-        """Give a method its name of today, or an argument the value that libraries want today."""
+        """Rename a method, or replace an argument's value, as newer libraries require."""
         if function.attr == "isAlive" and not node.args and "isAlive" not in self._own:
             function.attr = "is_alive"
         elif name == "yaml.load" and len(node.args) == 1 and not node.keywords:
-            function.attr = "safe_load"  # PyYAML wants a loader by now
-        elif function.attr == "set_printoptions":
+            function.attr = "safe_load"  # since PyYAML 6, `load` requires a loader
+        elif function.attr == "set_printoptions":  # NumPy no longer accepts nan as a threshold
             for keyword in node.keywords:
                 if ast.unparse(keyword.value) in {"np.nan", "numpy.nan"}:
                     keyword.value = _at(keyword.value, "__import__('sys').maxsize")
 
     def _use_method(self, node: ast.Call, function: Any) -> None:
-        """Make a call of `string.split(text)` and the like one of `text.split()`."""
+        """Turn a call such as `string.split(text)` into `text.split()`."""
         if function.attr in self._METHODS:
             function.value, *node.args = node.args
         elif function.attr in self._CONVERSIONS:
@@ -411,7 +418,7 @@ class _GoneNames(ast.NodeTransformer):
 
 
 def _at(place: ast.AST, source: str) -> ast.expr:
-    """Parse an expression and give all of it the lines of another one."""
+    """Parse an expression and give it the place of another node."""
     made = ast.parse(source, mode="eval").body
     for node in ast.walk(made):
         ast.copy_location(node, place)
@@ -419,7 +426,7 @@ def _at(place: ast.AST, source: str) -> ast.expr:
 
 
 def _line_map(before: list[str], after: list[str]) -> dict[int, int]:
-    """Return converted line -> original line, both from 1."""
+    """Return number of a converted line -> number of the original line, both from 1."""
     lines: dict[int, int] = {}
     matcher = difflib.SequenceMatcher(None, before, after, autojunk=False)
     for _tag, old, old_end, new, new_end in matcher.get_opcodes():

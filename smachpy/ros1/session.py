@@ -1,7 +1,7 @@
-"""What an old program runs in: its node, its parameters, and whether it runs at all or only builds.
+"""The session of an old program: its node and parameters, and whether it runs or only builds.
 
 A dry session builds a program's machine without running it: nothing is waited for, sent, written
-or started, and the first call that would run the machine ends the program there.
+or started, and the first call that would run the machine ends the program.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 DRY_LIMIT_S = 3600.0
-"""Virtual time after which a dry program is taken to serve for ever [s]."""
+"""Virtual time after which a dry program counts as one that serves for ever [s]."""
 SETTLE_S = 1.0
-"""Virtual time that the threads of a dry program have left when it would wait or has ended [s]."""
+"""Virtual time that a dry program's threads get when its main thread waits or has ended [s]."""
 
 
 class Stop(SystemExit):
-    """Ends a dry program where it would begin to run its machine; threads end by it silently.
+    """Ends a dry program where it would run its machine.
+
+    It is a `SystemExit`, which ends a thread silently and passes `except Exception` in the program.
 
     Attributes:
-        machine: What would run; None when the program would serve or wait for ever.
+        machine: The machine; None when the program would serve or wait for ever.
     """
 
     def __init__(self, machine: Any = None) -> None:
@@ -47,21 +49,21 @@ class Session:
     """One program for ROS 1.
 
     Args:
-        argv: Its command line, the program's name in front.
+        argv: Its command line, beginning with the program's name.
         dry: Only build its machine.
-        make_node: Makes the node that `init_node` asks for by name, and puts it in force.
-        stub_missing: Missing parameters, modules and packages get stand-ins.
+        make_node: Makes the node for the name in `init_node` and makes it the current one.
+        stub_missing: Missing parameters, modules and packages are replaced by stand-ins.
 
     Attributes:
         parameters: Its parameters.
-        name: What `init_node` called it; "" before.
-        named_node: Its node has that name, maybe renamed by the command line.
-        stubbed: What got a stand-in.
-        stopped: How a dry program ended, once it has.
-        shows_transitions: Somebody shows them already, so SMACH's log need not.
-        loaded: Its machine was built, and may be run by somebody else.
-        rosout: Publishes what the program logs; None before it has a node.
-        on_action: Called with the name of each action that a client of the program is made for.
+        name: The name in `init_node`; "" before.
+        named_node: Its node has that name, or the one that the command line gives it.
+        stubbed: Names of what was replaced by stand-ins.
+        stopped: How a dry program has ended; None before.
+        shows_transitions: The command shows transitions, so SMACH's log need not.
+        loaded: Its machine was built by `load`, and may be run by other code.
+        rosout: Publishes the program's log; None before it has a node.
+        on_action: Called with the name of each action for which the program makes a client.
     """
 
     def __init__(
@@ -89,54 +91,55 @@ class Session:
         self._handling = contextlib.ExitStack()
 
     def begin_node(self, name: str) -> Node:
-        """Make the node that the program calls `name`, and put it in force."""
+        """Make the node that the program calls `name`, and make it the current one."""
         self.name = name
         node = self._make_node(name)
         self.named_node = node.name == name or not self.dry
         return node
 
     def stop(self, machine: Any = None) -> None:
-        """End a dry program here; another one goes on.
+        """End a dry program; for others, do nothing.
 
         Raises:
             Stop: the program is dry.
         """
         if self.dry:
+            # Several threads may get here; a machine counts more than an endless wait.
             if self.stopped is None or (machine is not None and self.stopped.machine is None):
                 self.stopped = Stop(machine)
             raise self.stopped
 
     def settle(self) -> None:
-        """Let the threads of a dry program get to where they run a machine; others go on."""
+        """Give the threads of a dry program time to reach their machine's `execute`."""
         if self.dry and self.stopped is None:
             current_clock().sleep(SETTLE_S)
 
     def check_time(self) -> None:
-        """End a dry program that was stopped, or waits for what never comes.
+        """End a dry program if it was stopped or waits without end; for others, do nothing.
 
         Raises:
-            Stop: it is dry, and that is so.
+            Stop: the program is ended.
         """
         if self.dry and (self.stopped is not None or current_clock().now() > DRY_LIMIT_S):
             self.stop()
 
     def is_shutdown(self) -> bool:
-        """Tell whether the program is to end."""
+        """Return whether the program is to end."""
         return self.stopped is not None or shutdown.requested()
 
     def be_live(self) -> None:
-        """Let what was only built do what it says from now on: its states run later."""
+        """End the dry mode: the states of the machine run later, and then are to have effects."""
         self.dry, self.stopped, self.loaded = False, None, True
         self.hooks.clear()
 
     def add_hook(self, hook: Callable[[str], object]) -> None:
-        """Call `hook(reason)` once when the program is to end, or at its end."""
+        """Call `hook(reason)` once, when the program is asked to end or at its end."""
         if not self.hooks:
             shutdown.current_shutdown().at_exit(lambda: self.run_hooks("exit"))
         self.hooks.append(hook)
 
     def handle_signals(self) -> None:
-        """Let Ctrl-C and SIGTERM ask the program to end, unless somebody handles them already."""
+        """Let Ctrl-C and SIGTERM ask the program to end, unless they already have handlers."""
         real = isinstance(current_clock(), RealClock)
         if real and threading.current_thread() is threading.main_thread():
             defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
@@ -146,7 +149,7 @@ class Session:
                 shutdown.current_shutdown().at_exit(self._handling.close)
 
     def run_hooks(self, reason: str) -> None:
-        """Call what the program wants to have called at its end; each once."""
+        """Call the program's hooks, each once."""
         hooks, self.hooks = self.hooks, []
         if self.dry:
             return
@@ -154,7 +157,7 @@ class Session:
             hook(reason)
 
     def stand_in(self, what: str) -> None:
-        """Note that `what` was missing and got a stand-in."""
+        """Note that `what` was replaced by a stand-in."""
         if what not in self.stubbed:
             self.stubbed.append(what)
 
@@ -162,7 +165,7 @@ class Session:
 def _make_default(name: str) -> Node:
     try:
         return init(name)
-    except NodeError:  # something was made before `init_node`: the node has another name
+    except NodeError:  # something used the network before `init_node`: the node has another name
         return get_node()
 
 
@@ -170,23 +173,23 @@ _sessions: list[Session] = []
 
 
 def session() -> Session:
-    """Return the session of the program that runs; one is made for a program run by hand."""
+    """Return the current session; if there is none, make one for a program run by `python`."""
     if not _sessions:
         _sessions.append(Session())
     return _sessions[-1]
 
 
 def begin(made: Session) -> None:
-    """Put a session in force."""
+    """Make a session the current one."""
     _sessions.append(made)
 
 
 def end(made: Session) -> None:
-    """Take a session out of force; without effect when it is not in force."""
+    """End a session; the one before it is the current one again."""
     if made in _sessions:
         _sessions.remove(made)
 
 
 def forget_loaded() -> None:
-    """Take the sessions of machines that were loaded out of force."""
+    """End the sessions of machines that were loaded by `load`."""
     _sessions[:] = [made for made in _sessions if not made.loaded]

@@ -1,7 +1,7 @@
-"""Stand-ins for what an old program needs and nobody has: modules, messages, values.
+"""Stand-ins for missing modules, messages and values of an old program.
 
-They take every call, attribute and item, so that a machine can be built, drawn, checked and
-explored; they do nothing.
+They accept every call, attribute and item and do nothing, so that a machine can be built, drawn,
+checked and explored.
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ if TYPE_CHECKING:
 _ACTION_ENDS = ("ActionGoal", "ActionResult", "ActionFeedback", "Action")
 
 _MARKS = frozenset({"_md5sum", "nsecs", "to_nsec"})
-"""By these a message or a time is known, which a stand-in is not."""
+"""Attributes by which messages and times are recognised; stand-ins must not have them."""
 
 
 class Anything:
-    """A value that allows everything: in sums 0 or a word, as a list empty, as a condition true.
+    """A value that allows every operation.
 
-    As a base class it takes any arguments.
+    In sums it is 0 or a word, as a list empty, as a condition true. As a base class it accepts any
+    arguments.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -66,6 +67,7 @@ class Anything:
         pass
 
     def __iter__(self) -> Iterator[Any]:
+        # `a, b = value` needs two items; a loop over it gets none, as it would never end.
         count = _wanted_items(sys._getframe(1))
         return iter([Anything(f"{self._stub_name}[...]") for _ in range(count)])
 
@@ -106,21 +108,21 @@ class Anything:
         return 0
 
     def to_sec(self) -> float:
-        """Return 0: as a duration it is none."""
+        """Return 0, as for a duration."""
         return 0.0
 
     def keys(self) -> list[Any]:
-        """Return no keys: as a dict it is empty."""
+        """Return no keys, as for an empty dict."""
         return []
 
     def __mro_entries__(self, bases: tuple[type, ...]) -> tuple[type, ...]:
-        """Let a program derive a class from it."""
+        """Allow a program to derive a class from it."""
         del bases
         return (Anything,)
 
 
 def _importing(frame: FrameType | None) -> tuple[ast.AST | None, dict[str, Any]]:
-    """Return the tree of the file that imports, and its globals; no tree if it cannot be read."""
+    """Return the syntax tree of the importing file, None if it cannot be read, and its globals."""
     while frame is not None and ("importlib" in frame.f_code.co_filename or _is_here(frame)):
         frame = frame.f_back
     if frame is None:
@@ -137,7 +139,7 @@ def _is_here(frame: FrameType) -> bool:
 
 
 def service_names(frame: FrameType | None) -> set[str]:
-    """Return the names in the importing file that are used as the class of a service."""
+    """Return the unbound names that the importing file uses as classes of services."""
     tree, _ = _importing(frame)
     calls = [] if tree is None else [n for n in ast.walk(tree) if isinstance(n, ast.Call)]
     names = set()
@@ -153,7 +155,10 @@ _SERVICE_CALLS = frozenset({"Service", "ServiceProxy", "ServiceState"})
 
 
 def unbound_names(frame: FrameType | None) -> list[str]:
-    """Return the names that the importing file reads, nothing in it binds and it has not yet."""
+    """Return the names that the importing file reads but neither binds nor has imported.
+
+    For a star import from a stand-in: these are the names that it has to provide.
+    """
     tree, there = _importing(frame)
     return [] if tree is None else [name for name in _unbound(tree) if name not in there]
 
@@ -173,8 +178,8 @@ def _unbound(tree: ast.AST) -> list[str]:
 
 
 def _wanted_items(frame: FrameType) -> int:
-    """Return how many values the code unpacks from a stand-in; 0 when it loops over it."""
-    code = frame.f_code.co_code
+    """Return how many values the code unpacks from a stand-in; 0 for other iterations."""
+    code = frame.f_code.co_code  # f_lasti: the instruction that is running; its argument follows
     if opname[code[frame.f_lasti]] == "UNPACK_SEQUENCE":
         return code[frame.f_lasti + 1]
     return 0
@@ -182,11 +187,11 @@ def _wanted_items(frame: FrameType) -> int:
 
 def _number(name: str) -> Callable[..., Any]:
     def operate(self: Anything, *others: Any) -> Any:
-        if others and isinstance(others[0], str):  # it is a text then: part of a name, of a path
+        if others and isinstance(others[0], str):  # then it is text: part of a name or path
             return {"add": f"{self}{others[0]}", "radd": f"{others[0]}{self}"}.get(name, str(self))
         if others and isinstance(others[0], list | tuple):
             return others[0]
-        return 0  # whole, as `range` takes it too
+        return 0  # not 0.0, as `range` needs an integer
 
     operate.__name__ = name
     return operate
@@ -221,7 +226,7 @@ class StubModule(types.ModuleType):
 
 
 class _AnyClass(type):
-    """A class that has every name: of a message a constant, and it may be a module in truth."""
+    """Makes a class have every attribute: a constant of a message, or a name if it is a module."""
 
     def __getattr__(cls, name: str) -> Any:
         if name.startswith("_") or name in _MARKS:
@@ -230,12 +235,12 @@ class _AnyClass(type):
 
 
 def _stand_in(name: str) -> Any:
-    """Return a class for a name like a class's, `Gripper`; a value for `gripper` and `GRIPPER`."""
+    """Return a class for a name such as `Gripper`; a value for `gripper` and `GRIPPER`."""
     return stand_in_class(name) if name[:1].isupper() and not name.isupper() else Anything(name)
 
 
 def stand_in_class(name: str) -> type:
-    """Return a class of stand-ins."""
+    """Return a class whose instances are stand-ins."""
     return _AnyClass(
         name,
         (Anything,),
@@ -244,14 +249,14 @@ def stand_in_class(name: str) -> type:
 
 
 class OldSection(types.ModuleType):
-    """`pkg.msg` or `pkg.srv` of a package that is there, as ROS 1's generator wrote it.
+    """`pkg.msg` or `pkg.srv` of an existing package, as ROS 1's generator writes it.
 
-    A star import gives what its modules import themselves, too: scripts use `std_msgs.msg.Bool` or
-    `sys` and import neither.
+    A star import also gives the modules that the generated ones import: some scripts use `sys` or
+    `std_msgs.msg.Bool` without importing them.
 
     Args:
         name: Its full name.
-        known: The module here.
+        known: The module with the interfaces.
     """
 
     def __init__(self, name: str, known: Any) -> None:
@@ -277,7 +282,7 @@ _GENERATED = ("codecs", "genpy", "struct", "sys")
 
 
 def _packages_of(section: Any, names: list[str]) -> set[str]:
-    """Return the packages whose messages are fields of those in a section."""
+    """Return the packages of the messages that are fields of those in a section."""
     found = set()
     for name in names:
         try:
@@ -289,11 +294,11 @@ def _packages_of(section: Any, names: list[str]) -> set[str]:
 
 
 class StubSection(OldSection):
-    """`pkg.msg` or `pkg.srv` of a package that is missing, or lacks some: made when named.
+    """`pkg.msg` or `pkg.srv` with stand-ins for missing interfaces, made when they are used.
 
     Args:
         name: Its full name.
-        known: The module of what is there; None for nothing.
+        known: The module with the existing interfaces; None: the whole package is missing.
     """
 
     def __init__(self, name: str, known: Any = None) -> None:
@@ -321,9 +326,9 @@ class StubSection(OldSection):
         return value
 
     def _stand_ins(self, frame: FrameType | None, there: list[str]) -> list[str]:
-        """Return the names that a star import gives beyond those that are there.
+        """Return the names that a star import gives in addition to the existing ones.
 
-        What a script calls a service with is none of a `msg`, and of a `srv` whatever its case.
+        Those that the script uses as classes of services belong to `srv`, even in lower case.
         """
         unbound, services = unbound_names(frame), service_names(frame)
         if self._kind == "srv":
@@ -333,12 +338,12 @@ class StubSection(OldSection):
         return [each for each in used if each not in there]
 
     def _resolved(self, name: str) -> Any:
-        """Return a class that is there; types that it uses and nobody has are empty."""
+        """Return an existing class; missing types of its fields become empty messages."""
         made: set[str] = set()
         while True:
             try:
                 found = getattr(self._known, name)
-                return _loose.get(found, found)  # it was a stand-in for a program before, too
+                return _loose.get(found, found)  # made as a stand-in for an earlier program
             except InterfaceError as error:
                 unknown = set(re.findall(r"unknown type: got '(\w+/\w+)'", str(error))) - made
                 if not unknown:
@@ -350,7 +355,7 @@ class StubSection(OldSection):
 
 
 def _message(package: str, name: str) -> Any:
-    """Return a message class; of an action, when its name says that it is part of one."""
+    """Return a message class; a name such as XGoal or XActionResult makes a whole action."""
     for end in _ACTION_ENDS:
         if name.endswith(end) and name != end:
             return _action_part(package, name.removesuffix(end), end)
@@ -381,7 +386,7 @@ def _service(package: str, name: str) -> Any:
 
 
 def _fill(holder: Any, field: str, loose: type) -> None:
-    """Let new messages of a class hold a permissive one in a field."""
+    """Make new messages of a class have a permissive message in a field."""
     plain = holder.__init__
 
     def make(self: Any, *args: Any, **fields: Any) -> None:
@@ -396,7 +401,7 @@ _loose: dict[type, type] = {}
 
 
 def permissive(kind: type) -> Any:
-    """Return a subclass of a class of messages or services that takes and gives every field."""
+    """Return a subclass of a message or service class that has every field."""
     if issubclass(kind, _Loose):
         return kind
     if kind not in _loose:
@@ -407,7 +412,7 @@ def permissive(kind: type) -> Any:
 
 
 class _EveryName(tuple[str, ...]):
-    """No fields to go through, and every field when asked for one."""
+    """Empty when iterated, but contains every name."""
 
     __slots__ = ()
 
@@ -416,7 +421,7 @@ class _EveryName(tuple[str, ...]):
 
 
 class _Loose:
-    """Takes every field; one that was not set is a stand-in."""
+    """Accepts every field; a field that was not set is a stand-in."""
 
     def __init__(self, *_args: Any, **fields: Any) -> None:
         super().__init__()

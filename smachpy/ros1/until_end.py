@@ -1,4 +1,4 @@
-"""Waits of old programs, which end as soon as the program is to end, whatever limit they have."""
+"""Waits that end as soon as the program is to end, as those of rospy do."""
 
 from __future__ import annotations
 
@@ -14,12 +14,17 @@ T = TypeVar("T")
 
 
 def until_end(what: str, wait: Callable[[], T], over: Callable[[], T]) -> T:
-    """Return what `wait` returns, or raise what it raises; once the program is to end, `over`.
+    """Call `wait` and return its result or raise its exception; at shutdown return `over()`.
 
-    `what` is waited for, as a deadlock's report names it. `wait` goes on in its own thread then,
-    until its limit or the end of its node.
+    `wait` runs in its own thread, as it cannot be interrupted. After a shutdown it goes on there
+    until its own limit or the end of its node.
 
-    Blocks: until one of both.
+    Args:
+        what: What is waited for, as the report of a deadlock names it.
+        wait: The function that waits.
+        over: Called instead when the program is to end.
+
+    Blocks: until `wait` has ended or the program is to end.
     """
     if shutdown.requested():
         return over()
