@@ -1,8 +1,10 @@
 """pnp_cmd_ros: `PNPCmd` as PNP's own Python programs use it.
 
-Actions and conditions are those of a file `actions.yaml` beside the program; what it does not name,
-or everything where there is no such file, is the business of the robot's `PNPActionServer`. Source:
-pnp_cmd_ros and pnp_cmd_base of PetriNetPlans 1.4.
+Actions and conditions come from a file `actions.yaml` beside the program. Those that it does not
+name, or all without such a file, are left to the robot's `PNPActionServer`.
+
+Source:
+    pnp_cmd_ros and pnp_cmd_base of PetriNetPlans 1.4.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ NODE = "pnp_cmd"
 
 
 class PNPCmd(pnp.PNPCmd):
-    """As `smachpy.pnp.PNPCmd`, with the arguments that these programs give."""
+    """A `smachpy.pnp.PNPCmd` with the arguments of these programs."""
 
     def __init__(self) -> None:
         program = Path(sys.argv[0] or "program")
@@ -36,20 +38,20 @@ class PNPCmd(pnp.PNPCmd):
         super().__init__(given.actions, given.conditions, plan_folder=program.parent, server=server)
 
     def begin(self) -> None:
-        """Make the program's node, if it has none, and begin."""
+        """Begin; make the program's node first, if it has none."""
         if not is_initialized():
             init_node(NODE)
         super().begin()
 
     def stop_plan(self, name: str = "") -> None:
-        """Ask the plan that runs to stop."""
+        """Ask the running plan to stop."""
         del name
         super().stop_plan()
 
     def wait_for_termination(self, action: Any = None) -> Any:
-        """Wait until an action has ended; return how: "success", "failure" or "interrupt".
+        """Wait until an action has ended; return "success", "failure" or "interrupt".
 
-        Without an action, as that of `smachpy.pnp.PNPCmd`.
+        Without the name of an action, as `smachpy.pnp.PNPCmd.wait_for_termination`.
 
         Blocks: until then.
         """

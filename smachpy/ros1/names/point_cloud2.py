@@ -1,4 +1,4 @@
-"""sensor_msgs.point_cloud2: the points of a PointCloud2, and clouds of points.
+"""sensor_msgs.point_cloud2: reads the points of a PointCloud2, and makes clouds from points.
 
 Source:
     http://docs.ros.org/en/noetic/api/sensor_msgs/html/namespacesensor__msgs_1_1point__cloud2.html
@@ -32,7 +32,7 @@ _LETTERS: Final = {
 def _layout(
     big_endian: bool, fields: Iterable[Any], names: Sequence[str] | None = None
 ) -> struct.Struct:
-    """Return the layout of a point, up to the last of the named fields."""
+    """Return the layout of a point, up to the last of the named fields; None: all fields."""
     text, at = ">" if big_endian else "<", 0
     for field in sorted(fields, key=lambda each: each.offset):
         if names is None or field.name in names:
@@ -51,12 +51,13 @@ def read_points(
 
     Args:
         cloud: A PointCloud2.
-        field_names: Values that are wanted, in this order; None for all.
-        skip_nans: Leave out points with a value that is no number.
-        uvs: Column and row of the points that are wanted; none for all.
+        field_names: The fields to read, in this order; None: all.
+        skip_nans: Leave out points with a NaN.
+        uvs: Columns and rows of the points to read; empty: all.
     """
     names = None if field_names is None else list(field_names)
     layout = _layout(cloud.is_bigendian, cloud.fields, names)
+    # `layout` reads the fields in the order of their offsets; `order` puts them as requested.
     order: list[int] | None = None
     if names is not None:
         held = sorted((f for f in cloud.fields if f.name in names), key=lambda each: each.offset)
@@ -94,8 +95,8 @@ def create_cloud(header: Any, fields: Sequence[Any], points: Iterable[Iterable[A
 
     Args:
         header: Its header.
-        fields: What a point holds, as PointFields.
-        points: The values of each.
+        fields: The fields of a point, as PointFields.
+        points: The values of each point.
     """
     layout = _layout(False, fields)
     packed = [layout.pack(*point) for point in points]

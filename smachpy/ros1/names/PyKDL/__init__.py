@@ -1,7 +1,9 @@
-"""PyKDL: vectors, rotations, frames, twists and wrenches, as far as mission scripts use them.
+"""PyKDL: the parts of it that mission scripts use: vectors, rotations, frames, twists, wrenches.
+
+Angles are in rad.
 
 Source:
-    http://docs.ros.org/en/melodic/api/kdl_python/html/ for names and meaning; angles in rad.
+    http://docs.ros.org/en/melodic/api/kdl_python/html/ for names and meaning.
 """
 
 from __future__ import annotations
@@ -49,8 +51,9 @@ class Vector:
         return math.sqrt(dot(self, self))
 
     def Normalize(self) -> float:
-        """Give it length 1; returns what it had."""
+        """Scale it to length 1; return its former length."""
         length = self.Norm()
+        # KDL makes a vector of length 0 the unit vector x.
         self._values = [value / length for value in self._values] if length else [1.0, 0.0, 0.0]
         return length
 
@@ -76,7 +79,7 @@ class Vector:
         return Vector(*(-a for a in self))
 
     def __mul__(self, other: Any) -> Vector:
-        """Multiply with a number; of two vectors it is the vector product."""
+        """Multiply by a number; for two vectors return the vector product."""
         if isinstance(other, Vector):
             a, b, c = self
             x, y, z = other
@@ -103,7 +106,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 class Rotation:
-    """A turn; made from three rows of numbers, or by one of the static methods."""
+    """A rotation: from nine numbers row by row, three columns, or one of the static methods."""
 
     def __init__(self, *rows: Any) -> None:
         if not rows:
@@ -121,19 +124,19 @@ class Rotation:
 
     @staticmethod
     def Identity() -> Rotation:
-        """Return no turn."""
+        """Return the identity."""
         return Rotation()
 
     @staticmethod
     def Quaternion(x: float, y: float, z: float, w: float) -> Rotation:
-        """Return the turn of a quaternion, which need not have length 1."""
+        """Return the rotation of a quaternion, which need not have length 1."""
         length = math.sqrt(x * x + y * y + z * z + w * w) or 1.0
         turn = Transform(0.0, 0.0, 0.0, x / length, y / length, z / length, w / length)
         return Rotation(*(Vector(*turn.apply(*axis)) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))))
 
     @staticmethod
     def Rot(axis: Vector, angle: float) -> Rotation:
-        """Return a turn by `angle` about `axis`."""
+        """Return a rotation by `angle` about `axis`."""
         length = axis.Norm() or 1.0
         half = math.sin(angle / 2) / length
         x, y, z = axis * half
@@ -143,53 +146,54 @@ class Rotation:
 
     @staticmethod
     def RotX(angle: float) -> Rotation:
-        """Return a turn about x."""
+        """Return a rotation about x."""
         return Rotation.Rot(Vector(1, 0, 0), angle)
 
     @staticmethod
     def RotY(angle: float) -> Rotation:
-        """Return a turn about y."""
+        """Return a rotation about y."""
         return Rotation.Rot(Vector(0, 1, 0), angle)
 
     @staticmethod
     def RotZ(angle: float) -> Rotation:
-        """Return a turn about z."""
+        """Return a rotation about z."""
         return Rotation.Rot(Vector(0, 0, 1), angle)
 
     @staticmethod
     def RPY(roll: float, pitch: float, yaw: float) -> Rotation:
-        """Return turns about the fixed x, then y, then z."""
+        """Return rotations about the fixed axes x, then y, then z."""
         made: Rotation = Rotation.RotZ(yaw) * Rotation.RotY(pitch) * Rotation.RotX(roll)
         return made
 
     @staticmethod
     def EulerZYX(alpha: float, beta: float, gamma: float) -> Rotation:
-        """Return turns about z, then the new y, then the new x."""
+        """Return rotations about z, then the new y, then the new x."""
         return Rotation.RPY(gamma, beta, alpha)
 
     @staticmethod
     def EulerZYZ(alpha: float, beta: float, gamma: float) -> Rotation:
-        """Return turns about z, then the new y, then the new z."""
+        """Return rotations about z, then the new y, then the new z."""
         made: Rotation = Rotation.RotZ(alpha) * Rotation.RotY(beta) * Rotation.RotZ(gamma)
         return made
 
     def DoRotX(self, angle: float) -> None:
-        """Turn further, about its own x."""
+        """Rotate it about its own x."""
         self._rows = (self * Rotation.RotX(angle))._rows
 
     def DoRotY(self, angle: float) -> None:
-        """Turn further, about its own y."""
+        """Rotate it about its own y."""
         self._rows = (self * Rotation.RotY(angle))._rows
 
     def DoRotZ(self, angle: float) -> None:
-        """Turn further, about its own z."""
+        """Rotate it about its own z."""
         self._rows = (self * Rotation.RotZ(angle))._rows
 
     def GetRPY(self) -> tuple[float, float, float]:
         """Return the angles about the fixed x, y, z."""
         rows = self._rows
         pitch = math.atan2(-rows[2][0], math.hypot(rows[0][0], rows[1][0]))
-        if abs(abs(pitch) - math.pi / 2) < 1e-9:  # noqa: PLR2004  roll and yaw turn alike
+        # At a pitch of 90 degrees roll and yaw rotate about the same axis: all of it is yaw here.
+        if abs(abs(pitch) - math.pi / 2) < 1e-9:  # noqa: PLR2004
             return 0.0, pitch, math.atan2(-rows[0][1], rows[1][1])
         return math.atan2(rows[2][1], rows[2][2]), pitch, math.atan2(rows[1][0], rows[0][0])
 
@@ -205,7 +209,9 @@ class Rotation:
         x = math.copysign(math.sqrt(max(0.0, 1 + a - e - i)) / 2, h - f)
         y = math.copysign(math.sqrt(max(0.0, 1 - a + e - i)) / 2, c - g)
         z = math.copysign(math.sqrt(max(0.0, 1 - a - e + i)) / 2, d - b)
-        if w < 1e-9:  # noqa: PLR2004  half a turn: the signs are in the sums
+        # For a rotation by 180 degrees the differences above are 0 and give no signs; the sums of
+        # the elements do, relative to the largest part.
+        if w < 1e-9:  # noqa: PLR2004
             biggest = max((x, 0), (y, 1), (z, 2), key=lambda pair: abs(pair[0]))[1]
             signs = ((1.0, b + d, c + g), (b + d, 1.0, f + h), (c + g, f + h, 1.0))[biggest]
             x, y, z = (math.copysign(v, s) for v, s in zip((x, y, z), signs, strict=True))
@@ -220,24 +226,24 @@ class Rotation:
         """Return angle and axis."""
         x, y, z, w = self.GetQuaternion()
         length = math.sqrt(x * x + y * y + z * z)
-        if length < 1e-12:  # noqa: PLR2004  no turn
+        if length < 1e-12:  # noqa: PLR2004  the identity, which has no axis
             return 0.0, Vector(0, 0, 1)
         return 2 * math.atan2(length, w), Vector(x, y, z) / length
 
     def UnitX(self) -> Vector:
-        """Return where x points then."""
+        """Return the rotated unit vector x."""
         return Vector(*(row[0] for row in self._rows))
 
     def UnitY(self) -> Vector:
-        """Return where y points then."""
+        """Return the rotated unit vector y."""
         return Vector(*(row[1] for row in self._rows))
 
     def UnitZ(self) -> Vector:
-        """Return where z points then."""
+        """Return the rotated unit vector z."""
         return Vector(*(row[2] for row in self._rows))
 
     def Inverse(self, vector: Vector | None = None) -> Any:
-        """Return the turn back, or a vector turned back."""
+        """Return the inverse, or a vector rotated by the inverse."""
         back = Rotation(*(row[index] for index in range(3) for row in self._rows))
         return back if vector is None else back * vector
 
@@ -261,7 +267,7 @@ class Rotation:
 
 
 class Frame:
-    """A place and a turn: `Frame(Rotation, Vector)`; `M` and `p`."""
+    """A position `p` and a rotation `M`: `Frame(Rotation, Vector)`."""
 
     def __init__(self, *parts: Any) -> None:
         self.M, self.p = Rotation(), Vector()
@@ -275,11 +281,11 @@ class Frame:
 
     @staticmethod
     def Identity() -> Frame:
-        """Return the frame in its own place."""
+        """Return the identity."""
         return Frame()
 
     def Inverse(self, vector: Vector | None = None) -> Any:
-        """Return the way back, or a vector taken back."""
+        """Return the inverse, or a vector transformed by the inverse."""
         back = Frame(self.M.Inverse(), -(self.M.Inverse() * self.p))
         return back if vector is None else back * vector
 
@@ -304,7 +310,7 @@ class Frame:
 
 
 class _Pair:
-    """Two vectors that belong together."""
+    """Base of twists and wrenches: two vectors, with their names in `_names`."""
 
     _names: tuple[str, str]
 
@@ -314,7 +320,7 @@ class _Pair:
 
     @classmethod
     def Zero(cls) -> Any:
-        """Return the zero one."""
+        """Return one with zero vectors."""
         return cls()
 
     def _parts(self) -> tuple[Vector, Vector]:
@@ -364,7 +370,7 @@ class Wrench(_Pair):
 
 
 def diff(a: Any, b: Any, dt: float = 1.0) -> Any:
-    """Return what leads from `a` to `b` in `dt` [s]."""
+    """Return the velocity that leads from `a` to `b` in `dt` [s]."""
     if isinstance(a, Vector):
         return (b - a) / dt
     if isinstance(a, Rotation):
@@ -373,7 +379,7 @@ def diff(a: Any, b: Any, dt: float = 1.0) -> Any:
 
 
 def addDelta(a: Any, change: Any, dt: float = 1.0) -> Any:
-    """Return where `a` is after moving so for `dt` [s]."""
+    """Return `a` after moving with the velocity `change` for `dt` [s]."""
     if isinstance(a, Vector):
         return a + change * dt
     if isinstance(a, Rotation):
@@ -383,7 +389,7 @@ def addDelta(a: Any, change: Any, dt: float = 1.0) -> Any:
 
 
 def Equal(a: Any, b: Any, eps: float = 1e-6) -> bool:
-    """Tell whether two of a kind are the same, but for `eps`."""
+    """Return whether two objects of one kind differ by `eps` at most."""
     if isinstance(a, Vector):
         return all(abs(x - y) <= eps for x, y in zip(a, b, strict=True))
     if isinstance(a, Rotation):

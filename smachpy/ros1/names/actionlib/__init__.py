@@ -1,6 +1,6 @@
-"""actionlib's public names, and what `from actionlib import *` leaks in the original.
+"""actionlib's public names, and the others that `from actionlib import *` gives in the original.
 
-In a dry program servers are there, goals are done at once and nothing is sent.
+In a dry program servers seem to be there, goals succeed at once and nothing is sent.
 """
 
 import threading

@@ -1,4 +1,4 @@
-"""actionlib's client that follows each goal by a handle."""
+"""actionlib's client with a handle for each goal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from smachpy.ros1.until_end import until_end
 
 
 class ActionClient(_ActionClient[Any]):
-    """Sends goals and follows each by a handle."""
+    """Sends goals and returns a handle for each."""
 
     def __init__(self, ns: str, ActionSpec: Any) -> None:
         session().on_action(ns)
@@ -26,7 +26,7 @@ class ActionClient(_ActionClient[Any]):
         self.ns = ns
 
     def wait_for_server(self, timeout: Any = 0.0) -> bool:
-        """Wait for a server, until the program is to end; a dry one is told that there is one."""
+        """Wait for a server until the program is to end; a dry program gets True at once."""
         return session().dry or until_end(
             f"a server of action {self.ns!r}", partial(super().wait_for_server, timeout), bool
         )

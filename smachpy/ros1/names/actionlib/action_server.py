@@ -1,4 +1,4 @@
-"""actionlib's server that decides on each goal itself."""
+"""actionlib's server whose program decides about each goal."""
 
 from __future__ import annotations
 

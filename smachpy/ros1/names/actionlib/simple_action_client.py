@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class SimpleActionClient(_SimpleActionClient[Any]):
-    """Sends one goal at a time; in a dry program all of them succeed at once, unsent."""
+    """Sends one goal at a time; in a dry program goals succeed at once and are not sent."""
 
     def __init__(self, ns: str, ActionSpec: Any) -> None:
         session().on_action(ns)
@@ -25,7 +25,7 @@ class SimpleActionClient(_SimpleActionClient[Any]):
         self._result_class = type(ActionSpec().action_result.result)
 
     def wait_for_server(self, timeout: Any = 0.0) -> bool:
-        """Wait for a server; 0 waits until the program is to end, which ends every wait."""
+        """Wait for a server; with 0, until the program is to end. That ends every wait."""
         session().check_time()
         return session().dry or until_end(
             f"a server of action {self.ns!r}", partial(super().wait_for_server, timeout), bool
@@ -39,26 +39,28 @@ class SimpleActionClient(_SimpleActionClient[Any]):
         feedback_cb: Callable[..., object] | None = None,
         **more: Any,
     ) -> None:
-        """Send a goal and forget the one before."""
+        """Send a goal and stop following the one before."""
         if not session().dry:
             super().send_goal(goal, done_cb, active_cb, feedback_cb, **more)
 
     def send_goal_and_wait(
         self, goal: Any, execute_timeout: Any = 0.0, preempt_timeout: Any = 0.0
     ) -> int:
-        """Send a goal and wait for its end; returns its status."""
+        """Send a goal and wait for its end; return its status."""
         if session().dry:
             return int(GoalStatus.SUCCEEDED)
         return super().send_goal_and_wait(goal, execute_timeout, preempt_timeout)
 
     def wait_for_result(self, timeout: Any = 0.0) -> bool:
-        """Wait for the end of the goal; 0 waits until the program is to end, as above."""
+        """Wait for the end of the goal; with 0, until the program is to end."""
         session().check_time()
         if session().dry:
             return True
         wait = partial(super().wait_for_result, timeout)
         handle = self.gh
-        if handle is None or handle.manager.callbacks.is_inside():  # a goal's end, not callbacks
+        # Called inside a callback, it must not wait for the goal's callbacks, as those run in this
+        # thread. `until_end` would wait in another thread, where this is not recognised.
+        if handle is None or handle.manager.callbacks.is_inside():
             return wait()
         return until_end(f"the result of action {self.ns!r}", wait, lambda: handle.goal.over)
 

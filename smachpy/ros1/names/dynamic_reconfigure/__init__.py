@@ -1,4 +1,4 @@
-"""dynamic_reconfigure, as far as mission scripts use it: the client and the messages."""
+"""dynamic_reconfigure: the parts that mission scripts use; here the messages and exceptions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Reconfigure: Any = define_service(
 
 
 class DynamicReconfigureException(Exception):  # noqa: N818  ROS's name
-    """Base of its exceptions."""
+    """Base of the exceptions of dynamic_reconfigure."""
 
 
 class DynamicReconfigureParameterException(DynamicReconfigureException):

@@ -1,4 +1,4 @@
-"""dynamic_reconfigure.client: change the parameters of another node while it runs."""
+"""dynamic_reconfigure.client: changes the parameters of another node while it runs."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Client:
     """Changes the parameters of a node.
 
     Args:
-        name: The node's.
-        timeout: How long to wait for it, seconds or `Duration`; None waits until the program is to
+        name: The node's name.
+        timeout: Longest wait for the node, seconds or `Duration`; None: until the program is to
             end.
         config_callback: Called with the configuration whenever it changes.
-        description_callback: As ROS takes it; descriptions are not read.
+        description_callback: Ignored; descriptions are not read.
 
     Raises:
-        ROSException: it is not there in time.
+        ROSException: the node is not there in time.
 
     Blocks: see `timeout`.
     """
@@ -49,17 +49,17 @@ class Client:
         self.closed = False
 
     def get_configuration(self, timeout: Any = None) -> dict[str, Any]:
-        """Return what was heard last; asks for it when nothing was."""
+        """Return the last configuration that was received; if there was none, ask for it."""
         del timeout
         if self._config is None:
             self._config = decode_config(self._proxy(Config()).config)
         return dict(self._config)
 
     def update_configuration(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """Change parameters, and return the configuration as the node has it then.
+        """Change parameters, and return the node's new configuration.
 
         Raises:
-            DynamicReconfigureParameterException: a value is no bool, number or text.
+            DynamicReconfigureParameterException: a value is not a bool, number or text.
             ServiceException: the node did not answer.
 
         Blocks: until the answer.
@@ -72,7 +72,7 @@ class Client:
         self._callback = value
 
     def close(self) -> None:
-        """Leave the node."""
+        """Stop receiving updates."""
         self.closed = True
         self._updates.unregister()
         self._proxy.close()

@@ -16,7 +16,7 @@ from smachpy.ros1.stubs import Anything
 
 
 class Config(dict[str, Any]):
-    """A configuration; its values are attributes, too."""
+    """A configuration; its values are also attributes."""
 
     def __getattr__(self, name: str) -> Any:
         try:
@@ -36,13 +36,14 @@ def decode_config(msg: Any, description: Any = None) -> Config:
 
 
 def encode_config(config: dict[str, Any], flat: bool = True) -> Any:
-    """Return the message of some values.
+    """Return a message with these values.
 
     Raises:
-        DynamicReconfigureParameterException: one is no bool, number or text.
+        DynamicReconfigureParameterException: a value is not a bool, number or text.
     """
     del flat
     msg = ConfigMsg()
+    # bool first: in Python a bool is an int as well.
     for name, value in config.items():
         for kind, make, place in (
             (bool, BoolParameter, msg.bools),
@@ -61,7 +62,7 @@ def encode_config(config: dict[str, Any], flat: bool = True) -> Any:
 
 
 def extract_params(group: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the parameters of a group and of those in it."""
+    """Return the parameters of a group and of its subgroups."""
     found = list(group["parameters"])
     for inner in group["groups"]:
         found += extract_params(inner)

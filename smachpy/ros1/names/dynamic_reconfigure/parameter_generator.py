@@ -1,7 +1,7 @@
-"""dynamic_reconfigure.parameter_generator: what a package's `cfg/Name.cfg` is written in.
+"""dynamic_reconfigure.parameter_generator: the functions that a package's `cfg/Name.cfg` calls.
 
-ROS 1's build ran such a file, which wrote `pkg.cfg.NameConfig`; here the import of that module
-runs it.
+ROS 1's build runs such a file to generate `pkg.cfg.NameConfig`; here it is run when that module is
+imported.
 
 Source:
     dynamic_reconfigure/parameter_generator_catkin.py for names and arguments.
@@ -22,7 +22,7 @@ _MOST = {"int": 2**31 - 1, "double": math.inf, "str": "", "bool": True}
 
 
 class Group:
-    """Some parameters, and groups of more."""
+    """A group of parameters and subgroups."""
 
     def __init__(self, name: str, type: str = "", state: bool = True) -> None:
         self.name, self.type, self.state = name, type, state
@@ -60,7 +60,7 @@ class Group:
         return self.groups[-1]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return its description, as generated modules have it."""
+        """Return its description, as in generated modules."""
         return {
             "name": self.name,
             "type": self.type,
@@ -74,7 +74,7 @@ class ParameterGenerator(Group):
     """The parameters of a node.
 
     Attributes:
-        module: Name -> value in the module that is generated; empty before `generate`.
+        module: The names and values of the generated module; empty before `generate`.
     """
 
     def __init__(self) -> None:
@@ -91,11 +91,11 @@ class ParameterGenerator(Group):
         return {"name": name, "type": type, "value": value, "description": descr}
 
     def enum(self, constants: list[dict[str, Any]], description: str) -> dict[str, Any]:
-        """Return an enumeration, an `edit_method`."""
+        """Return an enumeration, for the argument `edit_method`."""
         return {"enum": constants, "enum_description": description}
 
     def generate(self, pkgname: str, nodename: str, name: str) -> int:
-        """Make the module; return 0, which the file ends with."""
+        """Make the module; return 0, with which the file then exits."""
         del pkgname, nodename
         description = self.to_dict()
         found = extract_params(description)

@@ -1,4 +1,4 @@
-"""dynamic_reconfigure.server: parameters of this node that others may change while it runs."""
+"""dynamic_reconfigure.server: lets other nodes change parameters of this node while it runs."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 
 class Server:
-    """Lets others change this node's parameters; as ROS's, but descriptions are not sent.
+    """Lets other nodes change this node's parameters; as in ROS, but descriptions are not sent.
 
     Args:
-        type: What is configured: `pkg.cfg.NameConfig`.
-        callback: Called with the configuration and the levels that changed, at first with all;
-            returns the configuration that is to hold.
-        namespace: Below the node's name.
+        type: The module of the configuration, `pkg.cfg.NameConfig`.
+        callback: Called with the configuration and the levels that changed, at first with all
+            levels; returns the configuration to use.
+        namespace: Namespace of the parameters, below the node's name.
     """
 
     def __init__(
@@ -50,13 +50,13 @@ class Server:
         self.update_topic = Publisher(
             f"{self.ns_name}/parameter_updates", Config, latch=True, queue_size=10
         )
-        self._change_config(self.config, 0xFFFFFFFF)
+        self._change_config(self.config, 0xFFFFFFFF)  # as in ROS, the first call has all levels
         self.set_service = Service(
             f"{self.ns_name}/set_parameters", Reconfigure, self._set_callback
         )
 
     def update_configuration(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """Change parameters, and return the configuration as the callback wants it.
+        """Change parameters, and return the configuration that the callback returns.
 
         Raises:
             DynamicReconfigureCallbackException: the callback returned None.
@@ -75,7 +75,7 @@ class Server:
 
     def _of(self, what: str) -> dict[str, Any]:
         found = getattr(self.type, what)
-        return found if isinstance(found, dict) else {}  # else it is a stand-in
+        return found if isinstance(found, dict) else {}  # the module may be a stand-in
 
     def _clamp(self, config: dict[str, Any]) -> None:
         least, most = self._of("min"), self._of("max")
@@ -100,7 +100,11 @@ class Server:
 
 
 def _defaults(kind: Any, callback: Any) -> dict[str, Any]:
-    """Return the first values; of a stand-in those that the callback puts into a text."""
+    """Return the default values.
+
+    A stand-in has none. But callbacks often log their configuration with a format string, which
+    contains its names.
+    """
     if isinstance(kind.defaults, dict):
         return kind.defaults
     code = getattr(getattr(callback, "__func__", callback), "__code__", None)

@@ -1,4 +1,4 @@
-"""message_filters: topics in step.
+"""message_filters: synchronises messages of several topics.
 
 Source:
     message_filters of ros_comm for names, arguments and meaning.
@@ -28,13 +28,13 @@ __all__ = [
 
 
 class SimpleFilter:
-    """Passes on what it gets to those that have registered."""
+    """Passes messages on to registered callbacks."""
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callable[..., object], tuple[Any, ...]]] = {}
 
     def registerCallback(self, cb: Callable[..., object], *args: Any) -> int:
-        """Call `cb(message(s), *args)` from now on; returns a number of the registration."""
+        """Call `cb(message(s), *args)` from now on; return a number for the registration."""
         number = len(self.callbacks)
         self.callbacks[number] = cb, args
         return number
@@ -59,7 +59,7 @@ class Subscriber(SimpleFilter):
         return str(self.topic)
 
     def unregister(self) -> None:
-        """Listen no more."""
+        """Unsubscribe."""
         self.sub.unregister()
 
     def __getattr__(self, name: str) -> Any:
@@ -71,8 +71,8 @@ class Cache(SimpleFilter):
 
     Args:
         f: The filter.
-        cache_size: How many.
-        allow_headerless: Messages without a header count by the time at which they come.
+        cache_size: How many messages to keep.
+        allow_headerless: Use the time of arrival for messages without a header.
     """
 
     def __init__(
@@ -86,11 +86,11 @@ class Cache(SimpleFilter):
             self.connectInput(f)
 
     def connectInput(self, f: SimpleFilter) -> None:
-        """Take the messages of `f`."""
+        """Get the messages of `f`."""
         f.registerCallback(self.add)
 
     def add(self, msg: Any) -> None:
-        """Take a message."""
+        """Handle a message."""
         stamp = _stamp(msg, self._allow_headerless)
         if stamp is None:
             logwarn("Cannot use message filters with messages of type %s", msg._type)
@@ -99,38 +99,38 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Any, to_stamp: Any) -> list[Any]:
-        """Return the messages from one time to another."""
+        """Return the messages between two times."""
         return [msg for stamp, msg in self._kept if from_stamp <= stamp <= to_stamp]
 
     def getElemAfterTime(self, stamp: Any) -> Any:
-        """Return the oldest message from a time on; None for none."""
+        """Return the oldest message at or after a time, or None."""
         return next((msg for other, msg in self._kept if other >= stamp), None)
 
     def getElemBeforeTime(self, stamp: Any) -> Any:
-        """Return the newest message up to a time; None for none."""
+        """Return the newest message at or before a time, or None."""
         return next((msg for other, msg in reversed(self._kept) if other <= stamp), None)
 
     def getLastestTime(self) -> Any:
-        """Return the time of the newest message; None for none."""
+        """Return the time of the newest message, or None."""
         return self._kept[-1][0] if self._kept else None
 
-    getLatestTime = getLastestTime  # noqa: N815
+    getLatestTime = getLastestTime  # noqa: N815  the original has both spellings
 
     def getOldestTime(self) -> Any:
-        """Return the time of the oldest message; None for none."""
+        """Return the time of the oldest message, or None."""
         return self._kept[0][0] if self._kept else None
 
     def getLast(self) -> Any:
-        """Return the newest message; None for none."""
+        """Return the newest message, or None."""
         return self._kept[-1][1] if self._kept else None
 
 
 class TimeSynchronizer(SimpleFilter):
-    """Passes on messages of several filters that have the same stamp, each set once.
+    """Passes on sets of messages with the same stamp, one message from each filter.
 
     Args:
         fs: The filters.
-        queue_size: How many messages of each wait for the others.
+        queue_size: How many messages of each filter are kept until the others arrive.
     """
 
     def __init__(self, fs: Sequence[SimpleFilter], queue_size: int) -> None:
@@ -144,7 +144,7 @@ class TimeSynchronizer(SimpleFilter):
             each.registerCallback(self.add, queue)
 
     def add(self, msg: Any, my_queue: dict[Any, Any], my_queue_index: int | None = None) -> None:
-        """Take a message of one filter."""
+        """Handle a message of one filter."""
         del my_queue_index
         stamp = _stamp(msg, self._allow_headerless)
         if stamp is None:
@@ -159,7 +159,7 @@ class TimeSynchronizer(SimpleFilter):
             self.signalMessage(*found)
 
     def _take_set(self, stamp: Any, own: dict[Any, Any]) -> list[Any]:
-        """Take the messages nearest to a stamp out of the queues, if they are near enough."""
+        """Remove and return the messages nearest to a stamp, if they are near enough."""
         stamps = []
         for queue in self._queues:
             if not queue:
@@ -172,14 +172,14 @@ class TimeSynchronizer(SimpleFilter):
 
 
 class ApproximateTimeSynchronizer(TimeSynchronizer):
-    """As `TimeSynchronizer`, for stamps that differ by `slop` [s] at most.
+    """A `TimeSynchronizer` for stamps that differ by `slop` [s] at most.
 
     Args:
         fs: The filters.
-        queue_size: How many messages of each wait for the others.
+        queue_size: How many messages of each filter are kept until the others arrive.
         slop: See above.
-        allow_headerless: Messages without a header count by the time at which they come.
-        reset: As the original takes it: time does not jump back here.
+        allow_headerless: Use the time of arrival for messages without a header.
+        reset: Ignored; time does not jump back here.
     """
 
     def __init__(

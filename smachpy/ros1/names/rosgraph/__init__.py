@@ -1,4 +1,4 @@
-"""rosgraph: the master, as far as there is one: `rospy.get_master` says what it answers."""
+"""rosgraph: the calls to a ROS master that work without one; see `rospy.client.MasterProxy`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class MasterException(Exception):  # noqa: N818  rosgraph's name
 
 
 class Master:
-    """The calls to a ROS master that make sense without one, with their values alone.
+    """The calls to a ROS master that work without one; they return only the value.
 
     Args:
-        caller_id: As rosgraph takes it.
-        master_uri: As rosgraph takes it.
+        caller_id: Kept as an attribute.
+        master_uri: Kept as an attribute; None: see `get_master_uri`.
     """
 
     def __init__(self, caller_id: str = "", master_uri: str | None = None) -> None:
@@ -27,7 +27,7 @@ class Master:
         self.master_uri = master_uri or get_master_uri()
 
     def is_online(self) -> bool:
-        """Return True: none is needed."""
+        """Return True: no master is needed."""
         return True
 
     def __getattr__(self, name: str) -> Any:
@@ -36,12 +36,12 @@ class Master:
 
 
 def is_master_online(master_uri: str | None = None) -> bool:
-    """Return True: none is needed."""
+    """Return True: no master is needed."""
     del master_uri
     return True
 
 
 def get_master_uri(env: Any = None, argv: Any = None) -> str:
-    """Return the address that the environment names, else rosgraph's default."""
+    """Return the address in the environment, else rosgraph's default."""
     del argv
     return str((env or os.environ).get("ROS_MASTER_URI", MasterProxy.target))

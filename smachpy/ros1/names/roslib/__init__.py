@@ -1,4 +1,4 @@
-"""roslib, as far as scripts use it: `load_manifest` does nothing, packages are found by folder."""
+"""roslib: the parts that scripts use. `load_manifest` does nothing: packages are found anyway."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""roslib.packages: where packages are."""
+"""roslib.packages: finds packages and their files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def get_pkg_dir(package: str, required: bool = True, ros_root: object = None) ->
 
 
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """Return folder and name of the package that a folder is in; None, None for none."""
+    """Return folder and name of the package that contains a folder; (None, None) if none does."""
     rospack = RosPack()
     for name in rospack.list():
         path = rospack.get_path(name)
@@ -35,7 +35,7 @@ def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
 
 
 def find_resource(pkg: str, resource_name: str, *_: object, **__: object) -> list[str]:
-    """Return the files of a name in a package."""
+    """Return the files with a name in a package."""
     return sorted(map(str, Path(RosPack().get_path(pkg)).rglob(resource_name)))
 
 

@@ -1,4 +1,4 @@
-"""rosnode: the nodes that are there.
+"""rosnode: lists the nodes.
 
 Source:
     rosnode of ros_comm for names, arguments and exceptions.
@@ -15,11 +15,11 @@ __all__ = ["ROSNodeException", "get_node_names", "rosnode_ping"]
 
 
 class ROSNodeException(Exception):  # noqa: N818  rosnode's name
-    """The nodes cannot be asked for."""
+    """The nodes cannot be listed."""
 
 
 def get_node_names(namespace: str | None = None) -> list[str]:
-    """Return the names of the nodes that serve, publish or listen, and of this one."""
+    """Return the names of the nodes that serve, publish or subscribe, and of this node."""
     prefix = "/" if namespace is None else f"/{namespace.strip('/')}/".replace("//", "/")
     _, _, parts = MasterProxy().getSystemState()
     names = {node for part in parts for _, nodes in part for node in nodes}
@@ -30,6 +30,6 @@ def get_node_names(namespace: str | None = None) -> list[str]:
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Tell whether a node is there."""
+    """Return whether a node is present."""
     del max_count, verbose, skip_cache
     return resolve_name(node_name) in get_node_names()

@@ -15,17 +15,17 @@ RosParamException = ParameterFileError
 def load_file(
     filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[dict[Any, Any], str]]:
-    """Return what a YAML file says, with the name space that it is for.
+    """Return the values of a YAML file and the namespace for them.
 
     Raises:
-        RosParamException: it cannot be read, or is no dict.
+        RosParamException: the file cannot be read, or is not a dict.
     """
     del verbose
     return [(read_file(Path(filename)), default_namespace or "/")]
 
 
 def upload_params(ns: str, values: dict[str, Any], verbose: bool = False) -> None:
-    """Set parameters below a name space."""
+    """Set parameters below a namespace."""
     del verbose
     session().parameters.merge(resolve_name(ns), values)
 
@@ -36,11 +36,11 @@ def get_param(param: str) -> Any:
 
 
 def set_param(param: str, value: Any) -> None:
-    """Give a parameter a value."""
+    """Set a parameter."""
     session().parameters.set(resolve_name(param), value)
 
 
 def list_params(ns: str) -> list[str]:
-    """Return the full names of the parameters below a name space."""
+    """Return the full names of the parameters below a namespace."""
     prefix = resolve_name(ns).rstrip("/") + "/"
     return [name for name in session().parameters.names() if name.startswith(prefix)]

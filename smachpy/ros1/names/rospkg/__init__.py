@@ -1,4 +1,4 @@
-"""rospkg: where packages are, those around the program."""
+"""rospkg: finds the packages in the program's repository."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 
 class ResourceNotFound(Exception):  # noqa: N818  rospkg's name
-    """There is no such package around the program."""
+    """The program's repository has no such package."""
 
 
 class InvalidManifest(Exception):  # noqa: N818  rospkg's name
-    """A manifest is no XML."""
+    """A manifest is not XML."""
 
 
 class Manifest:
-    """What package.xml or manifest.xml says.
+    """The content of package.xml or manifest.xml.
 
     Args:
         name: The package's name.
@@ -37,7 +37,7 @@ class Manifest:
         """Return the values of an attribute of the tags in <export>.
 
         Raises:
-            InvalidManifest: it is no XML.
+            InvalidManifest: it is not XML.
         """
         try:
             return current_project().exports(self.name, tag, attr)
@@ -67,11 +67,11 @@ class RosPack:
         return sorted(current_project().packages())
 
     def get_depends(self, name: str, implicit: bool = True) -> Sequence[str]:
-        """Return what a package's manifest says that it depends on.
+        """Return the dependencies in a package's manifest.
 
         Args:
-            name: The package's.
-            implicit: With what those of the same repository depend on.
+            name: The package's name.
+            implicit: Also those of its dependencies, as far as they are in the same repository.
 
         Raises:
             ResourceNotFound: there is no package of that name.
@@ -97,7 +97,7 @@ class RosPack:
         return Manifest(name, str(_folder_of(name)))
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Sequence[str]:
-        """Return the packages that depend on one; `implicit`: by way of others too."""
+        """Return the packages that depend on one; `implicit`: also indirectly."""
         return [one for one in self.list() if name in self.get_depends(one, implicit)]
 
 

@@ -1,4 +1,4 @@
-"""Parameters and waiting, as rospy has them.
+"""Parameters, and waiting for messages and services, as in rospy.
 
 Source:
     rospy.client for names, arguments and exceptions.
@@ -28,7 +28,7 @@ def get_param(param_name: str, default: Any = _NO_DEFAULT) -> Any:
     """Return a parameter's value.
 
     Raises:
-        KeyError: it has none, and there is no default.
+        KeyError: it has no value, and there is no default.
     """
     name = resolve_name(param_name)
     now = session()
@@ -52,17 +52,17 @@ def get_param_cached(param_name: str, default: Any = _NO_DEFAULT) -> Any:
 
 
 def set_param(param_name: str, param_value: Any) -> None:
-    """Give a parameter a value; a dict becomes a name space."""
+    """Set a parameter; a dict becomes a namespace."""
     session().parameters.set(resolve_name(param_name), param_value)
 
 
 def has_param(param_name: str) -> bool:
-    """Tell whether a parameter has a value."""
+    """Return whether a parameter has a value."""
     return session().parameters.has(resolve_name(param_name))
 
 
 def delete_param(param_name: str) -> None:
-    """Forget a parameter.
+    """Delete a parameter.
 
     Raises:
         KeyError: it has no value.
@@ -71,7 +71,7 @@ def delete_param(param_name: str) -> None:
 
 
 def search_param(param_name: str) -> str | None:
-    """Return the full name of a parameter, from the node's name space upwards; None for none."""
+    """Return the full name of a parameter, searched from the node's namespace upwards, or None."""
     return session().parameters.search(get_name(), param_name)
 
 
@@ -144,14 +144,14 @@ def _interrupted() -> NoReturn:
 
 
 def _limit(timeout: Any) -> float | None:
-    """Return a limit in seconds; rospy takes 0 for no wait, and so a moment."""
+    """Return a limit in seconds. In rospy 0 is no wait at all; here it is a very short one."""
     return None if timeout is None else max(float(timeout), 1e-3)
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """Return [topic, type] of all topics below `namespace` that somebody publishes.
+    """Return [topic, type] of all published topics below `namespace`.
 
-    Those of a real robot (`--ros1-robot`) are among them, whether or not anybody listens to them.
+    Those of a real robot (`--ros1-robot`) are included, even if they are not bridged.
     """
     prefix = namespace if namespace.endswith("/") else f"{namespace}/"
     ends = list_endpoints(get_node().transport, kind=Kind.PUBLISHER)
@@ -164,12 +164,12 @@ def get_published_topics(namespace: str = "/") -> list[list[str]]:
 
 
 class MasterProxy:
-    """The calls to a ROS master that make sense without one."""
+    """The calls to a ROS master that work without one."""
 
     target = "http://localhost:11311"
 
     def getSystemState(self) -> tuple[int, str, list[list[list[Any]]]]:
-        """Return publishers, subscribers and services as ROS's master does, a robot's too."""
+        """Return publishers, subscribers and services like ROS's master, including a robot's."""
         found: dict[Kind, dict[str, list[str]]] = {
             kind: {} for kind in (Kind.PUBLISHER, Kind.SUBSCRIBER, Kind.SERVICE)
         }
@@ -210,7 +210,7 @@ class MasterProxy:
 
 
 def get_master(env: Any = None) -> MasterProxy:
-    """Return what stands in for the ROS master."""
+    """Return the replacement for a ROS master."""
     del env
     return MasterProxy()
 

@@ -1,4 +1,4 @@
-"""The program's beginning and end, its names and its log, as rospy has them.
+"""Beginning and end of the program, and its log, as in rospy.
 
 Source:
     rospy.core, rospy.client and rospy.names for names, arguments and meaning.
@@ -30,7 +30,7 @@ from smachpy.slips import accepts
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-_MOST_LOGS: Final = 100  # that wait to be published; beyond, the oldest are dropped
+_MOST_LOGS: Final = 100  # queue of /rosout; beyond, the oldest messages are dropped
 
 DEBUG: Final = 1
 INFO: Final = 2
@@ -72,16 +72,16 @@ def init_node(
     Args:
         name: One word.
         argv: Its arguments; None: those of the program.
-        anonymous: Add a number that no other program has.
-        log_level: The lowest level that is logged, `rospy.DEBUG` for example.
-        disable_rostime: As rospy takes it.
-        disable_rosout: Publish nothing that is logged on /rosout.
+        anonymous: Make the name unique by adding numbers.
+        log_level: The lowest level that is logged, for example `rospy.DEBUG`.
+        disable_rostime: Ignored.
+        disable_rosout: Do not publish the log on /rosout.
         disable_signals: Leave Ctrl-C and SIGTERM to the program.
-        xmlrpc_port: As rospy takes it.
-        tcpros_port: As rospy takes it.
+        xmlrpc_port: Ignored.
+        tcpros_port: Ignored.
 
     Raises:
-        ROSInitException: the name is none, or the network cannot be joined.
+        ROSInitException: the name is invalid, or the network cannot be joined.
         ROSException: called again with another name.
     """
     del disable_rostime, xmlrpc_port, tcpros_port
@@ -113,7 +113,7 @@ def init_node(
 
 
 def _legal(name: str) -> str:
-    """Return a name without the characters that ROS only warned of, `my-node` for example."""
+    """Return a name with `_` in place of characters about which ROS only warns: `my-node`."""
     made = re.sub(r"[^\w/]", "_", name, flags=re.ASCII)
     problem = f"init_node: name: got {name!r}; expected letters, digits and '_', as in {made!r}."
     return made if made != name and accepts(problem) else name
@@ -131,7 +131,7 @@ def _count() -> int:
 
 
 def _set_private_parameters(argv: Sequence[str]) -> None:
-    """Take `_name:=value` of the command line; the value is YAML, as for roslaunch."""
+    """Set the parameters `_name:=value` of the command line; values are YAML, as in ROS."""
     from smachpy.ros1.names.rospy.names import resolve_name
 
     for word in argv:
@@ -145,12 +145,12 @@ def _set_private_parameters(argv: Sequence[str]) -> None:
 
 
 def is_initialized() -> bool:
-    """Tell whether `init_node` was called."""
+    """Return whether `init_node` was called."""
     return bool(session().name)
 
 
 def is_shutdown() -> bool:
-    """Tell whether the program is to end."""
+    """Return whether the program is to end."""
     now = session()
     if now.dry and now.stopped is None:
         now.check_time()
@@ -161,9 +161,9 @@ is_shutdown_requested = is_shutdown
 
 
 def signal_shutdown(reason: Any = "") -> None:
-    """Ask the program to end: machines are preempted, what waits in rospy ends.
+    """Ask the program to end: machines are preempted, and waits in rospy end.
 
-    What `on_shutdown` was given is called here, before this returns.
+    The functions given to `on_shutdown` are called before this returns.
     """
     now = session()
     if now.dry:
@@ -174,10 +174,10 @@ def signal_shutdown(reason: Any = "") -> None:
 
 
 def on_shutdown(h: Callable[..., object]) -> None:
-    """Call `h` once when the program is to end or has ended.
+    """Call `h` once, when the program is asked to end or at its end.
 
     Raises:
-        TypeError: it cannot be called.
+        TypeError: `h` is not callable.
     """
     if not callable(h):
         raise TypeError(f"on_shutdown: got {h!r}; expected a function without arguments.")
@@ -185,12 +185,12 @@ def on_shutdown(h: Callable[..., object]) -> None:
 
 
 def add_shutdown_hook(h: Callable[[str], object]) -> None:
-    """Call `h(reason)` once when the program is to end or has ended."""
+    """Call `h(reason)` once, when the program is asked to end or at its end."""
 
     def call(reason: str) -> None:
         try:
             h(reason)
-        except Exception:
+        except Exception:  # the other hooks have to run as well
             logger.exception("on_shutdown: %r raised", h)
 
     session().add_hook(call)
@@ -209,7 +209,7 @@ def spin() -> None:
     Blocks: until then. In virtual time also until nothing can happen any more.
     """
     now = session()
-    now.settle()
+    now.settle()  # another thread may be about to execute the machine
     now.stop()
     if not now.name:
         raise ROSInitException("client code must call rospy.init_node() first")
@@ -222,12 +222,12 @@ def spin() -> None:
 
 
 def myargv(argv: list[str] | None = None) -> list[str]:
-    """Return the arguments without renaming (`a:=b`)."""
+    """Return the arguments without remappings (`a:=b`)."""
     return [word for word in (sys.argv if argv is None else argv) if ":=" not in word]
 
 
 def get_node_uri() -> str:
-    """Return an address for messages; there is no XML-RPC server behind it."""
+    """Return an address of the node; no XML-RPC server runs there."""
     return f"zenoh://{get_node().full_name}"
 
 
@@ -245,7 +245,7 @@ def configure_logging(node_name: str, level: int = INFO) -> None:
 
 
 class _Handler(logging.Handler):
-    """Writes as rospy does: DEBUG and INFO to the standard output, the rest to the error output."""
+    """Writes like rospy: DEBUG and INFO to the standard output, the rest to the error output."""
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
@@ -255,7 +255,7 @@ class _Handler(logging.Handler):
             stream = sys.stdout if record.levelno <= logging.INFO else sys.stderr
             stream.write(text)
             stream.flush()
-        except Exception:  # noqa: BLE001  as every handler of `logging` does
+        except Exception:  # noqa: BLE001  the rule for handlers of `logging`
             self.handleError(record)
 
 
@@ -264,9 +264,10 @@ if not logger.handlers:
     logger.addHandler(_Handler())
     logger.propagate = False
     logger.setLevel(logging.INFO)
-"""Where everything goes; programs that log with `logging` may use it by name."""
+"""The logger of all messages; programs that use `logging` may get it by its name."""
 
-_said: dict[tuple[Any, ...], Any] = {}
+_logged: dict[tuple[Any, ...], Any] = {}
+"""Level and line of the program -> when and what it has logged, for `throttle` and `once`."""
 
 
 def _text(msg: Any, args: tuple[Any, ...]) -> str:
@@ -279,7 +280,7 @@ def _text(msg: Any, args: tuple[Any, ...]) -> str:
 
 
 def _place() -> tuple[str, int]:
-    """Return the line of the program that logs."""
+    """Return file and line of the logging call in the program."""
     frame = sys._getframe(1)
     while frame.f_code.co_filename == __file__ and frame.f_back is not None:
         frame = frame.f_back
@@ -295,7 +296,7 @@ def _log(level: int, msg: Any, args: tuple[Any, ...], logger_name: str | None) -
 
 
 def _publish(level: int, text: str) -> None:
-    """Publish what was logged on /rosout, once there is a node."""
+    """Publish a log message on /rosout, if there is a node."""
     publisher = session().rosout
     if publisher is None:
         return
@@ -303,41 +304,41 @@ def _publish(level: int, text: str) -> None:
     own = next((ours for ours, theirs in _LEVELS.items() if theirs == level), INFO)
     message = Log(level=own, name=f"/{session().name}", msg=text, file=file, line=line)
     message.header.stamp = Time.now()
-    with contextlib.suppress(ActionlibError):  # its node has left, or somebody has another type
+    with contextlib.suppress(ActionlibError):  # the node is closed, or the types differ
         publisher.publish(message)
 
 
 def _functions(level: int) -> tuple[Callable[..., None], ...]:
-    """Return the four functions of a level: plain, throttled, identical ones throttled, once."""
+    """Return the four functions of a level: log, throttle, throttle_identical, once."""
 
     def log(msg: Any, *args: Any, logger_name: str | None = None, **_kwargs: Any) -> None:
-        """Log a message, with `%` and the other arguments; other keywords are rospy's."""
+        """Log `msg % args`; other keyword arguments of rospy are ignored."""
         _log(level, msg, args, logger_name)
 
     def throttle(period: float, msg: Any, *args: Any, logger_name: str | None = None) -> None:
-        """Log a message from this line of the program at most every `period` [s]."""
+        """Log a message from this line of the program at most once per `period` [s]."""
         key = (level, *_place())
         now = current_clock().now()
-        if key not in _said or now - _said[key] >= float(period) or now < _said[key]:
-            _said[key] = now
+        if key not in _logged or now - _logged[key] >= float(period) or now < _logged[key]:
+            _logged[key] = now
             _log(level, msg, args, logger_name)
 
     def throttle_identical(
         period: float, msg: Any, *args: Any, logger_name: str | None = None
     ) -> None:
-        """Log as `throttle`, but another text at once."""
+        """Log as `throttle`, but a different text at once."""
         key = (level, "identical", *_place())
         now, text = current_clock().now(), _text(msg, args)
-        before = _said.get(key)
+        before = _logged.get(key)
         if before is None or before[1] != text or now - before[0] >= float(period):
-            _said[key] = now, text
+            _logged[key] = now, text
             _log(level, text, (), logger_name)
 
     def once(msg: Any, *args: Any, logger_name: str | None = None) -> None:
-        """Log a message from this line of the program the first time only."""
+        """Log a message from this line of the program only the first time."""
         key = (level, "once", *_place())
-        if key not in _said:
-            _said[key] = True
+        if key not in _logged:
+            _logged[key] = True
             _log(level, msg, args, logger_name)
 
     return log, throttle, throttle_identical, once

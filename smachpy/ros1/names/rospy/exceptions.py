@@ -1,4 +1,4 @@
-"""rospy's exceptions, and how errors of this package become theirs."""
+"""rospy's exceptions, and the translation of this package's errors to them."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class ROSException(Exception):  # noqa: N818  rospy's names, all of them
 class ROSInterruptException(ROSException, ProgramEnds, KeyboardInterrupt):
     """The program is to end while it sleeps or waits.
 
-    It is a `KeyboardInterrupt`, as in rospy, so that `except Exception` of a program that does not
-    want to end catches it (as a `ROSException`), and `except KeyboardInterrupt` of one that does.
+    As in rospy it is both a `ROSException` and a `KeyboardInterrupt`: `except Exception` catches it
+    as well as `except KeyboardInterrupt`.
     """
 
 
@@ -51,7 +51,7 @@ class ROSInitException(ROSException):
 
 
 class ROSSerializationException(ROSException):
-    """A message holds a value that does not fit its field."""
+    """A value of a message does not fit its field."""
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
@@ -67,7 +67,7 @@ class ROSTimeMovedBackwardsException(ROSInterruptException):
 
 
 class ROSInternalException(Exception):  # noqa: N818
-    """Base of rospy's inner exceptions."""
+    """Base of rospy's internal exceptions."""
 
 
 class TransportException(ROSInternalException):
@@ -83,12 +83,12 @@ class TransportInitError(TransportException):
 
 
 class ServiceException(Exception):  # noqa: N818
-    """A service call failed; what exactly is its `__cause__`."""
+    """A service call failed; the reason is its `__cause__`."""
 
 
 @contextlib.contextmanager
 def as_rospy() -> Iterator[None]:
-    """Raise rospy's exceptions in place of this package's."""
+    """Raise rospy's exceptions instead of this package's."""
     try:
         yield
     except _ServiceError as error:

@@ -1,4 +1,4 @@
-"""`AnyMsg`: a message of whatever type, as bytes."""
+"""`AnyMsg`: a message of any type, as bytes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ __all__ = ["AnyMsg"]
 
 
 class AnyMsg:
-    """A message as it came.
+    """A received message that is not deserialised.
 
     Attributes:
-        _buff: Its bytes, as ROS 1 serialises it.
-        _connection_header: `type`, `md5sum`, `topic` and `callerid`, as texts.
+        _buff: Its bytes, as serialised in ROS 1.
+        _connection_header: `type`, `md5sum`, `topic` and `callerid`, as strings.
     """
 
     _type = "*"
@@ -33,6 +33,6 @@ class AnyMsg:
         buff.write(self._buff or b"")
 
     def deserialize(self, str_data: bytes) -> AnyMsg:
-        """Take the bytes of a message."""
+        """Store the bytes of a message."""
         self._buff = str_data
         return self

@@ -1,4 +1,4 @@
-"""Names as rospy has them, with a slash in front."""
+"""Names as in rospy, with a slash in front."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = [
 
 
 def get_name() -> str:
-    """Return the full name of the program's node, "/unnamed" before `init_node`."""
+    """Return the full name of the program's node; "/unnamed" before `init_node`."""
     if not session().name:
         return "/unnamed"
     node = get_node()
@@ -30,7 +30,7 @@ get_caller_id = get_name
 
 
 def get_namespace() -> str:
-    """Return the name space of relative names, with slashes around it."""
+    """Return the namespace of relative names, with a slash at either side."""
     space = get_node().namespace if session().name else ""
     return f"/{space}/" if space else "/"
 
@@ -39,8 +39,8 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
     """Return the full name, remapped.
 
     Args:
-        name: Relative, absolute or private name; "" is the name space.
-        caller_id: Full name of the node that it is private to; None: this one.
+        name: A relative, absolute or private name; "": the namespace itself.
+        caller_id: Full name of the node for private names; None: this node.
     """
     if not name:
         return get_namespace()
@@ -55,18 +55,18 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
 
 
 def canonical(name: str) -> str:
-    """Return a name with single slashes: rospy took doubled ones."""
-    return re.sub("//+", "/", name) if isinstance(name, str) else name  # else a stand-in
+    """Return a name with single slashes: rospy accepts doubled ones."""
+    return re.sub("//+", "/", name) if isinstance(name, str) else name  # it may be a stand-in
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """Return `name` as the command line renames it."""
+    """Return the full name of `name` after the remappings of the command line."""
     del resolved
     return resolve_name(name, caller_id)
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """Return the renaming of the command line, full names."""
+    """Return the remappings of the command line, as full names."""
     node = get_node()
     rules = node.arguments.remappings(node.name, namespace=node.namespace, node=node.full_name)
     return {f"/{old}": f"/{new}" for old, new in rules.items()}

@@ -1,4 +1,4 @@
-"""`numpy_msg`: arrays of messages as NumPy arrays. Here messages take and give them anyway."""
+"""`numpy_msg`: messages with NumPy arrays. Here all messages accept and return them."""
 
 from __future__ import annotations
 

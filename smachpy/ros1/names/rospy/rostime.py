@@ -1,4 +1,4 @@
-"""Time as rospy has it: `Time`, `Duration`, `sleep`, `Rate`, on the clock in force.
+"""Time as in rospy: `Time`, `Duration`, `sleep`, `Rate`, on the current clock.
 
 Source:
     rospy.rostime and rospy.timer for names, arguments and exceptions.
@@ -39,7 +39,7 @@ __all__ = [
 
 
 def get_time() -> float:
-    """Return seconds since the epoch, on the clock in force."""
+    """Return the seconds since 1970 of the current clock."""
     session().check_time()
     return Time.now().to_sec()
 
@@ -51,7 +51,7 @@ def get_rostime() -> Time:
 
 
 def is_rostime_initialized() -> bool:
-    """Tell whether time is known: it always is."""
+    """Return True: time is always known."""
     return True
 
 
@@ -61,14 +61,14 @@ def set_rostime_initialized(val: bool) -> None:
 
 
 def is_wallclock() -> bool:
-    """Tell whether time is wall time."""
+    """Return whether time is wall time."""
     from actionlib_core.clock import RealClock
 
     return isinstance(current_clock(), RealClock)
 
 
 def wallsleep(duration: float) -> None:
-    """Let time pass, whoever wants the program to end.
+    """Sleep, even if the program is to end.
 
     Blocks: for `duration` [s].
     """
@@ -76,13 +76,13 @@ def wallsleep(duration: float) -> None:
 
 
 def sleep(duration: Any) -> None:
-    """Let time pass; nothing happens for a negative duration.
+    """Sleep; a negative duration does nothing.
 
     Args:
         duration: Seconds, or a `Duration`.
 
     Raises:
-        ROSInterruptException: the program is to end, at once or meanwhile.
+        ROSInterruptException: the program is to end, now or during the sleep.
 
     Blocks: for `duration`.
     """
@@ -103,8 +103,8 @@ class Rate:
     """Keeps a loop at a frequency.
 
     Args:
-        hz: Rounds in a second; above 0.
-        reset: As rospy takes it; time does not jump here.
+        hz: Iterations per second, above 0.
+        reset: Ignored; time does not jump here.
 
     Raises:
         ValueError: `hz` is not above 0.
@@ -118,11 +118,11 @@ class Rate:
         self.sleep_dur = Duration.from_sec(1.0 / float(hz))
 
     def remaining(self) -> Duration:
-        """Return what is left of this round."""
+        """Return the remaining time of this iteration."""
         return self.sleep_dur - (Time.now() - self.last_time)
 
     def sleep(self) -> None:
-        """Wait for the end of this round; after a round that took too long, begin anew.
+        """Wait for the end of this iteration; after one that took far too long, start afresh.
 
         Raises:
             ROSInterruptException: the program is to end.
@@ -130,20 +130,21 @@ class Rate:
         Blocks: until then.
         """
         sleep(self.remaining())
+        # Add the period instead of taking the time: small delays then do not lower the frequency.
         self.last_time = self.last_time + self.sleep_dur
         if Time.now() - self.last_time > self.sleep_dur * 2:
             self.last_time = Time.now()
 
 
 class TimerEvent:
-    """What a timer's callback gets.
+    """The argument of a timer's callback.
 
     Attributes:
-        last_expected: When the round before should have come; None in the first.
-        last_real: When it came.
-        current_expected: When this one should have come.
-        current_real: When it came.
-        last_duration: How long the callback took in the round before [s].
+        last_expected: When the last call was due; None in the first call.
+        last_real: When it was made.
+        current_expected: When this call was due.
+        current_real: When it was made.
+        last_duration: How long the last call took [s].
     """
 
     def __init__(
@@ -162,13 +163,13 @@ class TimerEvent:
 
 
 class Timer:
-    """Calls a function again and again, or once.
+    """Calls a function periodically, or once.
 
     Args:
-        period: Time between two calls, `Duration` or seconds; above 0.
+        period: Time between two calls, `Duration` or seconds, above 0.
         callback: Called with a `TimerEvent`.
-        oneshot: Only once.
-        reset: As rospy takes it; time does not jump here.
+        oneshot: Call it only once.
+        reset: Ignored; time does not jump here.
 
     Raises:
         ValueError: `period` is not above 0.
@@ -200,12 +201,12 @@ class Timer:
             self._task = self._clock.spawn(self._run, name="rospy timer")
 
     def shutdown(self) -> None:
-        """Stop calling; a call that is under way ends by itself."""
+        """Make no more calls; does not wait for a running one."""
         self._shutdown.set()
         self._forget()
 
     def is_alive(self) -> bool:
-        """Tell whether it still calls."""
+        """Return whether it still makes calls."""
         return self._task is not None and self._task.is_alive()
 
     def join(self, timeout: float | None = None) -> None:
@@ -228,6 +229,7 @@ class Timer:
             if self._oneshot:
                 break
             last_expected, last_real, took = expected, real, self._clock.now() - begun
+            # Calls that are overdue are skipped, not made up for.
             missed = max(int((self._clock.now() - due) / self._period_s), 0)
             due += self._period_s * (missed + 1)
             expected = expected + self._period_s * (missed + 1)

@@ -23,7 +23,7 @@ __all__ = ["Service", "ServiceException", "ServiceProxy", "wait_for_service"]
 
 
 class Service(_Service):
-    """Answers the calls of a service; as `actionlib_core.Service`, with rospy's arguments."""
+    """Offers a service: an `actionlib_core.Service` with rospy's arguments."""
 
     def __init__(
         self,
@@ -45,9 +45,9 @@ class Service(_Service):
 
 
 class ServiceProxy(_ServiceProxy):
-    """Calls a service; as `actionlib_core.ServiceProxy`, with rospy's arguments.
+    """Calls a service: an `actionlib_core.ServiceProxy` with rospy's arguments.
 
-    A call waits for the answer as long as the server lives.
+    As in rospy, a call has no time limit; it ends with an error when the server dies.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class ServiceProxy(_ServiceProxy):
             super().__init__(canonical(name), service_class, persistent, headers, timeout=None)
 
     def call(self, *args: Any, **kwds: Any) -> Any:
-        """Send a request, or one made from the arguments, and return the response.
+        """Send a request, given or made from the arguments, and return the response.
 
         Raises:
             ServiceException: there is no server, it died, or its handler raised.

@@ -1,4 +1,4 @@
-"""rospy's module of `Rate`, `Timer` and `sleep`."""
+"""rospy's module with `Rate`, `Timer` and `sleep`."""
 
 from smachpy.ros1.names.rospy.rostime import Rate, Timer, TimerEvent, sleep
 

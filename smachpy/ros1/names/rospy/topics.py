@@ -29,17 +29,17 @@ __all__ = ["Publisher", "SubscribeListener", "Subscriber", "Topic"]
 
 
 class SubscribeListener:
-    """Told of the subscribers of a publisher; here for programs that name it as a base class."""
+    """Base class of listeners for a publisher's subscribers; here they are never called."""
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
-        """Take notice of a subscriber."""
+        """Handle a new subscriber."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        """Take notice that one left."""
+        """Handle the end of a subscriber."""
 
 
 class Publisher(_Publisher):
-    """Sends messages to a topic; as `actionlib_core.Publisher`, with rospy's arguments."""
+    """Publishes on a topic: an `actionlib_core.Publisher` with rospy's arguments."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class Publisher(_Publisher):
         self.impl = self
 
     def publish(self, *args: Any, **kwds: Any) -> None:
-        """Send a message, or one made from the arguments.
+        """Send a message, given or made from the arguments.
 
         Raises:
             ROSException: `init_node` was not called, or the topic is closed.
@@ -75,7 +75,8 @@ class Publisher(_Publisher):
             with as_rospy():
                 super().publish(*args, **kwds)
         except ROSException as error:
-            if isinstance(error.__cause__, TypeMismatchError):  # in rospy nothing is said
+            # In rospy, publishing goes on when a subscriber has another type.
+            if isinstance(error.__cause__, TypeMismatchError):
                 logerr_once("%s", error)
             elif isinstance(error.__cause__, TransportError):
                 raise ROSException("publish() to a closed topic") from error
@@ -83,15 +84,15 @@ class Publisher(_Publisher):
                 raise
 
     def get_num_connections(self) -> int:
-        """Return how many subscribers there are; a dry program is told one."""
+        """Return the number of subscribers; 1 in a dry program, as some wait for the first."""
         return 1 if session().dry else super().get_num_connections()
 
 
 class Subscriber(_Subscriber[Any]):
-    """Calls back with every message of a topic, with rospy's arguments; `AnyMsg` takes any type."""
+    """Subscribes to a topic, with rospy's arguments; with `AnyMsg`, to messages of any type."""
 
     def __new__(cls, name: str, data_class: Any, *_args: Any, **_kwargs: Any) -> Any:
-        """Make one, of another kind for `AnyMsg`."""
+        """Make an instance; for `AnyMsg`, of a subclass."""
         del name
         return object.__new__(_AnySubscriber if data_class is AnyMsg else cls)
 
@@ -155,10 +156,10 @@ class _AnySubscriber(Subscriber):
 
 
 def wait_for_any(topic: str, timeout: float | None) -> AnyMsg:
-    """Return the next message of a topic, whatever its type.
+    """Return the next message of a topic, of any type.
 
     Raises:
-        ROSException: none came in time, or the program is to end.
+        ROSException: none arrived in time, or the program is to end.
     """
     node = get_node()
     found: list[AnyMsg] = []

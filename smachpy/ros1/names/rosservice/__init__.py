@@ -1,4 +1,4 @@
-"""rosservice: the services that are there, and calls of them by name.
+"""rosservice: lists services, and calls them by name.
 
 Source:
     rosservice of ros_comm for names, arguments and exceptions.
@@ -33,9 +33,9 @@ class ROSServiceException(Exception):  # noqa: N818  rosservice's name
 def get_service_list(
     node: str | None = None, namespace: str | None = None, include_nodes: bool = False
 ) -> list[Any]:
-    """Return the names of the services, of one node or below a name if asked.
+    """Return the names of the services, if given of one node or below a namespace.
 
-    With `include_nodes`, [name, [node]] of each.
+    With `include_nodes`, return [name, [node]] for each.
     """
     prefix = "/" if namespace is None else f"/{namespace.strip('/')}/".replace("//", "/")
     _, _, (_, _, services) = MasterProxy().getSystemState()
@@ -48,22 +48,22 @@ def get_service_list(
 
 
 def get_service_type(service_name: str) -> str | None:
-    """Return the type of a service; None when it is not there."""
+    """Return the type of a service; None if it is not available."""
     end = _find(service_name)
     return None if end is None else str(end.type)
 
 
 def get_service_node(service_name: str) -> str | None:
-    """Return the name of the node that has a service; None when it is not there."""
+    """Return the name of the node that offers a service; None if it is not available."""
     end = _find(service_name)
     return None if end is None else f"/{end.node}"
 
 
 def get_service_class_by_name(service_name: str) -> Any:
-    """Return the class of a service that is there.
+    """Return the class of a service.
 
     Raises:
-        ROSServiceException: it is not there, or its type is not known here.
+        ROSServiceException: it is not available, or its type is not known here.
     """
     end = _find(service_name)
     if end is None:

@@ -1,4 +1,4 @@
-"""rostest and rosunit: run a test case, as `unittest` does."""
+"""rostest and rosunit: run a test case with `unittest`."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def rosrun(
     """Run a test case and end the program: with 0 if all of it passed, else with 1.
 
     Args:
-        package: As rostest takes it.
-        test_name: As rostest takes it.
+        package: Ignored.
+        test_name: Ignored.
         test: A `unittest.TestCase`, or its name.
-        sysargs: As rostest takes it.
+        sysargs: Ignored.
 
     Raises:
         SystemExit: always.

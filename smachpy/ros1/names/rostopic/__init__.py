@@ -1,4 +1,4 @@
-"""rostopic: types of the topics that are there.
+"""rostopic: the types of published topics.
 
 Source:
     rostopic of ros_comm for names, arguments and exceptions.
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ROSTopicException", "find_by_type", "get_topic_class", "get_topic_type"]
 
-LOOK_S = 0.1  # a topic that is not there yet is looked for so often
+LOOK_S = 0.1  # pause between two checks for a topic
 
 
 class ROSTopicException(Exception):  # noqa: N818  rostopic's name
@@ -30,7 +30,7 @@ _Found = tuple[Any, str | None, "Callable[[Any], Any] | None"]
 
 
 def get_topic_type(topic: str, blocking: bool = False) -> _Found:
-    """Return type, full name, and None, of a topic that is published; thrice None for none.
+    """Return type, full name and None for a published topic; otherwise three times None.
 
     Blocks: with `blocking`, until there is one or the program is to end.
     """
@@ -45,7 +45,7 @@ def get_topic_type(topic: str, blocking: bool = False) -> _Found:
 
 
 def get_topic_class(topic: str, blocking: bool = False) -> _Found:
-    """Return class, full name, and None, of a topic that is published; as above.
+    """Return class, full name and None for a published topic; as `get_topic_type`.
 
     Raises:
         ROSTopicException: its type is not known here.

@@ -1,4 +1,4 @@
-"""SMACH's public names, and what `from smach import *` brings along."""
+"""SMACH's public names, and the others that `from smach import *` gives in the original."""
 
 from smachpy import exceptions, log, util
 from smachpy.exceptions import (

@@ -1,4 +1,4 @@
-"""smach_ros's public names. Importing it joins SMACH's log and end with rospy's, as in ROS 1."""
+"""smach_ros's public names. As in ROS 1, importing it sends SMACH's log to rospy."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ class ActionServerWrapper(_ActionServerWrapper):
     """Runs a container for each goal of an action."""
 
     def run_server(self) -> None:
-        """Serve from now on; a dry program ends here."""
+        """Begin to serve; a dry program ends here."""
         session().stop(self.wrapped_container)
         super().run_server()
 

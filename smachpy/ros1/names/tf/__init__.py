@@ -1,4 +1,4 @@
-"""tf: listener and broadcaster of transforms, in the shape that tf had before tf2.
+"""tf: listener and broadcaster of transforms, with the interface from before tf2.
 
 Source:
     http://docs.ros.org/en/noetic/api/tf/html/python/tf_python.html for names and arguments.
@@ -35,11 +35,11 @@ define_message("tf/tfMessage", "geometry_msgs/TransformStamped[] transforms\n")
 
 
 class TransformerROS:
-    """Knows transforms and takes stamped messages to other frames.
+    """Keeps transforms and converts stamped messages to other frames.
 
     Args:
-        interpolate: As tf takes it: always.
-        cache_time: How long transforms are kept.
+        interpolate: Ignored: transforms are always interpolated.
+        cache_time: Length of the history, seconds or `Duration`; None: ten seconds.
     """
 
     def __init__(self, interpolate: bool = True, cache_time: Any = None) -> None:
@@ -69,7 +69,7 @@ class TransformerROS:
         """Wait until a transform is known.
 
         Raises:
-            tf.Exception: it is not, within `timeout`.
+            tf.Exception: it is not known within `timeout`.
 
         Blocks: `timeout` at most.
         """
@@ -81,7 +81,7 @@ class TransformerROS:
             raise TransformException(problem)
 
     def canTransform(self, target_frame: str, source_frame: str, time: Any) -> bool:
-        """Tell whether a transform is known."""
+        """Return whether a transform is known."""
         return bool(self._buffer.can_transform(target_frame, source_frame, time))
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> Time:
@@ -89,7 +89,7 @@ class TransformerROS:
         return self._buffer.lookup_transform(dest_frame, source_frame, Time(0)).header.stamp
 
     def frameExists(self, frame_id: str) -> bool:
-        """Tell whether a frame is known."""
+        """Return whether a frame is known."""
         return frame_id.lstrip("/") in self._buffer.get_frame_strings()
 
     def getFrameStrings(self) -> list[str]:
@@ -101,7 +101,7 @@ class TransformerROS:
         return self._buffer.all_frames_as_string()
 
     def setTransform(self, transform: TransformStamped, authority: str = "") -> None:
-        """Take a transform over."""
+        """Add a transform."""
         self._buffer.set_transform(transform, authority)
 
     def clear(self) -> None:
@@ -115,7 +115,7 @@ class TransformerROS:
         return made
 
     def asMatrix(self, target_frame: str, hdr: Any) -> Any:
-        """Return the 4x4 matrix that takes coordinates of a header's frame to `target_frame`."""
+        """Return the 4x4 matrix from the frame of a header to `target_frame`."""
         return self.fromTranslationRotation(
             *self.lookupTransform(target_frame, hdr.frame_id, hdr.stamp)
         )
@@ -150,7 +150,7 @@ Transformer = TransformerROS
 
 
 class TransformListener(TransformerROS):
-    """Hears the network's transforms."""
+    """A `TransformerROS` that receives the transforms on the network."""
 
     def __init__(self, interpolate: bool = True, cache_time: Any = None) -> None:
         super().__init__(interpolate, cache_time)
@@ -167,7 +167,7 @@ class TransformBroadcaster:
     def sendTransform(
         self, translation: Any, rotation: Any, time: Any, child: str, parent: str
     ) -> None:
-        """Send where `child` is in `parent`: translation [m], rotation (x, y, z, w)."""
+        """Send the pose of `child` in `parent`: translation [m], rotation (x, y, z, w)."""
         made = TransformStamped()
         made.header.frame_id, made.header.stamp, made.child_frame_id = parent, time, child
         move, turn = made.transform.translation, made.transform.rotation

@@ -79,7 +79,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: str = "sxyz") -
 
 
 def quaternion_about_axis(angle: float, axis: Any) -> Array:
-    """Return the quaternion of a turn by `angle` [rad] about `axis`."""
+    """Return the quaternion of a rotation by `angle` [rad] about `axis`."""
     direction = np.asarray(axis, dtype=float)[:3]
     length = float(np.linalg.norm(direction))
     half = direction * (math.sin(angle / 2.0) / length if length > _EPS else 1.0)
@@ -99,12 +99,12 @@ def quaternion_from_matrix(matrix: Any) -> Array:
 
 
 def quaternion_multiply(quaternion1: Any, quaternion0: Any) -> Array:
-    """Return the turn `quaternion1` after `quaternion0`."""
+    """Return the product: the rotation by `quaternion0`, then by `quaternion1`."""
     return _xyzw(_quaternions.qmult(_wxyz(quaternion1), _wxyz(quaternion0)))
 
 
 def quaternion_conjugate(quaternion: Any) -> Array:
-    """Return the turn back, of a quaternion of length 1."""
+    """Return the conjugate; for a quaternion of length 1 it is the inverse."""
     x, y, z, w = quaternion
     return np.array([-x, -y, -z, w], dtype=np.float64)
 
@@ -117,7 +117,7 @@ def quaternion_inverse(quaternion: Any) -> Array:
 def quaternion_slerp(
     quat0: Any, quat1: Any, fraction: float, spin: int = 0, shortestpath: bool = True
 ) -> Array:
-    """Return what lies between two turns: 0 is `quat0`, 1 is `quat1`."""
+    """Return a rotation between two others; `fraction` is 0 at `quat0` and 1 at `quat1`."""
     q0, q1 = unit_vector(np.array(quat0[:4])), unit_vector(np.array(quat1[:4]))
     if fraction in {0.0, 1.0}:
         return q1 if fraction else q0
@@ -134,7 +134,7 @@ def quaternion_slerp(
 
 
 def random_quaternion(rand: Any = None) -> Array:
-    """Return a turn, all equally likely; `rand` are three numbers from 0 to 1."""
+    """Return a uniformly distributed random rotation; `rand`: three numbers from 0 to 1."""
     r0, r1, r2 = np.random.rand(3) if rand is None else rand
     one, two = math.sqrt(1.0 - r0), math.sqrt(r0)
     a, b = 2.0 * math.pi * r1, 2.0 * math.pi * r2
@@ -142,12 +142,12 @@ def random_quaternion(rand: Any = None) -> Array:
 
 
 def random_rotation_matrix(rand: Any = None) -> Array:
-    """Return the matrix of a turn, all equally likely."""
+    """Return the matrix of a uniformly distributed random rotation."""
     return quaternion_matrix(random_quaternion(rand))
 
 
 def rotation_matrix(angle: float, direction: Any, point: Any = None) -> Array:
-    """Return the matrix of a turn by `angle` [rad] about an axis through `point` [m]."""
+    """Return the matrix of a rotation by `angle` [rad] about an axis through `point` [m]."""
     made = quaternion_matrix(quaternion_about_axis(angle, direction))
     if point is not None:
         place = np.asarray(point, dtype=float)[:3]
@@ -156,8 +156,9 @@ def rotation_matrix(angle: float, direction: Any, point: Any = None) -> Array:
 
 
 def rotation_from_matrix(matrix: Any) -> tuple[float, Array, Array]:
-    """Return angle [rad], direction and point of the turn that a matrix is."""
+    """Return angle [rad], direction and point of the rotation in a matrix."""
     given = np.asarray(matrix, dtype=float)
+    # Points on the axis do not move: they are an eigenvector for the eigenvalue 1.
     direction, angle = _quaternions.quat2axangle(_quaternions.mat2quat(given[:3, :3]))
     values, vectors = np.linalg.eig(given)
     index = int(np.argmin(abs(np.real(values) - 1.0) + abs(np.imag(values))))
@@ -169,7 +170,7 @@ def rotation_from_matrix(matrix: Any) -> tuple[float, Array, Array]:
 
 
 def scale_matrix(factor: float, origin: Any = None, direction: Any = None) -> Array:
-    """Return the matrix that scales about `origin` [m], along `direction` if one is given."""
+    """Return the matrix that scales about `origin` [m], only along `direction` if it is given."""
     made = np.identity(4)
     if direction is None:
         made[:3, :3] *= factor
@@ -190,7 +191,7 @@ def reflection_matrix(point: Any, normal: Any) -> Array:
 def compose_matrix(
     scale: Any = None, shear: Any = None, angles: Any = None, translate: Any = None, _p: Any = None
 ) -> Array:
-    """Return the matrix of these, done in this order; angles about the fixed x, y, z [rad]."""
+    """Return the matrix of these operations in this order; angles about fixed x, y, z [rad]."""
     rotation = _euler.euler2mat(*angles) if angles is not None else np.identity(3)
     return _affines.compose(
         translate if translate is not None else np.zeros(3),
@@ -220,7 +221,7 @@ def concatenate_matrices(*matrices: Any) -> Array:
 
 
 def is_same_transform(matrix0: Any, matrix1: Any) -> bool:
-    """Tell whether two matrices do the same."""
+    """Return whether two matrices are the same transform."""
     one, two = (np.array(matrix, dtype=float) for matrix in (matrix0, matrix1))
     return bool(np.allclose(one / one[3, 3], two / two[3, 3]))
 
@@ -245,7 +246,7 @@ def vector_norm(data: Any, axis: int | None = None, out: Any = None) -> Any:
 
 
 def random_vector(size: Any) -> Array:
-    """Return numbers from 0 to 1."""
+    """Return random numbers from 0 to 1."""
     return np.random.random(size)
 
 

@@ -28,6 +28,7 @@ def _of(stamped: TransformStamped) -> Transform:
 
 def _pose(pose: Pose, transform: Transform) -> Pose:
     place, turn = pose.position, pose.orientation
+    # A pose whose orientation was never set is all zeros, which is no rotation.
     whole = (turn.x, turn.y, turn.z, turn.w) if any((turn.x, turn.y, turn.z, turn.w)) else None
     made = transform.then(Transform(place.x, place.y, place.z, *(whole or (0.0, 0.0, 0.0, 1.0))))
     return Pose(Point(*made[:3]), Quaternion(*made[3:]))
@@ -45,7 +46,7 @@ def do_transform_point(point: PointStamped, transform: TransformStamped) -> Poin
 
 
 def do_transform_vector3(vector3: Vector3Stamped, transform: TransformStamped) -> Vector3Stamped:
-    """Return the vector in the transform's frame: turned, not moved."""
+    """Return the vector in the transform's frame: it is rotated but not translated."""
     turn = Transform(0.0, 0.0, 0.0, *_of(transform)[3:])
     given = vector3.vector
     return Vector3Stamped(transform.header, Vector3(*turn.apply(given.x, given.y, given.z)))
@@ -54,7 +55,7 @@ def do_transform_vector3(vector3: Vector3Stamped, transform: TransformStamped) -
 def do_transform_pose_with_covariance(
     pose: PoseWithCovarianceStamped, transform: TransformStamped
 ) -> PoseWithCovarianceStamped:
-    """Return the pose in the transform's frame; the covariance stays as it is."""
+    """Return the pose in the transform's frame; the covariance is not changed."""
     made = PoseWithCovarianceStamped()
     made.header = transform.header
     made.pose.pose = _pose(pose.pose.pose, _of(transform))

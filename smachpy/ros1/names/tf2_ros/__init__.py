@@ -1,6 +1,6 @@
 """tf2_ros: a buffer of transforms, its listener, and broadcasters.
 
-In a dry program every transform is there and is the identity.
+In a dry program every transform is known and is the identity.
 
 Source:
     http://docs.ros.org/en/noetic/api/tf2_ros/html/python/ for names, arguments and exceptions.
@@ -29,7 +29,7 @@ from smachpy.ros1.session import session
 
 
 class TransformException(Exception):  # noqa: N818  tf2's names, all of them
-    """A transform cannot be had."""
+    """A transform cannot be looked up."""
 
 
 class LookupException(TransformException):
@@ -37,19 +37,19 @@ class LookupException(TransformException):
 
 
 class ConnectivityException(TransformException):
-    """No way leads from one frame to the other."""
+    """Two frames are not in the same tree."""
 
 
 class ExtrapolationException(TransformException):
-    """The time is before or after what is known."""
+    """The time is before the first or after the last known transform."""
 
 
 class InvalidArgumentException(TransformException):
-    """An argument is wrong."""
+    """An argument is invalid."""
 
 
 class TimeoutException(TransformException):
-    """It was not there in time."""
+    """A transform was not known in time."""
 
 
 class TypeException(Exception):  # noqa: N818
@@ -57,7 +57,7 @@ class TypeException(Exception):  # noqa: N818
 
 
 class NotImplementedException(Exception):  # noqa: N818
-    """A buffer does not do that."""
+    """A buffer does not support an operation."""
 
 
 _KINDS = {
@@ -72,8 +72,8 @@ class Buffer:
     """Transforms of the last seconds.
 
     Args:
-        cache_time: How long they are kept; None: ten seconds.
-        debug: As tf2_ros takes it.
+        cache_time: Length of the history, seconds or `Duration`; None: ten seconds.
+        debug: Ignored.
     """
 
     def __init__(self, cache_time: Any = None, debug: bool = True) -> None:
@@ -82,7 +82,7 @@ class Buffer:
         self._listener: listening.Listener | None = None
 
     def listen(self) -> listening.Listener:
-        """Begin to hear the network's transforms, if it does not yet."""
+        """Begin to receive the transforms on the network, if it does not yet."""
         if self._listener is None:
             self._listener = listening.Listener(self._frames)
         return self._listener
@@ -90,13 +90,13 @@ class Buffer:
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0.0
     ) -> TransformStamped:
-        """Return what takes coordinates in `source_frame` to `target_frame`.
+        """Return the transform of coordinates from `source_frame` to `target_frame`.
 
         Args:
             target_frame: Frame of the result.
             source_frame: Frame of the coordinates.
-            time: When; `Time(0)` is the latest.
-            timeout: How long to wait for it, `Duration` or seconds.
+            time: The time; `Time(0)`: the latest.
+            timeout: Longest wait for it, `Duration` or seconds.
 
         Raises:
             LookupException, ConnectivityException, ExtrapolationException: it is not known.
@@ -118,7 +118,7 @@ class Buffer:
         timeout: Any = 0.0,
         return_debug_tuple: bool = False,
     ) -> Any:
-        """Tell whether a transform is known, within `timeout`.
+        """Return whether a transform is known, within `timeout`.
 
         Blocks: `timeout` at most.
         """
@@ -127,12 +127,12 @@ class Buffer:
         return (there, problem) if return_debug_tuple else there
 
     def set_transform(self, transform: TransformStamped, authority: str = "") -> None:
-        """Take a transform over."""
+        """Add a transform."""
         del authority
         self._add(transform, static=False)
 
     def set_transform_static(self, transform: TransformStamped, authority: str = "") -> None:
-        """Take a transform over that never changes."""
+        """Add a transform that never changes."""
         del authority
         self._add(transform, static=True)
 
@@ -142,7 +142,7 @@ class Buffer:
         """Return a stamped pose, point, vector or the like in another frame.
 
         Raises:
-            TypeException: nothing is registered for its type.
+            TypeException: its type is not supported.
             LookupException, ConnectivityException, ExtrapolationException: it is not known.
         """
         del new_type
@@ -158,7 +158,7 @@ class Buffer:
         self._frames.clear()
 
     def all_frames_as_string(self) -> str:
-        """Return the names of all frames, one a line."""
+        """Return the names of all frames, one per line."""
         return "".join(f"Frame {name} exists.\n" for name in self._frames.names())
 
     all_frames_as_yaml = all_frames_as_string
@@ -168,7 +168,7 @@ class Buffer:
         return self._frames.names()
 
     def registration(self) -> Any:
-        """Return nothing: transforms of messages are always registered."""
+        """Do nothing: the conversions of messages are always registered."""
 
     def _add(self, transform: TransformStamped, *, static: bool) -> None:
         try:
@@ -241,7 +241,7 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster(TransformBroadcaster):
-    """Sends transforms that never change, on `/tf_static`, also to those who come later."""
+    """Sends transforms that never change, on the latched topic `/tf_static`."""
 
     _static = True
 

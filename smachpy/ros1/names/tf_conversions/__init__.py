@@ -1,4 +1,4 @@
-"""tf_conversions: between messages, matrices, tf's pairs and PyKDL's frames."""
+"""tf_conversions: converts between messages, matrices, tf's pairs and PyKDL's frames."""
 
 from __future__ import annotations
 

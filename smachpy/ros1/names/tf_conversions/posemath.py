@@ -1,4 +1,4 @@
-"""tf_conversions.posemath: PyKDL frames from and to poses, matrices and tf's pairs."""
+"""tf_conversions.posemath: converts PyKDL frames from and to poses, matrices and tf's pairs."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def toMatrix(f: Frame) -> Any:
 
 
 def fromTfListener(tf_listener: Any, source: str, target: str) -> Frame:
-    """Return the frame that a listener knows."""
+    """Return the latest transform of a listener as a frame."""
     return fromTf(tf_listener.lookupTransform(source, target, Time(0)))
 
 
