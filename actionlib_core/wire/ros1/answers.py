@@ -108,7 +108,10 @@ def read_types(peer: str, value: object) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Names:
-    """The topics and services with which a node is registered, or wants to be."""
+    """The topics and services with which a node is registered, or wants to be.
+
+    The difference of two, `wanted - there`, is what is still to be registered.
+    """
 
     published: frozenset[str] = frozenset()
     subscribed: frozenset[str] = frozenset()

@@ -177,6 +177,7 @@ class Ros1Bridge:
             if self._closing:
                 return
             self._closing = True
+        # First end the loop, which makes bridges; then close these; the connections last.
         self._forget()
         for forget in self._forget_names:
             forget()
@@ -248,12 +249,13 @@ class Ros1Bridge:
     def _run(self) -> None:
         state, types = SystemState(), {}
         while not self._closing and not self.ended:
-            self._changed.clear()
+            self._changed.clear()  # before looking: a change from now on causes another round
             try:
                 state = self._ros.state()
                 if not self._answered:
                     self._ros.clean(state, BRIDGE)
                 types = self._ros.types()
+                # `_look` only notes what is wanted in ROS 1; this registers it.
                 self._look(state, types)
                 self._ros.register(state, BRIDGE)
                 self._note_master(None)

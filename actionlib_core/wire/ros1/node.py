@@ -178,6 +178,8 @@ class _Link:
                     self._node.report(self.uri if whole else about, error)
             except Exception:  # noqa: BLE001  an error of a receiver: report it and try again
                 report_thread_exception()
+            # Checked again before the pause, so that a publisher that has left ends this thread at
+            # once; `wake` is set when it leaves during the pause, or comes back.
             if self._subscription.leave(self):
                 break
             self.wake.wait(pause)
@@ -194,8 +196,9 @@ class _Link:
         node.forget_report(self.uri)
         with Connection.open(*where, f"{topic} at {self.uri}", node.clock) as connection:
             self.connection = connection
-            if subscription.closed:
+            if subscription.closed:  # `close` did not find the connection, which was not set yet
                 return
+            # "*" accepts every type: the bridge passes on bytes.
             fields = {"topic": topic, "type": ANY, "md5sum": ANY, "message_definition": ""}
             connection.send_header({"callerid": node.name, **fields, "tcp_nodelay": "1"})
             header = connection.read_header()
@@ -296,6 +299,8 @@ class Publication:
 
     def serve(self, connection: Connection, header: Header) -> None:
         """Serve a subscriber until it leaves; runs in the connection's thread."""
+        # "*" is a subscriber of any type, such as rostopic or rosbag. It has to be told a real one:
+        # ours, else the one that another subscriber has given.
         theirs = header.get("type", ANY), header.get("md5sum", ANY)
         known = self._seen if ANY in theirs else theirs
         ours = self.type or known[0], self.md5 or known[1]
@@ -311,6 +316,7 @@ class Publication:
         fields |= {"md5sum": ours[1], "message_definition": self._definition}
         connection.send_header({**fields, "latching": str(int(self.latching))})
         try:
+            # In one step, so that it gets each message once: as kept or from `put`.
             with self.lock:
                 if self._closed:
                     return
@@ -372,7 +378,7 @@ class ServiceServer:
         fields = {"callerid": self._node.name, "type": self.type, "md5sum": self.md5}
         parts = {f"{part}_type": f"{self.type}{part.title()}" for part in ("request", "response")}
         connection.send_header({**fields, **parts})
-        if header.get("probe") == "1":
+        if header.get("probe") == "1":  # rospy's wait_for_service only looks whether we answer
             return
         while (request := connection.read_frame()) is not None:
             try:
@@ -420,6 +426,8 @@ class Ros1Node:
         self._tasks: set[Task] = set()
         self._reported: dict[str, str] = {}
         self._unconnected: dict[tuple[str, str], Backoff] = {}  # (topic, subscribing node)
+        # With the master on this computer no other one needs to reach the node. Else it listens on
+        # all addresses: the robot may know this computer under another one.
         own = find_host(master, host)
         bind = "127.0.0.1" if is_loopback(own) else ""
         self._rpc = RpcServer(bind, clock, self._methods())
@@ -506,6 +514,7 @@ class Ros1Node:
                 uris = read_texts(self.master, "registerSubscriber", uris)
                 subscription.apply(subscription.publishers.answer(asked, uris))
                 subscription.nodes = nodes
+        # Also what the master still has from before it was dropped here.
         self._unregister(there - wanted)
         self._remind(state, published, ignored or self.name)
 

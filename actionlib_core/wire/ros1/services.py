@@ -63,6 +63,7 @@ class ServiceBridge:
             text = f"two servers: got one in ROS 1 and one of node '{here.node}' here"
             error = Ros1Error(f"service {self._name}", f"{text}; expected one.")
             self._sides.ros.report(f"two servers of {self._name}", error)
+        # A server here that is replaced by one of another type needs another offer in ROS 1.
         typed = None if served or here is None else Typed(here.type, here.md5)
         if self._to_ros is not None and self._to_ros.typed != typed:
             self._to_ros.close()
@@ -139,6 +140,7 @@ class _FromRos:
         except TypeMismatchError as error:
             _refuse(query, error)
             return
+        # Each call has a thread, as it blocks and this is the network's thread.
         with self._lock:
             busy = self._calls >= CALLS_AT_ONCE
             self._calls += not busy

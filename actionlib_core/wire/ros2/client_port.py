@@ -132,16 +132,22 @@ class RosClientPort:
         self._lock = threading.Lock()
         self._closed = False
         self._declared: list[Closable] = []
+        # The last status list, and the gid of its publisher with its sequence number.
         self._last_status: Sample | None = None
         self._last_number: tuple[bytes, int] | None = None
+        # The same goals by id and by UUID: the first is the client's key, the second the wire's.
         self._goals: dict[str, _Goal] = {}
         self._by_uuid: dict[bytes, _Goal] = {}
+        # Goals that wait to be sent, and those whose request is not answered.
         self._queue: deque[_Goal] = deque()
         self._sending: set[_Goal] = set()
+        # Servers with the error about their types; servers whose tokens are there but that did not
+        # answer a probe; servers whose tokens are gone and whose last answers may still come. A
+        # server is in one of the three.
         self._present: dict[RosServer, TypeMismatchError | None] = {}
         self._silent: set[RosServer] = set()
-        self._probing = False
         self._leaving: dict[RosServer, Timer] = {}
+        self._probing = False  # a request for the result of an unknown goal is open
         self._probe = LinkProbe(
             node.clock,
             network.settings.probe,
@@ -261,15 +267,17 @@ class RosClientPort:
         with self._lock:
             goal = self._goals.get(goal_id)
             known = goal is not None
-            if goal is None:
+            if goal is None:  # an earlier process has sent it
                 goal = self._keep(_Goal(goal_id, b"", "", attached=True))
             step = goal.exchange.ask_again() if self._present else Step.NOTHING
+            # Added before `_do` sends the request, whose answer may come at once.
             waits = goal.exchange.asking
             if waits:
                 goal.on_done.append(on_done)
         if not waits:
             on_done()
         self._do(goal, step)
+        # The last list was read when this goal was not followed yet, and may contain it.
         if not known and self._last_status is not None:
             with contextlib.suppress(ValueError):  # reported when it arrived
                 self._read_states(self._last_status)
@@ -435,6 +443,7 @@ class RosClientPort:
         with self._lock:
             known = not self._closed and self._goals.get(goal.id) is goal
             step = goal.exchange.ask_again() if known and self._present else Step.NOTHING
+        # A goal that the client has given up is dropped instead of being requested for ever.
         if step and not self._listener.follows(goal.id):
             self._drop(goal)
         else:
@@ -564,6 +573,7 @@ class RosClientPort:
         steps = []
         with self._lock:
             for uuid, code in states:
+                # A goal may have been dropped since, and a list may be older than other messages.
                 goal = self._by_uuid.get(uuid)
                 if goal is not None and code >= goal.exchange.code:
                     self._note_sender(goal, sample.source)
@@ -652,6 +662,7 @@ class RosClientPort:
         self._feedback.flush()
         self._listener.on_server_gone(server, why)
         with self._lock:
+            # A goal without a known server may have been sent to this one.
             mine = [g for g in self._goals.values() if g.server in {"", server.session}]
             requests = [request for goal in mine for request in self._withdraw(goal)]
             callbacks = [on_done for goal in mine for on_done in goal.on_done]

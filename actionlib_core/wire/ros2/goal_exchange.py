@@ -115,7 +115,7 @@ class GoalExchange:
         self.sent_at = 0.0
         self._attached = attached
         self._sendings = 0
-        self._refused = False
+        self._refused = False  # a repeated request was refused, which is not settled yet
         self._waits = False  # the last list seen shows it as accepted
         self._never_active = False
         self._cancel_wanted = False
@@ -149,6 +149,7 @@ class GoalExchange:
         """Handle the answer to the request."""
         if accepted:
             return self._take(GoalCode.ACCEPTED)
+        # The first request is not a repetition, and a goal that was executing was not refused.
         if self._sendings == 1 and self.code <= GoalCode.ACCEPTED:
             return Step.REFUSED
         if self.phase is Phase.TAKEN:  # the server has it from the first request
@@ -191,6 +192,8 @@ class GoalExchange:
 
     def _take(self, code: int) -> int:
         step = Step.NOTHING
+        # The first sign that the server has the goal: request its result at once, since the server
+        # keeps it only for a short time after the end, and send a cancel that had to wait.
         if self.phase is not Phase.TAKEN:
             self.phase = Phase.TAKEN
             step |= self.ask_again()

@@ -120,7 +120,7 @@ class RosNode:
         self.domain = domain
         self._ids = ids if ids is not None else itertools.count()
         namespace, _, base = full_name.rpartition("/")
-        number = next(self._ids)
+        number = next(self._ids)  # in a node's own token both ids are the same
         self.token = Token(
             domain, transport.session_id, number, number, Kind.NODE, "", namespace, base
         )
@@ -294,6 +294,7 @@ class ActionServers:
             seen.discard(token)
             if not seen:
                 del self._seen[which]
+        # By name alone: a server with other types is present, too, and is reported.
         complete = {other.name for other in seen} == set(self._types)
         if complete == (which in self._servers):
             return None

@@ -154,6 +154,7 @@ class RosServerPort:
     def open(self, listener: ServerListener) -> None:
         self._listener = listener
         names, transport = self._names, self._ros.transport
+        # Any server of the name has this publisher, whatever its type.
         there = self._ros.list(kind=Kind.PUBLISHER, name=names.status)
         if there:
             raise self._conflict(there[0])
@@ -172,6 +173,7 @@ class RosServerPort:
             self._declared.append(self._feedback)
             self._status = transport.publisher(keys[names.status], "", STATUS)
             self._declared.append(self._status)
+            # `complete`: a client's request may go to this one alone.
             for name, answer in (
                 (names.get_result, self._on_result),
                 (names.cancel_goal, self._on_cancel),
@@ -290,6 +292,7 @@ class RosServerPort:
             self._answer_forgotten({entry.id for entry in listed})
 
     def send_result(self, entry: StatusEntry, body: bytes, *, wait: bool = True) -> None:  # noqa: ARG002  replies never wait
+        # A goal may end before its request was answered: clients get that answer first.
         self._decide(entry.id, accepted=entry.status != Status.REJECTED)
         if entry.status in _BEFORE_CANCEL:
             self.send_status(())  # shows whether it has been executing; the result does not
@@ -348,6 +351,7 @@ class RosServerPort:
         if stamp_ns is None:
             self._reply(request, pack_accepted(None))
             return
+        # Noted as undecided before this call, since the server may decide within it.
         taken = False
         try:
             taken = self._listener.on_goal(
@@ -491,7 +495,7 @@ class RosServerPort:
     # -- clients and other servers -------------------------------------------------------------
 
     def _on_token(self, token: Token, key: str, alive: bool) -> None:
-        if any(token == end.token for end in self._ends.values()):
+        if any(token == end.token for end in self._ends.values()):  # our own tokens are seen, too
             return
         if token.kind is Kind.PUBLISHER and token.name == self._names.status and alive:
             log.error("%s", self._conflict(token, stays=True))
