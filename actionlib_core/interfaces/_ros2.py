@@ -298,10 +298,19 @@ class Ros2Registry(Registry):
         )
 
     def hash(self, full: str) -> str:
-        """Return the type hash of "pkg/kind/Name", also of a type that has no class."""
+        """Return the type hash of "pkg/kind/Name", also of a type that has no class.
+
+        Raises:
+            InterfaceError: No such type, or not such a name.
+        """
         if self.distro == "humble":
             return NO_HASH
         if full not in self._hashes:
+            # Names in tokens of other programs may be any text.
+            if parse_ros2_name(full)[1] is None:
+                raise InterfaceError(
+                    f"interface name: got {full!r}; expected 'package/msg/Name' (or srv, action)"
+                )
             from actionlib_core.interfaces import _typesys
 
             self._hashes[full] = _typesys.ros2_hash(full, self.fields)

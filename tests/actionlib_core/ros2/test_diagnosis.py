@@ -78,6 +78,17 @@ def test_own_types_that_differ_or_are_unknown_here():
     assert "own_msgs/msg/Own" in unknown.text
 
 
+@pytest.mark.parametrize("name", [
+    "plain", "a/b", "std_msgs/msg/", "/msg/String", "a::b/msg/C", "../srv/..%..%etc",
+    "std_msgs/foo/String", "std_srvs/srv/Nope", "a/action/B_FeedbackMessage", "Std/msg/Event",
+])  # fmt: skip
+def test_any_text_may_stand_for_a_type(name):
+    tokens = [*action(), end(Kind.SERVICE, "odd", name, "RIHS01_" + "3" * 64)]
+    ok, unknown = diagnose_types(tokens, "jazzy")
+    assert (ok.level, unknown.level) == (Level.OK, Level.NOTE)
+    assert name in unknown.text
+
+
 def test_servers_that_are_not_whole_or_two():
     assert levels(diagnose_actions(action())) == [Level.OK]
     assert levels(diagnose_actions(action()[:4])) == [Level.PROBLEM]
