@@ -93,7 +93,8 @@ def token_key(endpoint: Endpoint) -> str:
 def parse_token(key: str) -> Endpoint | None:
     """Return the end that a token's key describes; None if the key is not one of our tokens."""
     words = key.split("/", WORDS_BEFORE_NAME)  # the name keeps its slashes
-    if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT:
+    # Commands print names: a line break or an escape sequence in one could pass for their output.
+    if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT or not key.isprintable():
         return None
     _, kind, session, entity, node, type_name, md5, name = words
     try:

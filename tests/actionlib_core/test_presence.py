@@ -57,7 +57,8 @@ def test_every_endpoint_survives_its_key(endpoint):
 
 @pytest.mark.parametrize(
     "key", ["", "a/b", "@smachpy/x", "@other/service/s/1/n/t/m/x", "@smachpy/cook/s/1/n/t/m/x",
-            "@smachpy/service/s/one/n/t/m/x"]
+            "@smachpy/service/s/one/n/t/m/x", "@smachpy/service/s/1/n/t/m/x\nproblem",
+            "@smachpy/service/s/1/n\x1b[31m/t/m/x"]
 )  # fmt: skip
 def test_foreign_keys_are_no_tokens(key):
     assert parse_token(key) is None

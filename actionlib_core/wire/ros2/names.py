@@ -192,7 +192,8 @@ def parse_token(key: str) -> Token | None:
     Words after the last known one are ignored: newer releases append some.
     """
     words = key.split("/")
-    if len(words) < NODE_WORDS or words[0] != ROOT:
+    # Commands print names: a line break or an escape sequence in one could pass for their output.
+    if len(words) < NODE_WORDS or words[0] != ROOT or not key.isprintable():
         return None
     _, domain, session, node_id, entity_id, kind, enclave, namespace, node = words[:NODE_WORDS]
     numbers = (domain, node_id, entity_id)

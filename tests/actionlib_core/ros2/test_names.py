@@ -165,6 +165,9 @@ def test_any_text_is_a_token_or_none(text: str) -> None:
     "@other/42/a/0/0/NN/%/%/n",
     f"@ros2_lv/{9:0>5000}/a/0/0/NN/%/%/n",
     f"@ros2_lv/42/a/0/{9:0>5000}/NN/%/%/n",
+    "@ros2_lv/42/a/0/0/NN/%/%/n\nproblem",
+    "@ros2_lv/42/a/0/0/SS/%/%/n/%x\x1b[31m/T/h/::,10:,:,:,,",
+    "@ros2_lv/42/a/0/0/SS/%/%/n/%x\u202e/T/h/::,10:,:,:,,",
 ])  # fmt: skip
 def test_what_is_no_token(key: str) -> None:
     assert parse_token(key) is None
