@@ -18,10 +18,17 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core._arguments import check_class, check_delay, check_function, check_queue_size
 from actionlib_core.action._callbacks import CallbackQueue
-from actionlib_core.exceptions import NodeError, TypeMismatchError, WaitTimeoutError
+from actionlib_core.exceptions import (
+    ActionlibError,
+    DeserializationError,
+    NodeError,
+    TypeMismatchError,
+    WaitTimeoutError,
+)
 from actionlib_core.goal.bounded import MESSAGES, Backlog
 from actionlib_core.pubsub._ends import End, NameWatch, close_all
 from actionlib_core.shutdown import requested
+from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
@@ -202,6 +209,8 @@ class Subscriber(_TopicEnd, Generic[M]):
         InvalidNameError: the name breaks the ROS rules.
         NodeError: the node is closed.
 
+    A message whose bytes cannot be read is dropped; the first one is logged.
+
     Threads: the callback runs in a thread of the node's clock and may block. An exception is passed
         to `threading.excepthook`; the next message is delivered all the same.
     """
@@ -228,6 +237,7 @@ class Subscriber(_TopicEnd, Generic[M]):
         self.queue_size = queue_size
         self._lock = threading.Lock()  # guards `_waiting`
         self._waiting: Backlog[Sample] = Backlog(queue_size or MESSAGES)
+        self._readable = Readable(logger)
         self._call = self._caller()
         # Last: a message may arrive at once, and needs all of the above.
         self._join(lambda: self._end.receive(self._on_sample))
@@ -265,6 +275,11 @@ class Subscriber(_TopicEnd, Generic[M]):
             message = self._end.read(sample)
         except TypeMismatchError as error:
             self._ends.note(error, self._end.sender_of(sample))
+            return
+        except DeserializationError as error:
+            # Not an exception of the callback; and a sensor would send many of them in a second.
+            text = f"topic {self.name}: a message cannot be read, and is dropped: {error}"
+            self._readable.report("a message", ActionlibError(text))
             return
         self._call_back(message)
 
