@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core._arguments import check_class, check_delay, check_limit
 from actionlib_core.exceptions import (
     ActionlibError,
+    DeserializationError,
     NodeError,
     ServiceBusyError,
     ServiceException,
@@ -156,7 +157,8 @@ class ServiceProxy(ServiceEnd):
 
         Raises:
             FieldError: a value does not fit its field of the request.
-            ServiceException: the handler raised; type and text are on the error.
+            ServiceException: the handler raised, then type and text are on the error; or the bytes
+                of the response cannot be read.
             ServiceUnavailableError: there is no server.
             ServiceTimeoutError: the server did not answer in time.
             ServiceLostError: the server died or left during the call.
@@ -306,7 +308,11 @@ class ServiceProxy(ServiceEnd):
 
     def _read(self, reply: Reply) -> Message:
         if not reply.error:
-            response: Message = self._end.read_response(reply)
+            try:
+                response: Message = self._end.read_response(reply)
+            except DeserializationError as unreadable:
+                reason = f"the response cannot be read: {unreadable}"
+                raise ServiceException(self.resolved_name, reason) from unreadable
             return response
         text = reply.payload.decode(errors="replace")
         try:

@@ -303,6 +303,25 @@ def test_handler_that_raises_is_told(world):
     service.close()
 
 
+@pytest.mark.parametrize("cut", [0, 4, -1])
+def test_response_that_cannot_be_read_is_a_failed_call(world, cut):
+    session = world.session()
+    server = RosNode(session, world.clock, domain=0, full_name="robot2")
+    end = server.end(Kind.SERVICE, "flag", RosType("std_srvs/srv/SetBool", SetBool._rihs01))
+
+    def answer(query):
+        query.reply(SetBool.Response(message="on").to_cdr()[:cut], attachment=query.attachment)
+        query.finish()
+
+    session.queryable(end.key, answer, complete=True)
+    end.show()
+    proxy = ServiceProxy("flag", SetBool, node=world.mission)
+    proxy.wait_for_service(WAIT_S)
+    with pytest.raises(ServiceException, match="the response cannot be read: std_srvs/srv/SetB"):
+        proxy(True)
+    end.close()
+
+
 def test_second_service_of_a_name_is_refused(world):
     service = Service("go", Trigger, lambda _: (True, "1"), node=world.robot)
     ServiceProxy("go", Trigger, node=world.mission).wait_for_service(WAIT_S)
