@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from actionlib_core.exceptions import CorrespondenceError
+from actionlib_core.exceptions import CorrespondenceError, FieldError
 from actionlib_core.interfaces._definition import FLOATS, INTEGERS, OCTETS
+from actionlib_core.interfaces._values import coerced
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.time import Duration, Time
 
@@ -39,7 +40,9 @@ def converter(
 ) -> Convert:
     """Return a function that converts a `source` to a `target`; for one class, the identity.
 
-    It raises FieldError, ValueError or TypeError for values that the target cannot hold.
+    It accepts the values that `to_bytes` of the source accepts, and raises FieldError for others,
+    and for times that the target cannot hold. Other values that only the target cannot hold are
+    found when it is written.
 
     Args:
         source: Class of its argument.
@@ -57,7 +60,20 @@ def converter(
     convert = pairs.message(source, target, "", dict(fields or {}))
     if pairs.problems:
         raise CorrespondenceError(*pairs.problems)
-    return convert
+
+    def checked(message: Any) -> Any:
+        try:
+            return convert(message)
+        except (AttributeError, TypeError, ValueError):
+            # A value is not exactly of its field's type. `coerced` converts what may be converted,
+            # such as a stamp in seconds, and reports the rest; it is too slow for each message.
+            exact = coerced(message)
+        try:
+            return convert(exact)
+        except (TypeError, ValueError) as error:  # ROS 1 has no times before 1970
+            raise FieldError(f"{source._type} -> {target._type}: {error}") from error
+
+    return checked
 
 
 class _Pairs:
@@ -148,11 +164,11 @@ class _Pairs:
         if not mine.type.is_array:
             return one
         if theirs.type.base in OCTETS:
-            return bytes
+            return lambda values: bytes(_array(values))
         if one is None:
-            return list
+            return lambda values: list(_array(values))
         element = one
-        return lambda values: [element(value) for value in values]
+        return lambda values: [element(value) for value in _array(values)]
 
     def _one(
         self, source: type[Message], mine: Field, target: type[Message], theirs: Field, here: str
@@ -179,6 +195,13 @@ class _Pairs:
             f"{source._type} -> {target._type}: {here}: got {mine.type}; expected {theirs.type}, "
             f"the type of {theirs.name!r}."
         )
+
+
+def _array(values: Any) -> Any:
+    """Return values that may be those of an array; `bytes(5)` and `list("ab")` are no errors."""
+    if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
+        raise TypeError("not an array")
+    return values
 
 
 def _family(kind: FieldType) -> str:

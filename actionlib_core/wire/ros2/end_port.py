@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.exceptions import DeserializationError, FieldError
 from actionlib_core.transport import Quality
 from actionlib_core.wire.end_port import Sender
 from actionlib_core.wire.presence import Endpoint
@@ -105,7 +106,7 @@ class RosEndPort:
         return self._network.transport.subscribe(self._end.key, callback, cached=LATCHED.depth)
 
     def read(self, sample: Sample) -> Any:
-        return self._message.from_ros2(self._message.message.from_cdr(sample.payload))
+        return _read(self._message, sample.payload)
 
     def sender_of(self, sample: Sample) -> Endpoint:
         return self.own._replace(kind=EndKind.PUBLISHER, session=sample.source, node="", entity=0)
@@ -117,7 +118,7 @@ class RosEndPort:
         unpack_attachment(query.attachment)
 
     def read_request(self, query: Query) -> Any:
-        return self._request.from_ros2(self._request.message.from_cdr(query.payload))
+        return _read(self._request, query.payload)
 
     def reply(self, query: Query, response: Any) -> None:
         asked = unpack_attachment(query.attachment)
@@ -142,4 +143,17 @@ class RosEndPort:
         )
 
     def read_response(self, reply: Reply) -> Any:
-        return self._response.from_ros2(self._response.message.from_cdr(reply.payload))
+        return _read(self._response, reply.payload)
+
+
+def _read(on_ros2: MessageOnRos2, payload: bytes) -> Any:
+    """Return the message of this program for the bytes of one of ROS 2.
+
+    Raises:
+        DeserializationError: they are malformed, or this program's type cannot hold the values.
+    """
+    message = on_ros2.message.from_cdr(payload)
+    try:
+        return on_ros2.from_ros2(message)
+    except FieldError as error:
+        raise DeserializationError(message._type, len(payload), str(error)) from error

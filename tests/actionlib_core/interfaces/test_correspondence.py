@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from actionlib_core import interfaces
-from actionlib_core.exceptions import CorrespondenceError
+from actionlib_core.exceptions import CorrespondenceError, FieldError
 from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces._correspondence import converter
 from actionlib_core.interfaces._registry import Registry
@@ -103,3 +103,46 @@ def test_arrays_and_bytes_are_taken_over() -> None:
     path, path2 = interfaces.get_message("nav_msgs/Path"), ros2.get_message("nav_msgs/Path")
     made = converter(path, path2)(path(poses=[PoseStamped(), PoseStamped(header=Header(stamp=2))]))
     assert [pose.header.stamp.sec for pose in made.poses] == [0, 2]
+
+
+@pytest.mark.parametrize("stamp", [12.5, 12, Time(12)])
+def test_a_stamp_in_seconds_is_converted_as_in_the_bytes_of_ros_1(stamp) -> None:
+    goal = MoveBaseGoal()
+    goal.target_pose.header.stamp = stamp
+    made = converter(MoveBaseGoal, NavigateToPose.Goal)(goal)
+    assert made.pose.header.stamp.sec == 12
+    assert goal.target_pose.header.stamp == stamp
+
+
+@pytest.mark.parametrize(("field", "value"), [
+    ("poses", None), ("poses", 5), ("poses", "ab"), ("poses", [None]), ("header", {"seq": 1}),
+    ("header", Header(frame_id="map", stamp=Time(1)).stamp),
+])  # fmt: skip
+def test_values_of_a_wrong_type_are_the_same_error_as_on_our_own_wire(field, value) -> None:
+    path = interfaces.get_message("nav_msgs/Path")
+    message = path()
+    setattr(message, field, value)
+    with pytest.raises(FieldError) as own:
+        message.to_bytes()
+    with pytest.raises(FieldError) as caught:
+        converter(path, ros2.get_message("nav_msgs/Path"))(message)
+    assert str(caught.value) == str(own.value)
+
+
+@pytest.mark.parametrize("value", [5, "ab", {"a": 1}])
+def test_what_is_no_array_does_not_become_one(value) -> None:
+    image, state = (interfaces.get_message(f"sensor_msgs/{n}") for n in ("Image", "JointState"))
+    for cls, field in ((image, "data"), (state, "name")):
+        message = cls()
+        setattr(message, field, value)
+        with pytest.raises(FieldError, match=f"[$].{field}: expected"):
+            converter(cls, ros2.get_message(cls._type))(message)
+
+
+def test_a_time_that_ros_1_cannot_hold_is_named() -> None:
+    odometry = ros2.get_message("nav_msgs/Odometry")
+    message = odometry()
+    message.header.stamp.sec = -5
+    back = converter(odometry, interfaces.get_message("nav_msgs/Odometry"), whole="target")
+    with pytest.raises(FieldError, match=r"nav_msgs/msg/Odometry -> nav_msgs/Odometry: .*got -5 s"):
+        back(message)

@@ -16,8 +16,8 @@ from actionlib_core.exceptions import (
     ServiceUnavailableError,
     TypeMismatchError,
 )
-from actionlib_core.interfaces import std_msgs
-from actionlib_core.interfaces.ros2.nav_msgs.msg import OccupancyGrid
+from actionlib_core.interfaces import nav_msgs, std_msgs
+from actionlib_core.interfaces.ros2.nav_msgs.msg import OccupancyGrid, Odometry
 from actionlib_core.interfaces.ros2.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.ros2.std_msgs.msg import Int32, String
 from actionlib_core.interfaces.ros2.std_srvs.srv import SetBool, Trigger
@@ -230,6 +230,20 @@ def test_topic_with_a_ros_1_type_goes_to_ros_2_where_the_configuration_names_it(
     assert [message.data for message in heard.wait_for(1)] == ["from ROS 1"]
     assert isinstance(heard.items[0], String)
     assert back.items == []
+
+
+def test_message_with_a_time_that_the_ros_1_type_cannot_hold_is_dropped(world, caplog):
+    node = world.node("old", names=("odom",))
+    heard = world.inbox()
+    Subscriber("odom", nav_msgs.msg.Odometry, heard, node=node)
+    publisher = Publisher("odom", Odometry, node=world.robot)
+    assert publisher.wait_for_connections(timeout=WAIT_S)
+    message = Odometry()
+    message.header.stamp.sec = -1
+    publisher.publish(message)
+    publisher.publish(Odometry(child_frame_id="base_link"))
+    assert [message.child_frame_id for message in heard.wait_for(1)] == ["base_link"]
+    assert any("topic /odom" in r.getMessage() and "-1 s" in r.getMessage() for r in caplog.records)
 
 
 # -- services --------------------------------------------------------------------------------------
