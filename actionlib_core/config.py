@@ -86,7 +86,8 @@ class Mapped:
         service: The same for a service.
         type: Its type there, "nav2_msgs/NavigateToPose"; "": the corresponding type.
         fields: Pairs of corresponding fields, here and there ("": none), where this does not follow
-            from names and types; for an action with its part in front, "goal.target_pose".
+            from names and types; for an action or service with its part in front,
+            "goal.target_pose" or "request.data".
     """
 
     name: str
@@ -108,6 +109,8 @@ class Mapped:
             f"{word}: got {given[word]!r} beside {named[0]!r}; expected one of the two."
             for word in named[1:]
         ]
+        # A name with a slash in front would never be found: full names have none.
+        problems += _check_names("name", (self.name,))
         for word in ("name", *named):
             try:
                 clean_namespace(getattr(self, word))

@@ -133,25 +133,19 @@ def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2
     type_name = types.action._type
     if types.action._wire == "ros1":
         type_name = type_name.removesuffix("Action")
-        if not mapped and type_name in KNOWN_ACTIONS:
+        if not wanted and type_name in KNOWN_ACTIONS:
             # The type alone gives the new type; the name changes only if it is the usual one.
             usual, successor, wanted = KNOWN_ACTIONS[type_name]
             front, _, last = name.rpartition("/")
             if last == usual:
                 there = f"{front}/{successor}" if front else successor
     action = _looked_up(network, name, "action", wanted or type_name)
-    fields = dict(mapped.fields) if mapped else {}
     problems: list[str] = []
+    fields = _fields_of_parts(mapped, ("goal", "result", "feedback"), problems)
 
     def ways(part: str) -> tuple[Convert, Convert]:
-        # `fields` are "goal.x": "goal.y"; `converter` wants those of one part, "x": "y".
         ours, theirs = getattr(types, part), getattr(action, part.title())
-        own = {
-            name.partition(".")[2]: counterpart.rpartition(".")[2]
-            for name, counterpart in fields.items()
-            if name.partition(".")[0] == part
-        }
-        return _ways(ours, theirs, own, problems)
+        return _ways(ours, theirs, fields[part], problems)
 
     goal, result, feedback = ways("goal"), ways("result"), ways("feedback")
     if problems:
@@ -181,12 +175,13 @@ def service_on_ros2(
     mapped = _mapped(network, name)
     theirs = _looked_up(network, name, "service", (mapped and mapped.type) or cls._type)
     problems: list[str] = []
+    fields = _fields_of_parts(mapped, ("request", "response"), problems)
     there = mapped.name_there if mapped else name
     request, response = (
-        MessageOnRos2(there, part, *_ways(ours, part, {}, problems))
-        for ours, part in (
-            (cls._request_class, theirs.Request),
-            (cls._response_class, theirs.Response),
+        MessageOnRos2(there, part, *_ways(ours, part, fields[which], problems))
+        for which, ours, part in (
+            ("request", cls._request_class, theirs.Request),
+            ("response", cls._response_class, theirs.Response),
         )
     )
     if problems:
@@ -196,6 +191,27 @@ def service_on_ros2(
 
 def _mapped(network: Ros2, name: str) -> Mapped | None:
     return next((entry for entry in network.map if entry.name == name), None)
+
+
+def _fields_of_parts(
+    mapped: Mapped | None, parts: tuple[str, ...], problems: list[str]
+) -> dict[str, dict[str, str]]:
+    """Return the pairs of fields of a name in the configuration by part: "goal.x": "goal.y".
+
+    Pairs that belong to none of the parts are added to `problems`.
+    """
+    found: dict[str, dict[str, str]] = {part: {} for part in parts}
+    for ours, theirs in mapped.fields if mapped else ():
+        part, _, field = ours.partition(".")
+        part_there, _, counterpart = theirs.rpartition(".")
+        if field and part in found and part_there in {"", part}:
+            found[part][field] = counterpart
+        else:
+            problems.append(
+                f"fields: got '{ours}: {theirs}'; expected one of {', '.join(parts)} before the "
+                f"name, the same on both sides: '{parts[0]}.x: {parts[0]}.y'."
+            )
+    return found
 
 
 def _looked_up(network: Ros2, name: str, kind: str, type_name: str) -> Any:

@@ -163,6 +163,31 @@ def test_the_configuration_has_the_last_word() -> None:
         action_on_ros2(Ros2(map=(Mapped("a", type="nav2_msgs/Spinn"),)), "a", MOVE_BASE)
 
 
+def test_a_mapped_name_without_a_type_keeps_the_known_successor() -> None:
+    settings = Ros2(map=(Mapped("move_base", action="/drive_to"),))
+    found = action_on_ros2(settings, "move_base", MOVE_BASE)
+    assert (found.name, found.action) == ("drive_to", NavigateToPose)
+    # With a type alone, the name is the same there, as for all mapped names.
+    settings = Ros2(map=(Mapped("move_base", type="nav2_msgs/NavigateToPose"),))
+    assert action_on_ros2(settings, "move_base", MOVE_BASE).name == "move_base"
+
+
+@pytest.mark.parametrize("name", ["/move_base", "move_base/", "a//b"])
+def test_a_mapped_name_that_would_never_be_found_is_refused(name) -> None:
+    with pytest.raises(ConfigError, match="without outer slashes"):
+        Mapped(name, action="go")
+
+
+@pytest.mark.parametrize("pair", [
+    ("target_pose", "pose"), ("gaol.target_pose", "goal.pose"), ("goal.target_pose", "result.pose"),
+    ("goal.", "goal.pose"),
+])  # fmt: skip
+def test_fields_of_no_part_of_an_action_are_named(pair) -> None:
+    settings = Ros2(map=(Mapped("move_base", action="go", fields=(pair,)),))
+    with pytest.raises(ConfigError, match=f"fields: got '{pair[0]}: {pair[1]}'; expected one of"):
+        action_on_ros2(settings, "move_base", MOVE_BASE)
+
+
 def test_another_distribution_takes_the_goals_of_a_class() -> None:
     found = action_on_ros2(Ros2(distro="rolling"), "go", ActionTypes.of(NavigateToPose))
     assert found.action._distro == "rolling"
@@ -186,6 +211,14 @@ def test_topics_and_services() -> None:
     assert service._type == "std_srvs/srv/SetBool"
     assert request.to_ros2(SetBool._request_class(data=True)).data is True
     assert response.from_ros2(response.message(message="x")).message == "x"
+    switch = interfaces.define_service("mapping_pkg/Switch", "bool on\nbool slow\n---\nbool ok\n")
+    pairs = (("request.on", "data"), ("request.slow", ""))
+    mapped = Mapped("flag", type="std_srvs/SetBool", fields=pairs)
+    _, request, _ = service_on_ros2(Ros2(map=(mapped,)), "flag", switch)
+    assert request.to_ros2(switch._request_class(on=True)).data is True
+    mapped = Mapped("flag", type="std_srvs/SetBool", fields=(*pairs, ("reqest.on", "data")))
+    with pytest.raises(ConfigError, match=r"reqest\.on"):
+        service_on_ros2(Ros2(map=(mapped,)), "flag", switch)
     own = interfaces.define_message("mapping_pkg/Old", "time at\n")
     with pytest.raises(ConfigError, match="mapping_pkg"):
         message_on_ros2(Ros2(), "old", own)
