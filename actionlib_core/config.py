@@ -395,6 +395,10 @@ def _check_ros2(config: Config) -> str:
             f"ros2: got {len(alike)} networks that do not say which names are theirs; expected one "
             "at most. Try 'robot: robot1' or 'names: [robot1/**]'."
         )
+    robots = [robot for network in config.ros2 if (robot := clean_namespace(network.robot))]
+    for robot in robots:
+        if robots.count(robot) > 1:
+            return f"ros2: robot: got {robot!r} {robots.count(robot)} times; expected it once."
     if config.ros2 and not config.tls.ca:
         encrypted = [n.router for n in config.ros2 if n.router.startswith(("tls/", "quic/"))]
         if encrypted:
