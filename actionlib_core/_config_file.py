@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 
 # Paths in these fields are relative to the configuration file.
 _FILE_FIELDS = frozenset({"ca", "certificate", "key", "password_file", "users_file"})
+# Of these, a file may have one instead of a list, or a mapping by name.
+_OR_MAPPING = {
+    Ros2: ("not a network", "lines such as 'router: tcp/robot.local:7447', or a list of networks"),
+    Mapped: ("not a mapping", "lines of 'name: {...}'"),
+}
 _EXPECTED = {float: "a number", int: "a whole number", bool: "true or false"}
 
 
@@ -131,6 +136,8 @@ class _Reader:
 
     def _read_tuple(self, item: Any, value: object, path: str) -> object:
         if not isinstance(value, Mapping):
+            if get_origin(item) is tuple:
+                return self._report(path, "not a mapping", value, "lines of 'field: field'")
             return self._read_sequence(item, value, path)
         if item is Ros2:  # one network needs no list
             only = self.read_record(item, value, path)
@@ -153,7 +160,8 @@ class _Reader:
 
     def _read_sequence(self, hint: Any, value: object, path: str) -> object:
         if isinstance(value, str) or not isinstance(value, Sequence):
-            return self._report(path, "not a list", value, "a list")
+            what, expected = _OR_MAPPING.get(hint, ("not a list", "a list"))
+            return self._report(path, what, value, expected)
         result = []
         for index, item in enumerate(value):
             self._go_to(value, index)

@@ -98,11 +98,24 @@ def test_all_problems_of_a_network_are_told_at_once(tmp_path):
     assert "line 3: router: malformed endpoint: got 'robot.local'" in told
 
 
+@pytest.mark.parametrize(("text", "told"), [
+    ("ros2:", "ros2: not a network: got None; expected lines such as 'router: "),
+    ("ros2: tcp/robot:7447", "expected lines such as 'router: tcp/robot.local:7447', or a list of"),
+    ("ros2: {map: move_base}", "ros2.map: not a mapping: got 'move_base'; expected lines of 'name:"),
+    ("ros2: {map: {a: {fields: [goal]}}}", "expected lines of 'field: field'"),
+])  # fmt: skip
+def test_what_was_expected_in_place_of_a_network(tmp_path, text, told):
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path, text)
+    assert told in str(caught.value)
+
+
 @pytest.mark.parametrize(
     "networks",
     [
         (Ros2(router="tcp/a:1"), Ros2(router="tcp/b:1")),
         (Ros2(router="tls/a:1"),),
+        (Ros2(router="tcp/a:1", robot="red"), Ros2(router="tcp/b:1", robot="/red")),
     ],
 )
 def test_networks_that_cannot_be_told_apart_or_trusted_are_refused(networks):
