@@ -360,20 +360,26 @@ class _Ros2Reader(_Reader):
     """
 
     def _split(self, line: str) -> tuple[str, str]:
+        line = line.expandtabs(1)  # as ROS 2 does: a tab separates words as a space does
         quote = ""  # within quotes, "#" does not begin a comment
         for index, character in enumerate(line):
+            before = line[index - 1 : index]
             if quote:
-                escaped = line[index - 1] == "\\"
-                quote = "" if character == quote and not escaped else quote
+                quote = "" if character == quote and before != "\\" else quote
             elif character == "#":
                 return line[:index], line[index + 1 :]
-            elif character in {'"', "'"}:
+            # Elsewhere it is an apostrophe, as in `string TEXT=don't # a comment`.
+            elif character in {'"', "'"} and before in {" ", "=", "[", ","}:
                 quote = character
         return line, ""
 
     def _type(self, at: Position, text: str) -> FieldType | None:
         match = _ROS2_TYPE.match(text)
-        if match is None or (match[4] and match[3] != "string") or match[5] == "[<=]":
+        if (
+            match is None
+            or (match[4] and match[3] not in {"string", "wstring"})
+            or match[5] == "[<=]"
+        ):
             self._problem(at, at.column, self._malformed(text))
             return None
         if max(len(match[4] or ""), len(match[7] or "")) > _LENGTH_DIGITS:
@@ -421,7 +427,7 @@ class _Ros2Reader(_Reader):
             try:
                 default = _ros2_value(kind, value.strip())
             except ValueError as error:
-                where = at.text.index(value.strip(), column)
+                where = at.text.expandtabs(1).index(value.strip(), column)
                 self._problem(at, where, f"default value of {name}: {error}")
                 return
         self.fields.append(Field(name, kind, at, comment, default))
@@ -444,13 +450,16 @@ class _Ros2Reader(_Reader):
         self.constants.append(Constant(name, kind.base, value, raw, comment))
 
 
+# Commas within quotes are not separators.
+_ARRAY_VALUE = re.compile(r"""\s*("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^,]+)""")
+
+
 def _ros2_value(kind: FieldType, text: str) -> Any:
     """Convert the text of a default value or constant; raises ValueError for a wrong one."""
     if kind.is_array:
         if not (kind.is_builtin and text.startswith("[") and text.endswith("]")):
             raise ValueError(f"got {text!r}; expected `[value, ...]` for an array of built-in type")
-        # Commas within quotes are not separators.
-        parts = re.findall(r"\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*'|[^,]+", text[1:-1])
+        parts = _ARRAY_VALUE.findall(text[1:-1])
         values = [_ros2_value(kind.element, part.strip()) for part in parts if part.strip()]
         if kind.length not in {None, len(values)} or len(values) > (kind.most or len(values)):
             raise ValueError(f"got {len(values)} values; expected {kind}")
@@ -459,6 +468,8 @@ def _ros2_value(kind: FieldType, text: str) -> Any:
         raise ValueError(f"got {text!r}; expected none, the type is a message")
     if kind.base == "string" and len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
         text = text[1:-1].replace(f"\\{text[0]}", text[0])
+    if kind.most_text is not None and len(text.encode()) > kind.most_text:
+        raise ValueError(f"got {len(text.encode())} bytes; expected {kind}")
     return _constant_value(kind.base, text)
 
 

@@ -220,9 +220,11 @@ class _Check:
         except (TypeError, ValueError, OverflowError) as error:
             self._problem(path, str(error))
             return None
-        if kind.most_text is not None and len(result.encode(*TEXT_CODEC)) > kind.most_text:
-            self._problem(path, f"expected {kind}, got {len(result)} characters")
-            return None
+        if kind.most_text is not None:
+            size = len(result.encode(*TEXT_CODEC))
+            if size > kind.most_text:
+                self._problem(path, f"expected {kind}, got {size} bytes")
+                return None
         return result
 
     def _ros2_time(self, cls: type[AnyMessage], value: Any, path: str) -> Message | None:

@@ -279,6 +279,48 @@ string c 'a "b"'"""
     assert (cls().a, cls().b, cls().c) == ('say "#"', ['x, "y"', "it's"], 'a "b"')
 
 
+def test_a_comma_in_a_later_value_of_an_array_is_no_separator() -> None:
+    registry = Ros2Registry("jazzy", ours=True)
+    cls: Any = registry.define("msg", "p/msg/Commas", "string[] a ['x', \"y, z\" , '', 'w']")
+    assert cls().a == ["x", "y, z", "", "w"]
+
+
+def test_tabs_separate_words_as_spaces_do() -> None:
+    registry = Ros2Registry("jazzy", ours=True)
+    text = "float64\tspeed\t0.3\t# [m/s]\nint8[]\tlevels\t[1,\t2]\nuint8\tA\t=\t1\nbool b\ttrue"
+    cls: Any = registry.define("msg", "p/msg/Tabs", text)
+    assert (cls().speed, cls().levels, cls.A, cls().b) == (0.3, [1, 2], 1, True)
+    with pytest.raises(InterfaceError) as caught:
+        registry.define("msg", "p/msg/Tabs2", "string<=3\ts\t'a\tbc'")
+    assert str(caught.value).endswith("    string<=3 s 'a bc'\n                ^")
+
+
+def test_an_apostrophe_within_a_word_opens_no_quotes() -> None:
+    registry = Ros2Registry("jazzy", ours=True)
+    text = "string A=don't # a comment\nstring a it's # it's one, too"
+    cls: Any = registry.define("msg", "p/msg/Apostrophe", text)
+    assert (cls.A, cls().a) == ("don't", "it's")
+
+
+def test_a_default_longer_than_its_string_may_be_is_refused() -> None:
+    registry = Ros2Registry("jazzy", ours=True)
+    with pytest.raises(InterfaceError) as caught:
+        registry.define(
+            "msg", "p/msg/Long", "string<=3 a 'abcd'\nstring<=3[] b ['abc', '\u00e9\u00e9']"
+        )
+    for name in "ab":
+        assert f"default value of {name}: got 4 bytes; expected string<=3" in str(caught.value)
+    cls: Any = registry.define("msg", "p/msg/Short", "string<=3 a 'abc'")
+    with pytest.raises(FieldError, match=r"\$\.a: expected string<=3, got 4 bytes"):
+        cls(a="\u00e9\u00e9").to_cdr()
+
+
+@pytest.mark.parametrize("kind", ["wstring", "wstring<=3", "wstring[]", "wstring<=3[<=2]"])
+def test_strings_of_wide_characters_are_refused_by_their_name(kind: str) -> None:
+    with pytest.raises(InterfaceError, match="'wstring', which cannot be used here"):
+        Ros2Registry("jazzy", ours=True).define("msg", "p/msg/Wide", f"{kind} text")
+
+
 def test_stamps_take_times_and_seconds() -> None:
     from actionlib_core.interfaces.ros2.builtin_interfaces.msg import Duration as Duration2
     from actionlib_core.interfaces.ros2.builtin_interfaces.msg import Time as Time2
