@@ -49,6 +49,8 @@ def wrap_angle(angle: float) -> float:
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
     """Return the heading of a quaternion [rad], which need not be normalised."""
+    largest = max(abs(x), abs(y), abs(z), abs(w)) or 1.0  # the square of 1e200 would be infinite
+    x, y, z, w = x / largest, y / largest, z / largest, w / largest
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 

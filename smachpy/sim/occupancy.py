@@ -59,7 +59,10 @@ class OccupancyMap:
 
     def cell(self, x: float, y: float) -> tuple[int, int] | None:
         """Return (row, column) of a point in the map frame; None outside the map."""
-        row, column = self.row_column(x, y)
+        try:
+            row, column = self.row_column(x, y)
+        except OverflowError:  # so far away that the quotient is infinite
+            return None
         if 0 <= row < self.height and 0 <= column < self.width:
             return row, column
         return None

@@ -124,6 +124,7 @@ def test_cells_and_points_agree_whatever_the_origin(x, y, yaw, row, column):
     assert grid.cell(*grid.centre(row, column)) == (row, column)
     outside = Pose2D(x, y, yaw).then(Pose2D(-0.1, 0.3, 0))
     assert grid.cell(outside.x, outside.y) is None
+    assert grid.cell(1e308, -1e308) is None  # further away than a row's number can be computed
 
 
 def test_the_office_is_large_enough_and_closed():
