@@ -32,6 +32,7 @@ def add_ros2_options(parser: argparse.ArgumentParser, **endpoint: Any) -> None:
     group.add_argument(
         "--ros2",
         metavar="ENDPOINT",
+        type=router_endpoint,
         help="its Zenoh router, tcp/robot.local:7447 for example (default: SMACHPY_ROS2, or the "
         "configuration)",
         **endpoint,
@@ -45,10 +46,33 @@ def add_ros2_options(parser: argparse.ArgumentParser, **endpoint: Any) -> None:
     )
 
 
+def router_endpoint(text: str) -> str:
+    """Return the value of a `--ros2`; its form is checked with the configuration.
+
+    Raises:
+        argparse.ArgumentTypeError: it is empty, as with an unset variable of the shell: taken for
+            no option at all, it would let a mission drive another robot.
+    """
+    if not text.strip():
+        raise argparse.ArgumentTypeError(
+            f"got {text!r}; expected a router, tcp/robot.local:7447 for example"
+        )
+    return text
+
+
 def _domain(text: str) -> str:
     if not (text.isascii() and text.isdecimal() and int(text[:MOST_DIGITS]) <= LAST_DOMAIN):
         raise argparse.ArgumentTypeError(f"got {text!r}; expected 0 to {LAST_DOMAIN}")
     return text
+
+
+def missing_router() -> ConfigError:
+    """Return the error for `--domain` or `--distro` without `--ros2`."""
+    return ConfigError(
+        "command line",
+        "--domain and --distro are of a ROS 2 robot: got no --ros2; expected its router. "
+        "Try --ros2 tcp/robot.local:7447.",
+    )
 
 
 @contextlib.contextmanager
@@ -64,11 +88,7 @@ def ros2_of_options(args: argparse.Namespace) -> Iterator[None]:
         ROS2_DISTRO_VARIABLE: args.distro,
     }
     if not (args.ros2 or os.environ.get(ROS2_VARIABLE)) and (args.domain or args.distro):
-        raise ConfigError(
-            "command line",
-            "--domain and --distro are of a ROS 2 robot: got no --ros2; expected its router. "
-            "Try --ros2 tcp/robot.local:7447.",
-        )
+        raise missing_router()
     before = {name: os.environ.get(name) for name in given}
     os.environ.update({name: value for name, value in given.items() if value})
     try:

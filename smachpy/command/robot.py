@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock
 from actionlib_core.config import Distro, Ros2
+from actionlib_core.ros2_options import missing_router, router_endpoint
 from smachpy.sim.config import SimConfig, load_config
 from smachpy.sim.exceptions import NavigationError
 from smachpy.sim.geometry import Pose2D, finite, wrap_angle
@@ -54,17 +55,17 @@ def register(subparsers: Any) -> None:
     ros2.add_argument(
         "--ros2",
         metavar="ROUTER",
+        type=router_endpoint,
         help="offer navigate_to_pose, spin and back_up to ROS 2 nodes behind this Zenoh router, "
         "tcp/127.0.0.1:7447 for example",
     )
     ros2.add_argument(
-        "--domain", type=_domain, default=0, metavar="N", help="their ROS_DOMAIN_ID (default: 0)"
+        "--domain", type=_domain, metavar="N", help="their ROS_DOMAIN_ID (default: 0)"
     )
     ros2.add_argument(
         "--distro",
         choices=get_args(Distro),
-        default=Ros2().distro,
-        help="the release whose message definitions to use (default: %(default)s)",
+        help=f"the release whose message definitions to use (default: {Ros2().distro})",
     )
     parser.add_argument("--parameters", action="store_true", help="list all parameters")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
@@ -96,6 +97,10 @@ def _run(args: argparse.Namespace) -> int:
     if args.parameters:
         print(parameters())
         return 0
+    if not args.ros2 and (args.domain is not None or args.distro is not None):
+        raise missing_router()
+    args.domain = args.domain or 0
+    args.distro = args.distro or Ros2().distro
     return serve(args)
 
 

@@ -155,7 +155,12 @@ def test_options_of_a_robot_without_its_router(capsys, monkeypatch):
     monkeypatch.delenv("SMACHPY_ROS2", raising=False)
     assert main(["--domain", "3", "list"]) == 2
     assert "--ros2" in capsys.readouterr().err
-    for wrong in (("--domain", "-1"), ("--domain", "9" * 12), ("--distro", "kilt")):
+    for wrong in (
+        ("--domain", "-1"),
+        ("--domain", "9" * 12),
+        ("--distro", "kilt"),
+        ("--ros2", " "),
+    ):
         with pytest.raises(SystemExit) as caught:
             main([f"{wrong[0]}={wrong[1]}", "list"])
         assert caught.value.code == 2

@@ -45,6 +45,7 @@ def test_robots_on_one_place_are_named(tmp_path, capsys):
         (["--robots", "0"], "got '0'; expected 1 to 1000"),
         (["--robots", "two"], "got 'two'; expected 1 to 1000"),
         (["--robots", "2", "--world", "w.yaml"], "not allowed with"),
+        (["--ros2", ""], "--ros2: got ''; expected a router"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, text, capsys):
@@ -52,6 +53,12 @@ def test_bad_arguments_are_refused(arguments, text, capsys):
         main(arguments)
     assert ended.value.code == 2
     assert text in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("--domain", "0"), ("--distro", "jazzy")])
+def test_options_for_ros_2_without_its_router_are_refused(words, capsys):
+    assert main(words) == 2
+    assert "got no --ros2; expected its router" in capsys.readouterr().err
 
 
 def test_all_parameters_are_listed(capsys):
