@@ -860,19 +860,22 @@ class GoalManager:
             return
         if not (answered or self._believes(session, handle)):
             return
-        status, text, result = STATUSES.get(entry.status, Status.LOST), entry.text, None
+        status, result, unreadable = STATUSES.get(entry.status, Status.LOST), None, ""
         if body is not None:
             try:
                 result = self.port.read_result(body)
             except (ValueError, ActionlibError) as error:
-                status, text = Status.LOST, f"the result cannot be read: {error}"
+                unreadable = f"the server sent a result that cannot be read: {error}"
         if not handle.keeps_result:
             self.acknowledge(entry.id)
         with self.lock:
             goal, now = handle.goal, self.clock.now()
             if session:
                 goal.server = session
-            path = goal.on_result(status, text, result, now)
+            if unreadable:
+                path = goal.lose(unreadable)
+            else:
+                path = goal.on_result(status, entry.text, result, now)
             if path:
                 self._finish(handle, path)
 

@@ -197,7 +197,7 @@ class ClientGoal:
         """Handle the result with its final status; return the states passed."""
         if self.over:
             return ()
-        # LOST also stands for a number that is not a status, and for a malformed result.
+        # LOST also stands for a number that is not a status.
         if status not in TERMINAL:
             return self.lose(f"the server sent a result with status {status.name}: {text}")
         path = self.on_status(status, text, now)

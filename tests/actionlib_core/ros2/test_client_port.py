@@ -113,6 +113,17 @@ def test_other_ends(world, code, status):
     assert handle.get_goal_status() == status
 
 
+def test_result_that_is_cut_short_is_lost_with_its_reason(world):
+    server, client = world.server(), world.client()
+    handle, uuid, _ = begin(server, client)
+    for question in server.asked.pop(uuid):
+        server.reply(question, b"\0\1\0\0\4\0")  # "succeeded", and then nothing
+    assert handle.wait(5.0)
+    assert handle.get_goal_status() == Status.LOST
+    text = handle.get_goal_status_text()
+    assert text.startswith("the server sent a result that cannot be read: test_msgs/action/Fibonac")
+
+
 def test_feedback_before_the_acceptance_and_result_before_the_last_state(world):
     server, client = world.server(), world.client()
     seen, states, kept = [], [], []
