@@ -509,6 +509,12 @@ class SimpleActionServer:
             self._keeper.give_up(handle, f"Exception in execute callback: {text}")
             raise
         if handle.record.status not in TERMINAL:
+            if text is TEXT_NO_STATUS:  # not every wire takes the text to the client
+                log.error(
+                    "action '%s': the execute callback has returned without a terminal state; the "
+                    "goal is aborted. Try set_succeeded(), set_aborted() or set_preempted() in it.",
+                    self._name,
+                )
             self._keeper.give_up(handle, text)
 
     def _execute(self, handle: ServerGoalHandle) -> None:
