@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import DeserializationError, FieldError
@@ -99,7 +100,14 @@ class RosEndPort:
             self.own = self._convert(self._end.token)
         end, to_ros2 = self._end, self._message.to_ros2
         port = self._network.transport.publisher(end.key, "", quality)
-        return Sender(lambda it: port.put(to_ros2(it).to_cdr(), end.attachment()), port.close)
+        lock = threading.Lock()
+
+        def put(message: Any) -> None:
+            payload = to_ros2(message).to_cdr()
+            with lock:  # a gap in the numbers, or one too late, is a lost message for a subscriber
+                port.put(payload, end.attachment())
+
+        return Sender(put, port.close)
 
     def receive(self, callback: Callable[[Sample], None]) -> Closable:
         # Asks for kept messages in any case: whether a publisher latches is its own choice.

@@ -8,6 +8,7 @@ import threading
 import pytest
 import zenoh
 
+from actionlib_core.clock import RealClock
 from actionlib_core.config import Config, Ros2
 from actionlib_core.exceptions import (
     ConfigError,
@@ -26,8 +27,9 @@ from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
+from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.attachment import unpack_attachment
-from actionlib_core.wire.ros2.graph import RosNode, RosType
+from actionlib_core.wire.ros2.graph import End, RosNode, RosType
 from actionlib_core.wire.ros2.names import DEFAULT, LATCHED, Kind, data_key
 from tests.transports import TRANSPORTS, opened
 
@@ -125,6 +127,31 @@ def test_message_on_the_wire_is_what_a_ros_2_node_expects(world):
     numbers = [unpack_attachment(sample.attachment) for sample in (first, second)]
     assert [number.sequence for number in numbers] == [1, 2]
     assert numbers[0].gid == numbers[1].gid
+
+
+def test_messages_of_several_threads_are_sent_in_the_order_of_their_numbers(monkeypatch):
+    clock = RealClock()
+    network = MemoryNetwork(clock)
+    seen = Inbox(clock)
+    key = data_key(0, "chatter", "std_msgs/msg/String", String._rihs01)
+    network.session().subscribe(key, seen)
+    with Node("talker", transport=network.session(), clock=clock) as node:
+        publisher = Publisher("chatter", String, node=node)
+        other = threading.Thread(target=publisher.publish, args=("second",))
+        take = End.attachment
+
+        def slowly(end):
+            taken = take(end)
+            if other.ident is None:
+                other.start()
+                other.join(0.2)  # it would send its message now, if it did not have to wait
+            return taken
+
+        monkeypatch.setattr(End, "attachment", slowly)
+        publisher.publish("first")
+        other.join(WAIT_S)
+        samples = seen.wait_for(2)
+    assert [unpack_attachment(sample.attachment).sequence for sample in samples] == [1, 2]
 
 
 @pytest.mark.zenoh
