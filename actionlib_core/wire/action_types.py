@@ -43,9 +43,14 @@ class ActionTypes:
             parts = example.action_goal, example.action_result, example.action_feedback
             inner = parts[0].goal, parts[1].result, parts[2].feedback
         except (AttributeError, TypeError) as error:
+            if getattr(spec, "_wire", "") == "ros2":
+                known = "nav2_msgs.action.NavigateToPose"
+                way_out = "Try a class of the package's module 'action', without '_Goal' behind it."
+            else:
+                known = "move_base_msgs.msg.MoveBaseAction"
+                way_out = "Try the name that ends with 'Action'."
             raise ActionException(
                 f"ActionSpec: got {spec!r}; expected an action class such as "
-                "actionlib_core.interfaces.move_base_msgs.msg.MoveBaseAction. Try the name that "
-                "ends with 'Action'."
+                f"actionlib_core.interfaces.{known}. {way_out}"
             ) from error
         return cls(spec, *(type(part) for part in parts), *(type(part) for part in inner))

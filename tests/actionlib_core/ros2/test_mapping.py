@@ -9,7 +9,8 @@ import pytest
 from actionlib_core import interfaces
 from actionlib_core.clock import RealClock
 from actionlib_core.config import Config, Mapped, Ros2, load_config
-from actionlib_core.exceptions import ConfigError
+from actionlib_core.exceptions import ActionException, ConfigError
+from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces.control_msgs.msg import GripperCommandAction
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
@@ -222,3 +223,9 @@ def test_topics_and_services() -> None:
     own = interfaces.define_message("mapping_pkg/Old", "time at\n")
     with pytest.raises(ConfigError, match="mapping_pkg"):
         message_on_ros2(Ros2(), "old", own)
+
+
+@pytest.mark.parametrize("wrong", [NavigateToPose.Goal, ros2.get_message("std_msgs/String")])
+def test_what_is_no_action_of_ros_2_is_told_where_those_are(wrong) -> None:
+    with pytest.raises(ActionException, match=r"nav2_msgs\.action\.NavigateToPose\. .*'action'"):
+        ActionTypes.of(wrong)
