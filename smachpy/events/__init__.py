@@ -416,7 +416,8 @@ callback. test: the test kit. program: anything else; `by` is the thread, or the
 NUMBERS = frozenset({"seq", "dropped"})
 """Fields that a buffer adds to a record: its number, and how many events are missing before it."""
 
-_BY_NAME = {kind.__name__: kind for kind in EVENT_TYPES}
+EVENT_KINDS = {kind.__name__: kind for kind in EVENT_TYPES}
+"""`kind` of a record -> its class."""
 
 
 def asker_text(source: str, by: str, why: str) -> str:
@@ -458,14 +459,25 @@ def to_record(event: Event) -> dict[str, Any]:
 
     Messages become `{"$msg": type, "fields": {...}}`. Other values that JSON does not have are
     replaced by their `repr`, and values that are too long for display are cut, or replaced by their
-    size.
+    size. Names are never cut.
     """
     # One `Room` for the whole record: many values of medium size are cut as one large value is.
     record: dict[str, Any] = {"kind": type(event).__name__}
     room = Room()
     for key, value in event._asdict().items():
-        record[key] = _plain(value, room)
+        record[key] = _listed(value) if key in _NAMES else _plain(value, room)
     return record
+
+
+_NAMES = frozenset(
+    {"path", "initial", "outcome", "label", "key", "action", "goal_id", "outages", "active"}
+    | {"transition", "transitions", "marking"}
+)
+"""Fields that say what an event is about: if they were cut, they would name something else."""
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(item) for item in value] if isinstance(value, tuple) else value
 
 
 def record_text(record: dict[str, Any]) -> str:
@@ -494,9 +506,11 @@ def from_record(record: dict[str, Any]) -> Event:
     """
     fields = {key: v for key, v in record.items() if key not in NUMBERS}
     name = fields.pop("kind", None)
-    kind = _BY_NAME.get(name) if isinstance(name, str) else None
+    kind = EVENT_KINDS.get(name) if isinstance(name, str) else None
     if kind is None:
-        raise ValueError(f"event record: kind: got {name!r}; expected one of {sorted(_BY_NAME)}.")
+        raise ValueError(
+            f"event record: kind: got {name!r}; expected one of {sorted(EVENT_KINDS)}."
+        )
     # JSON has lists where events have tuples.
     fields = {key: tuple(v) if isinstance(v, list) else v for key, v in fields.items()}
     try:

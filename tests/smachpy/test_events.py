@@ -240,6 +240,16 @@ def test_a_record_is_short_whatever_the_value(value):
     assert len(json.dumps(written(value))) < 400_000
 
 
+def test_names_are_whole_however_long():
+    path = "/P" + "/A_LABEL_OF_THIRTY_CHARACTERS__" * 200
+    active = tuple((f"{path}/{number}", number) for number in range(1_500))
+    record = to_record(events.Recovered(path, 0.0, 0, "m", 0, active=active))
+    assert record["path"] == path
+    assert record["active"] == [list(pair) for pair in active]
+    marking = ("p",) * 1_500
+    assert to_record(events.Fired(path, 0.0, 0, "t", marking))["marking"] == list(marking)
+
+
 class Cell:
     """Counts how often it is looked at."""
 
