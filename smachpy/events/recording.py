@@ -18,16 +18,18 @@ import heapq
 import json
 from collections import deque
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import NoneType
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces import get_message
 from actionlib_core.interfaces._sources import BUNDLED
 from smachpy import log
-from smachpy.events import record_text
+from smachpy.events import EVENT_KINDS, record_text
 from smachpy.exceptions import SmachError
 from smachpy.introspection import StateRecord, describe
 
@@ -52,12 +54,8 @@ than the writer. Further ones are thinned out and counted."""
 CLOSE_S = 2.0  # time to write what waits [s]; a disk that hangs must not hang the program's end
 
 _FIELDS = {"kind": str, "path": str, "stamp_ns": int}
-_TEXTS = frozenset(
-    {"action", "by", "container", "error", "goal_id", "key", "label", "outcome", "source"}
-    | {"status", "text", "why", "writer"}
-)
-"""Fields of events that are texts, or null."""
 _STAMPS = 2**63  # [ns] from 1970 on
+_SECONDS = 2.0**33  # longest time on a mission's clock; `_STAMPS` in seconds
 _MALFORMED = (
     ValueError,
     LookupError,
@@ -394,7 +392,7 @@ def run_of(path: Path) -> str:
 
 
 def _check_stamp(stamp_ns: int) -> int:
-    if abs(stamp_ns) >= _STAMPS:
+    if not 0 <= stamp_ns < _STAMPS:
         raise ValueError(f"stamp_ns: {stamp_ns!r:.60}")
     return stamp_ns
 
@@ -407,11 +405,8 @@ def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
             if type(event[name]) is not kind:
                 raise ValueError(f"{name}: {event[name]!r}")
         _check_stamp(event["stamp_ns"])
-        for name in _TEXTS & event.keys():
-            if not isinstance(event[name], str | None):
-                raise TypeError(f"{name}: {event[name]!r}")
-        if event["kind"] == "Recovered":
-            _check_recovered(event)
+        if event["kind"] in EVENT_KINDS:  # others are data of topics, or of a newer version
+            event = _completed(event)
         dropped = event.get("dropped", 0)
         if type(dropped) is not int or dropped < 0:
             raise ValueError(f"dropped: {dropped!r}")
@@ -420,6 +415,48 @@ def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
             path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
         ) from error
     return event
+
+
+def _completed(event: dict[str, Any]) -> dict[str, Any]:
+    """Check the fields of an event's kind; add the default of those that older files lack."""
+    event = {**EVENT_KINDS[event["kind"]]._field_defaults, **event}
+    for name, types in _field_types(event["kind"]).items():
+        value = event[name]
+        _check_type(name, value, types)
+        if types is _LIST_OF_TEXTS:
+            for item in value:
+                _check_type(name, item, (str,))
+    if not abs(event["t"]) < _SECONDS:
+        raise ValueError(f"t: {event['t']!r}")
+    if event["kind"] == "Recovered":
+        _check_recovered(event)
+    return event
+
+
+_LIST_OF_TEXTS = (list, tuple, str)
+_JSON_TYPES: dict[Any, tuple[type, ...]] = {
+    str: (str,),
+    str | None: (str, NoneType),
+    int: (int,),
+    bool: (bool,),
+    # `to_record` writes infinities and lists that are too long as texts.
+    float: (float, int, str),
+    float | None: (float, int, str, NoneType),
+    tuple[str, ...]: _LIST_OF_TEXTS,
+}
+"""Annotation of an event's field -> its types in a file; other fields take any value."""
+
+
+@cache
+def _field_types(kind: str) -> dict[str, tuple[type, ...]]:
+    hints = get_type_hints(EVENT_KINDS[kind])
+    types = {name: _JSON_TYPES.get(hint, ()) for name, hint in hints.items()}
+    return {**types, "t": (float, int)}
+
+
+def _check_type(name: str, value: Any, types: tuple[type, ...]) -> None:
+    if types and type(value) not in types:
+        raise TypeError(f"{name}: {value!r:.60}")
 
 
 def _check_recovered(event: dict[str, Any]) -> None:

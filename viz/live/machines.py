@@ -221,7 +221,8 @@ class Machine:
                 continue
             self._observed_seq = record["n"]
             entry = record["n"], record, record_text(record)
-            if record["what"] == "map":
+            # Data of other shapes is passed on: who uses it leaves it out.
+            if record.get("what") == "map" and isinstance(record.get("robot"), str):
                 self._maps[record["robot"]] = entry
             self._observed.append(entry)
             while len(self._observed) > KEPT_OBSERVED and not self.recorded:

@@ -10,7 +10,7 @@ import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from smachpy.events import EVENT_TYPES, Event, Finished, Recovered, Started
+from smachpy.events import EVENT_KINDS, EVENT_TYPES, Event
 from smachpy.events.run_state import RunState
 from viz.model.machine import Marks
 
@@ -74,17 +74,22 @@ class History:
 
     def on_event(self, event: Event) -> None:
         """Process one event."""
-        if type(event) not in _EVENT_TYPES:
+        if type(event) in _EVENT_TYPES:
+            fields = dict(zip(event._fields, event, strict=True))
+            self.on_record({**fields, "kind": type(event).__name__})
+
+    def on_record(self, record: dict[str, Any]) -> None:
+        """Process one record of a recording; kinds of a newer version are ignored."""
+        if record["kind"] not in EVENT_KINDS:
             return
-        record: dict[str, Any] = dict(zip(event._fields, event, strict=True))
         # The machine's clock instead of the event's date: a computer whose date is set changes no
         # duration. After a recovery, what the earlier process did is not on this clock: a Recovered
         # event counts as a start.
-        kind = Started if type(event) is Recovered else type(event)
-        record["kind"], record["stamp_ns"] = kind.__name__, round(event.t * 1e9)
+        kind = "Started" if record["kind"] == "Recovered" else record["kind"]
+        record = {**record, "kind": kind, "stamp_ns": round(record["t"] * 1e9)}
         with self._lock:
             self._state.fold(record)
-            if type(event) is Finished and self._state.data["started"] is not None:
+            if kind == "Finished" and self._state.data["started"] is not None:
                 self._seconds = (record["stamp_ns"] - self._state.data["started"]) / 1e9
 
     def marks(self) -> Marks:

@@ -375,14 +375,13 @@ def _write(recording: Recording, output: Path, runs: list[str], floor: Path | No
 
         write_mcap(recording, output)
     else:
-        from smachpy.events import from_record
         from viz.model.history import History
         from viz.pictures.drawing import render
 
         # The picture of the machine with what the run did, as `viz.render(..., run=history)`.
         history = History()
         for event in recording.events:
-            history.on_event(from_record(event))
+            history.on_record(event)
         render(recording.record, output, run=history)
 
 

@@ -22,6 +22,7 @@ import heapq
 import json
 import zlib
 from collections import Counter
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -36,6 +37,7 @@ from smachpy import log
 from smachpy.events import was_cut
 from smachpy.events.recording import OBSERVED
 from smachpy.events.run_state import RunState
+from smachpy.introspection import StateRecord
 from smachpy.userdata.json_text import dumps
 from viz.runs.scene import Scene
 
@@ -44,7 +46,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from smachpy.events.recording import Recording
-    from smachpy.introspection import StateRecord
 
 GOAL_PARTS = {"GoalSent": "goal", "GoalFeedback": "feedback", "GoalDone": "result"}
 """The part of an action that each kind of event carries."""
@@ -77,6 +78,9 @@ def write_mcap(recording: Recording, path: Path) -> None:
 
 class _Export:
     def __init__(self, recording: Recording, writer: Any) -> None:
+        machine = StateRecord.from_json(json.dumps(_encodable(asdict(recording.record))))
+        base, definitions = _encodable(recording.base), _encodable(recording.definitions)
+        recording = replace(recording, record=machine, base=base, definitions=definitions)
         self._recording = recording
         self._writer = writer
         self._channels: dict[tuple[str, str], int] = {}
@@ -103,7 +107,7 @@ class _Export:
         recording = self._recording
         # Both are in order of time, and so are the merged messages.
         records = heapq.merge(recording.events, recording.observed, key=itemgetter("stamp_ns"))
-        for event in records:
+        for event in map(_encodable, records):
             stamp = event["stamp_ns"]
             if event["kind"] == OBSERVED:
                 self._write_observed(event)
@@ -166,7 +170,7 @@ class _Export:
                 wrapper = _action_type(content["$msg"], part)
                 inside = get_message(content["$msg"]).from_dict(_restored(content, "", size))
                 self._write(f"{action}/{part}", wrapper(header, **more, **{part: inside}), stamp)
-            except (ActionlibError, TypeError, ValueError) as error:
+            except (*_MALFORMED, ActionlibError) as error:
                 self.left_out[f"{action}/{part}", str(error).partition("\n")[0]] += 1
         elif content is not None:
             self.left_out[f"{action}/{part}", "it was recorded as text"] += 1
@@ -197,6 +201,11 @@ class _Export:
             local_data=dumps(userdata),
             info=event["kind"],
         )
+
+
+def _encodable(value: Any) -> Any:
+    """Return JSON data with "?" for lone UTF-16 surrogates, which no file in UTF-8 can contain."""
+    return json.loads(json.dumps(value, ensure_ascii=False).encode("utf-8", "replace"))
 
 
 def define_types(definitions: Mapping[str, str]) -> None:

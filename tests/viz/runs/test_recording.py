@@ -137,6 +137,7 @@ def test_a_broken_line_in_the_middle_is_named(record):
         *[("stamp_ns", value) for value in ("5", None, 1.5)],
         ("kind", 3),
         ("path", ["/A"]),
+        *[("t", value) for value in ("5", None, 1e300, [])],
     ],
 )
 def test_a_field_that_is_none_is_named_with_its_line(record, name, value):
@@ -146,6 +147,57 @@ def test_a_field_that_is_none_is_named_with_its_line(record, name, value):
     path.write_text("".join(lines))
     with pytest.raises(RecordingError, match=rf"line 3: .*\({name}: .*expected an event"):
         read_recording(path)
+
+
+def with_line(path, **fields):
+    """The recording with another line before its last one."""
+    *lines, last = path.read_text().splitlines(keepends=True)
+    event = {"path": "/JOB/FIRST", "t": 0.0, "stamp_ns": json.loads(last)["stamp_ns"], **fields}
+    path.write_text("".join([*lines, json.dumps(event) + "\n", last]))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("fields", "word"),
+    [
+        ({"kind": "Left"}, "outcome"),
+        ({"kind": "Left", "outcome": None}, "outcome"),
+        ({"kind": "Retried", "attempt": "2", "reason": ""}, "attempt"),
+        ({"kind": "Fired", "transition": "a", "marking": ["a", 1]}, "marking"),
+        ({"kind": "UserdataWritten", "key": "a"}, "value"),
+        ({"kind": "GoalFeedback", "action": "a", "goal_id": "1"}, "feedback"),
+    ],
+)
+def test_an_event_without_what_its_kind_needs_is_named(record, fields, word):
+    path = with_line(record("run.jsonl"), **fields)
+    with pytest.raises(RecordingError, match=rf"line 8: .*{word}.*expected an event"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("fields", [{}, {"what": "map"}, {"what": "map", "robot": {}}])
+def test_data_of_topics_in_another_shape_stays_in_the_run(record, fields):
+    path = with_line(record("run.jsonl"), kind="Observed", **fields)
+    machine = Machines().obtain("run")
+    machine.load(read_recording(path))
+    assert len(machine.observed_since(0)) == 1
+
+
+def test_fields_that_older_recordings_lack_have_their_defaults(record):
+    path = with_line(
+        record("run.jsonl"), kind="GoalDone", action="a", goal_id="1", status="LOST", text=""
+    )
+    assert read_recording(path).events[-2]["result"] is None
+
+
+@pytest.mark.parametrize("fields", [{"kind": "Sparkled"}, {"kind": "Entered", "shade": "blue"}])
+def test_what_a_newer_version_records_is_skipped(record, fields):
+    """Format: the `version` in the header changes when an older reader would be wrong."""
+    from smachpy.command import main
+
+    path = with_line(record("run.jsonl"), **fields)
+    picture = path.with_suffix(".txt")
+    assert main(["runs", "export", str(path), "-o", str(picture)]) == 0
+    assert "FIRST" in picture.read_text()
 
 
 def test_a_disk_that_fails_ends_the_recording_and_not_the_run(tmp_path, clock):
@@ -472,6 +524,20 @@ def test_mcap_has_what_json_has_no_word_for_and_names_what_is_left_out(record, t
     )
     assert "too long to be recorded: <bytes of 5000" in caplog.text
     assert "it was recorded as text" in caplog.text
+
+
+def test_mcap_of_names_that_no_file_in_utf8_can_contain(record, tmp_path):
+    path = record("run.jsonl")
+    path.write_text(path.read_text().replace("FIRST", "F\\ud800").replace("count", "c\\udfff"))
+    messages = exported(read_recording(path), tmp_path / "run.mcap")
+    assert "/JOB/userdata/c?" in {topic for topic, _, _ in messages}
+
+
+def test_mcap_of_a_goal_without_fields_is_counted(record, tmp_path, caplog):
+    goal = {"$msg": "move_base_msgs/MoveBaseGoal"}
+    path = with_line(record("run.jsonl"), kind="GoalSent", action="a", goal_id="1", goal=goal)
+    exported(read_recording(path), tmp_path / "run.mcap")
+    assert "1 message(s) of /a/goal are left out" in caplog.text
 
 
 def test_mcap_leaves_out_what_was_cut(record, tmp_path, caplog):
