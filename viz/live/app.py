@@ -43,6 +43,7 @@ from typing import TYPE_CHECKING, Any
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
@@ -597,16 +598,16 @@ class _Page:
 
 
 async def _read_command(request: Request) -> dict[str, Any] | None:
-    """The JSON object in a request; None if it is too long or something else."""
+    """The JSON object in a request; None if it is too long, cut off or something else."""
     # Read in parts, so that a long body is refused before it fills the memory.
     body = b""
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > LONGEST_COMMAND:
-            return None
     try:
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > LONGEST_COMMAND:
+                return None
         command = json.loads(body)
-    except ValueError:
+    except (ClientDisconnect, ValueError, RecursionError):  # RecursionError: thousands of "["
         return None
     return command if isinstance(command, dict) else None
 

@@ -34,7 +34,7 @@ MOST_VARIED: Final = 8
 STOP_S: Final = 5.0
 """Time after an interrupt until a batch is killed [s]."""
 
-_ID = re.compile(r"[\w.-]{1,120}", re.ASCII)
+_ID = re.compile(r"[\w-][\w.-]{0,119}", re.ASCII)
 _LIMIT = re.compile(r"\d{1,9}(\.\d{1,3})?[smh]?", re.ASCII)
 _FACTS = "batch.json"
 _ERRORS = "errors.txt"
@@ -180,7 +180,7 @@ class Simulations:
             SimulationError: there is no such batch, or it has no report.
         """
         path = self._folder / name / _REPORT
-        # The pattern has no "/": a name cannot lead out of the folder.
+        # The pattern has no "/" and no "..": a name cannot lead out of the folder.
         if not _ID.fullmatch(name) or not path.is_file():
             raise SimulationError(f"batch: got {name!r}; expected one that has a report.")
         return path.read_bytes()
@@ -252,7 +252,8 @@ class Simulations:
     def _words(self, batch: Batch, folder: Path) -> list[str]:
         words = ["simulate", batch.mission, "--runs", str(batch.runs), "--seed", str(batch.seed)]
         words += ["--limit", batch.limit, "--record", str(folder / "runs"), "--json"]
-        words += [word for one in batch.vary for word in ("--vary", one)]
+        # With "=", a text that begins with a dash cannot be taken for an option.
+        words += [f"--vary={one}" for one in batch.vary]
         words += ["--compare", str(self._folder / batch.compare / "runs")] if batch.compare else []
         return [*words, "-o", str(folder / _REPORT)]
 

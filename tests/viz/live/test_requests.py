@@ -10,6 +10,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 import segno
@@ -38,6 +39,41 @@ def test_the_id_of_an_event_is_taken(served, last):
     address = served.start() + f"api/events?last={urllib.parse.quote(last)}"
     with urllib.request.urlopen(address, timeout=10) as answer:
         assert answer.status == 200
+
+
+PLACES = ["api/control?machine=one", "api/action", "api/simulate", "api/mission"]
+
+
+def commanded(served, body):
+    """A command of the page with this body, to each place in turn, as (place, request)."""
+    served.add("one")
+    actions, simulations = SimpleNamespace(listen=lambda _: None, revision=0), SimpleNamespace()
+    base = served.start(token="t", actions=actions, simulations=simulations)
+    headers = {"origin": base.rstrip("/"), "x-smachpy-token": "t"}
+    return [urllib.request.Request(base + place, body, headers) for place in PLACES]
+
+
+@pytest.mark.parametrize("body", [b"[" * 100_000, b'{"command":' * 50_000, b"\xff", b"[1]", b""])
+def test_a_body_that_is_no_command_is_refused(served, body):
+    for request in commanded(served, body):
+        with pytest.raises(urllib.error.HTTPError) as caught:
+            urllib.request.urlopen(request, timeout=10)
+        with caught.value:
+            assert caught.value.code == 400
+
+
+def test_a_page_that_goes_while_it_sends_a_command_leaves_no_traceback(served, capfd):
+    for request in commanded(served, b"{}"):
+        head = "".join(f"{name}: {value}\r\n" for name, value in request.header_items())
+        first = f"POST {request.selector} HTTP/1.1\r\nhost: {request.host}\r\n{head}"
+        with socket.create_connection(request.host.split(":"), 10) as link:
+            link.sendall(f"{first}content-length: 50\r\n\r\n{{".encode())
+            link.shutdown(socket.SHUT_WR)
+            link.settimeout(10)
+            while link.recv(1000):
+                pass
+    served.end()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])

@@ -88,12 +88,24 @@ def test_what_makes_no_sense_is_refused_and_nothing_begins(simulations, job, wro
     assert simulations.rows() == []
 
 
+def test_a_name_cannot_lead_out_of_the_folder(simulations, tmp_path, job):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "report.html").touch()
+    (tmp_path / "simulated").mkdir()
+    for name in (".", "..", ".hidden", "", "a/b"):
+        with pytest.raises(SimulationError):
+            simulations.report(name)
+    with pytest.raises(SimulationError, match="compare"):
+        simulations.start({"mission": job, "runs": 1, "compare": ".."})
+
+
 @pytest.mark.slow
-def test_a_batch_that_cannot_run_says_why(simulations, job):
+@pytest.mark.parametrize("key", ["nobody", "--output"])
+def test_a_batch_that_cannot_run_says_why(simulations, job, key):
     found = ended(
-        simulations, simulations.start({"mission": job, "runs": 1, "vary": ["nobody=1..2"]})
+        simulations, simulations.start({"mission": job, "runs": 1, "vary": [f"{key}=1..2"]})
     )
-    assert "nobody" in found["problem"]
+    assert f"{key}: mission" in found["problem"]
     assert not found["report"]
     with pytest.raises(SimulationError):
         simulations.report(found["id"])
