@@ -178,10 +178,33 @@ def test_page(page, tmp_path, monkeypatch, groups):
             run_console(page, block, tmp_path, groups)
 
 
-def test_every_link_between_pages_leads_somewhere():
+def links_of(page: Path) -> set[str]:
+    """Return the page's links to other files and to headings."""
+    return set(
+        re.findall(r"\]\((?!https?:|mailto:)([^)\s]+)\)", FENCE.sub("", page.read_text("utf-8")))
+    )
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Return the anchors of the page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", FENCE.sub("", page.read_text("utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize(
+    "page", [*PAGES, ROOT / "missions" / "README.md"], ids=lambda page: str(page.relative_to(ROOT))
+)
+def test_every_link_leads_to_a_file_and_a_heading(page):
     broken = []
-    for page in PAGES:
-        for target in re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text("utf-8")):
-            if not (page.parent / target).exists():
-                broken.append(f"{page.relative_to(ROOT)} -> {target}")
+    for link in links_of(page):
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        if not target.exists() or (anchor and anchor not in anchors_of(target)):
+            broken.append(link)
     assert not broken
+
+
+def test_the_index_leads_to_every_page():
+    index = ROOT / "docs" / "README.md"
+    linked = {(index.parent / link).resolve() for link in links_of(index)}
+    assert set((ROOT / "docs").rglob("*.md")) - {index} <= linked
