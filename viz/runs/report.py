@@ -159,10 +159,11 @@ def by_quarter(
         return list(ends.items())
     size = -(-len(numbers) // 4)  # rounded up: at most four parts
     quarters = [numbers[i : i + size] for i in range(0, len(numbers), size or 1)]
-    return [
-        (f"{part[0][0]:.3g} to {part[-1][0]:.3g}", Counter(end for _, end in part))
-        for part in quarters
-    ]
+    return [(_span(part[0][0], part[-1][0]), Counter(end for _, end in part)) for part in quarters]
+
+
+def _span(low: float, high: float) -> str:
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
 
 
 def _states(runs: Runs) -> str:

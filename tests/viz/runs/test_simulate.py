@@ -85,6 +85,9 @@ def test_runs_vary_over_the_whole_range_and_end_differently(job, tmp_path, capsy
     assert [dict(ends) for _, ends in quarters] == [
         {"succeeded": 2}, {"succeeded": 2}, {"aborted": 2}, {"aborted": 2},
     ]  # fmt: skip
+    assert [" to " in words for words, _ in quarters] == [True] * 4
+    few = dict(list({str(r.task.file): r.task.values for r in results}.items())[:4])
+    assert not any(" to " in words for words, _ in by_quarter(runs, few, "seconds"))
     assert capsys.readouterr().out == ""
 
 
