@@ -182,7 +182,7 @@ def journalled(
     patience = min(8.0, options.lease_s / 2)
     with contextlib.closing(open_store(options.journal, patience=patience)) as store:
         row = find_or_create(store, machine, options)
-        verb = "begins" if row.status == "queued" else "goes on"
+        verb = "begins" if row.status == "queued" else "is resumed"
         migrate: Any = options.migrate or info.migrations
         with kept_mission(
             machine,

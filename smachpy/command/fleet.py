@@ -242,7 +242,7 @@ class Runner:
         command = [sys.executable, "-P", "-m", "smachpy.command", "run", row.target, "--plain"]
         command += ["--durable", self._journal, "--mission", row.id, f"--lease={self._lease_s}"]
         command += ["--robot", row.robot] if row.robot else []
-        verb = "begins" if row.status == "queued" else "goes on"
+        verb = "begins" if row.status == "queued" else "is resumed"
         print(printable(f"mission {row.id}: {verb}"), flush=True)
         process = subprocess.Popen(  # noqa: S603  our own command
             [*command, *row.argv],

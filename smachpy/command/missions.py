@@ -40,8 +40,8 @@ def register(subparsers: Any) -> None:
     for name, run, text in (
         ("list", _list, "all missions and where they stand"),
         ("show", _show, "one mission: its active states, values, goals and outages"),
-        ("resume", _resume, "go on with a mission, however old its journal is"),
-        ("cancel", _cancel, "preempt a mission, now or when it goes on"),
+        ("resume", _resume, "resume a mission, however old its journal is"),
+        ("cancel", _cancel, "preempt a mission, now or when it is resumed"),
         ("forget", _forget, "delete a mission with its journal"),
     ):
         command = commands.add_parser(name, help=text, description=text)
@@ -198,7 +198,7 @@ def _cancel(args: argparse.Namespace) -> int:
     with _open(args) as store:
         store.request_cancel(args.mission)
         row = store.mission(args.mission)
-    how = "now" if row.status == "running" else "when it goes on"
+    how = "now" if row.status == "running" else "when it is resumed"
     told = "" if row.status == "cancelled" else f"will be preempted {how}; status: "
     print(f"mission {row.id}: {told}{row.status}")
     return 0

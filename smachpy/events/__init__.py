@@ -434,7 +434,7 @@ def answered_text(answer: str, by: str) -> str:
 def recovered_text(outages: Sequence[Sequence[int]]) -> str:
     """Return, as one phrase for people, that a run was resumed after the last of its outages."""
     seconds = (outages[-1][1] - outages[-1][0]) / 1e9 if outages else 0.0
-    return f"goes on after an outage of {span_text(seconds)}"
+    return f"resumed after an outage of {span_text(seconds)}"
 
 
 def outages_text(outages: Sequence[Sequence[int]]) -> str:

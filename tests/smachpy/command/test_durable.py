@@ -86,7 +86,7 @@ def test_it_goes_on_where_it_was(capsys: pytest.CaptureFixture[str]) -> None:
     mission = row["id"]
     Path("go").touch()
     assert run() == 0
-    assert f"mission {mission} goes on" in capsys.readouterr().err
+    assert f"mission {mission} is resumed" in capsys.readouterr().err
     assert Path("loaded").read_text() == "x"
     [row] = listed(capsys)
     assert (row["status"], row["outcome"], row["active"]) == ("ended", "done", [])

@@ -153,7 +153,7 @@ def test_what_a_dead_computer_ran_goes_on_at_another(errand, tmp_path, store_pla
         output, _ = other.communicate(timeout=WITHIN_S)
     finally:
         end(other)
-    assert "goes on" in output
+    assert "is resumed" in output
     assert statuses(store_place) == {"a": ("ended", "done")}
     assert [line[0] for line in log_of(errand)] == ["first", "wait", "wait", "end"]
 
