@@ -21,14 +21,19 @@ TURN_TIMEOUT: Final = 60.0  # [s]
 
 
 def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
-    """Return the `move_base` goal that drives to a pose in the frame "map" or "base_link"."""
+    """Return the `move_base` goal that drives to a pose.
+
+    Args:
+        pose: The pose [m, m, rad].
+        frame: Its frame, which the robot must know. In "base_link" x is ahead of the robot.
+    """
     heading = Quaternion(*quaternion_of(pose.yaw))
     there = Pose(position=Point(pose.x, pose.y, 0.0), orientation=heading)
     return MoveBaseGoal(target_pose=PoseStamped(header=Header(frame_id=frame), pose=there))
 
 
 def pose_of(message: Pose) -> Pose2D:
-    """Return position and heading of a pose message."""
+    """Return position and heading [m, m, rad] of a pose message, in the message's frame."""
     turned = message.orientation
     yaw = yaw_of(turned.x, turned.y, turned.z, turned.w)
     return Pose2D(message.position.x, message.position.y, yaw)
@@ -40,8 +45,8 @@ def drive_to(
     """Return a state that drives to a place. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     Args:
-        place: A pose in the map frame; or the userdata key of a pose: a `Pose2D`, a message, or an
-            object with the attribute `pose`, such as a `Waypoint` or `PoseStamped`.
+        place: A pose [m, m, rad] in the map frame; or the userdata key of one: a `Pose2D`, a
+            `Waypoint`, a `Pose`, or a `PoseStamped`, whose header names another frame.
         action: Name of the action.
         **options: Those of `SimpleActionState`; the default of `exec_timeout` is 600 s.
     """
@@ -52,19 +57,30 @@ def drive_to(
     def goal(userdata: UserData, _default: MoveBaseGoal) -> MoveBaseGoal:
         value = userdata[place]
         pose = getattr(value, "pose", value)
-        return goal_at(pose if isinstance(pose, Pose2D) else pose_of(pose))
+        header = getattr(value, "header", None)
+        frame = "map" if header is None else header.frame_id or "map"
+        return goal_at(pose if isinstance(pose, Pose2D) else pose_of(pose), frame)
 
     keys = [*options.pop("input_keys", ()), place]
     return SimpleActionState(action, MoveBaseAction, goal_cb=goal, input_keys=keys, **options)
 
 
 def drive_back(key: str = "home") -> SimpleActionState:
-    """Return a state that drives to the pose in a userdata key, with up to three attempts."""
+    """Return a state that drives to the pose in a userdata key, with up to three attempts.
+
+    The pauses before the second and third attempt are 5 s and 10 s; the rest is as in `drive_to`.
+    """
     return drive_to(key, retry=(3, 5.0, ["aborted"]))
 
 
 def turn(degrees: float, **options: Any) -> SimpleActionState:
-    """Return a state that turns on the spot, anticlockwise, by at most 180 degrees."""
+    """Return a state that turns on the spot. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        degrees: The angle [deg], anticlockwise. The robot turns the shorter way, so use two states
+            for more than 180.
+        **options: Those of `SimpleActionState`; the default of `exec_timeout` is 60 s.
+    """
     options.setdefault("exec_timeout", TURN_TIMEOUT)
     goal = goal_at(Pose2D(0.0, 0.0, math.radians(degrees)), frame="base_link")
     return SimpleActionState("move_base", MoveBaseAction, goal=goal, **options)
@@ -74,6 +90,12 @@ def locate(key: str = "here", topic: str = "odom") -> MonitorState:
     """Return a state that writes the robot's pose to a userdata key.
 
     Outcomes: 'valid', 'invalid', 'preempted', and 'aborted' after 5 s without odometry.
+
+    Args:
+        key: The userdata key that gets the pose, a `Pose2D` [m, m, rad]. It is in the odometry's
+            frame, usually "odom"; `drive_to` takes it for the map frame. With odometry that drifts,
+            name a topic with odometry in the map frame.
+        topic: A topic of `nav_msgs/Odometry`.
     """
 
     def note(userdata: UserData, odometry: Odometry) -> bool:

@@ -75,6 +75,13 @@ def test_it_drives_to_whatever_pose_the_userdata_holds(mission, base, value):
     assert target(base.goals[0]) == PLACE
 
 
+@pytest.mark.parametrize(("stamped", "frame"), [("base_link", "base_link"), ("", "map")])
+def test_it_drives_to_a_stamped_pose_in_its_own_frame(mission, base, stamped, frame):
+    value = goal_at(PLACE, frame=stamped).target_pose
+    mission(alone(drive_to("place"), place=value)).assert_outcome("succeeded")
+    assert base.goals[0].target_pose.header.frame_id == frame
+
+
 def test_a_value_that_is_no_pose_is_an_error_of_the_state(mission, base):
     with pytest.raises(Exception, match="STATE"):
         mission(alone(drive_to("place"), place="the kitchen"))
