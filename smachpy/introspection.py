@@ -54,6 +54,8 @@ Kind: TypeAlias = Literal[
     "iterator",
     "plan",
 ]
+"""The kinds of states: `StateRecord.kind`."""
+
 KINDS: frozenset[str] = frozenset(get_args(Kind))
 
 

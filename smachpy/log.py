@@ -55,8 +55,12 @@ def set_loggers(
 ) -> None:
     """Set the functions for the four kinds of messages; note the order of the arguments.
 
+    Each is called with a text.
+
     Raises:
         InvalidStateError: one of them cannot be called.
+
+    Threads: they are called in the thread that has something to say, also several at once.
     """
     problems = Problems("set_loggers")
     for name, function in (("info", info), ("warn", warn), ("debug", debug), ("error", error)):

@@ -54,10 +54,13 @@ def is_shutdown() -> bool:
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
     """Set the function that returns whether the program is shutting down.
 
-    Machines end 'preempted' when it returns a true value.
+    Machines end 'preempted' when it returns a true value. It is called before each state of a
+    state machine, so it does not interrupt one: `request_preempt` does.
 
     Raises:
         InvalidStateError: `cb` cannot be called.
+
+    Threads: it is called in the threads of the running machines.
     """
     problems = Problems("set_shutdown_check")
     problems.function("cb", cb, "cb()", 0, optional=False)

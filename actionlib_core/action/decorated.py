@@ -53,15 +53,26 @@ class GoalEnd(Exception):  # noqa: N818  an end is not always an error
 
 
 class Abort(GoalEnd):
-    """The goal failed: ABORTED."""
+    """Raised in a `server` function: the goal failed, ABORTED.
+
+    Args:
+        text: The reason, for people.
+        result: The result message (XResult); None sends one with default values.
+    """
 
 
 class Preempted(GoalEnd):
-    """The goal was stopped on request: PREEMPTED."""
+    """Raised in a `server` function: the goal was stopped on request, PREEMPTED.
+
+    The arguments are those of `Abort`.
+    """
 
 
 class Reject(GoalEnd):
-    """The goal is refused: REJECTED, or ABORTED once the context was used."""
+    """Raised in a `server` function: the goal is refused, REJECTED; ABORTED if it was accepted.
+
+    The arguments are those of `Abort`.
+    """
 
 
 class GoalContext(Generic[F]):

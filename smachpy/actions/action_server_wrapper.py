@@ -168,10 +168,12 @@ class ActionServerWrapper:
     # -- start and stop ------------------------------------------------------------------------
 
     def run_server(self) -> None:
-        """Start the server; returns at once.
+        """Start the server; its goals run in another thread.
 
         Raises:
             ServerConflictError: the name has a server already.
+
+        Blocks: until the network has listed the servers of the name, 1 s at most.
         """
         if self.__unsubscribe is None:
             self.__unsubscribe = self.wrapped_container.subscribe(self.__on_event)

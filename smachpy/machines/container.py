@@ -119,7 +119,15 @@ class Container(Openable, Callbacks, State):
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
     ) -> None:
-        """Choose where the next run begins, and update the userdata."""
+        """Choose where the next run begins, and update the userdata.
+
+        Args:
+            initial_states: Labels.
+            userdata: Values to set in the container's userdata; None changes nothing.
+
+        Raises:
+            InvalidStateError: a label is unknown, or not possible here.
+        """
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
@@ -244,9 +252,12 @@ class Container(Openable, Callbacks, State):
             InconsistentMachineError: the machine has structural problems.
             InvalidUserCodeError: a state or callback raised; the cause is chained.
             InvalidTransitionError: a state returned something that is not one of its outcomes.
+            InvalidStateError: the machine is running already.
+            KeyboardInterrupt: in the main thread, at the second Ctrl-C.
 
         Blocks: until the machine has ended; after a preempt, see docs/preemption.md.
-        Threads: one run at a time; from several threads one after another.
+        Threads: any, one run at a time. In the main thread the states run in it; otherwise they run
+            in a helper thread, which can be left behind.
         """
         first: Frame | None = THREAD.get()
         parent = None if first is None else first.innermost

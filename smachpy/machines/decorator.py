@@ -35,9 +35,10 @@ class FunctionState(CBState):
 
 
 class _StateDecorator:
-    """The decorator. Its attributes are those of SMACH's module `smach.state`.
+    """The decorator `@smachpy.state(outcomes, ...)`; see `help(smachpy.state.__call__)`.
 
-    Programs write `smach.state.State`; here the name `state` is the decorator, so both must work.
+    Its attributes are those of SMACH's module `smach.state`: programs write `smach.state.State`;
+    here the name `state` is the decorator, so both must work.
     """
 
     State: ClassVar[type[State]] = State
@@ -64,6 +65,18 @@ class _StateDecorator:
 
         In the function, `smachpy.current_state()` is the state, for `sleep` and
         `preempt_requested`.
+
+        Args:
+            outcomes: Names of the ways it can end; the function returns one of them.
+            input_keys: Userdata keys that it reads.
+            output_keys: Userdata keys that it writes.
+            io_keys: Keys that it reads and writes.
+            **options: See `StateOptions`.
+
+        Raises:
+            InvalidStateError: a list or an option is wrong, or the function cannot be called so.
+
+        Threads: the function runs in the thread of its container.
         """
 
         def make(function: Callable[..., Any]) -> FunctionState:

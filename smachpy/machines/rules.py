@@ -55,7 +55,11 @@ def any_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
 
 
 def n_of(n: int, conditions: Mapping[str, str | Iterable[str]]) -> Rule:
-    """Return a rule: at least `n` of the children named here must have their outcome."""
+    """Return a rule: at least `n` of the children named here must have their outcome.
+
+    Raises:
+        InvalidStateError: `n` is not between 1 and the number of conditions.
+    """
     made = _conditions(conditions)
     if as_number(n) is None or not 1 <= n <= len(made) or int(n) != n:
         raise InvalidStateError(

@@ -528,6 +528,6 @@ def clock_of_run() -> Clock:
 
 
 def current_state() -> Child | None:
-    """Return the state that runs in this context."""
+    """Return the state that runs in this thread or task; None outside of any state."""
     frame = current_frame()
     return None if frame is None or frame.step is None else frame.step.state

@@ -193,7 +193,10 @@ def write(content: bytes, file: str | os.PathLike[str]) -> Path:
 
 
 def svg(machine: State | StateRecord) -> str:
-    """Return a machine as SVG text, for a notebook."""
+    """Return a machine as SVG text, for a notebook.
+
+    Raises, Blocks: as `render`.
+    """
     return picture(machine, "svg").decode("utf-8")
 
 
