@@ -89,7 +89,7 @@ class ActionServerWrapper:
         on_client_lost: OnClientLost = "continue",
     ) -> None:
         problems = Problems(f"ActionServerWrapper {server_name!r}")
-        problems.word("server_name", server_name)
+        problems.network_name("server_name", server_name)
         self.wrapped_container = wrapped_container
         self.userdata = UserData()
         self.__server_name = server_name

@@ -72,7 +72,7 @@ class MonitorState(State):
         problems = Problems(f"{type(self).__name__} {topic!r}")
         with problems:
             super().__init__(("valid", "invalid", "preempted"), input_keys, output_keys, **options)
-        self.__topic = problems.word("topic", topic)
+        self.__topic = problems.network_name("topic", topic)
         problems.kind_of("msg_type", msg_type, "_slot_types", "a class of messages")
         self.__msg_type = msg_type
         call = "cond_cb(userdata, message)"

@@ -106,7 +106,7 @@ class ServiceState(State):
         given = ("succeeded", "aborted", "preempted", *problems.names("outcomes", outcomes))
         with problems:
             super().__init__(given, input_keys, output_keys, **options)
-        self.__service_name = problems.word("service_name", service_name)
+        self.__service_name = problems.network_name("service_name", service_name)
         self.__service_spec = service_spec
         self.__request = Outgoing(
             "request",

@@ -161,7 +161,7 @@ class SimpleActionState(State):
         given = (*OUTCOMES, *problems.names("outcomes", outcomes))
         with problems:
             super().__init__(given, input_keys, output_keys, **options)
-        self.__action_name = problems.word("action_name", action_name)
+        self.__action_name = problems.network_name("action_name", action_name)
         self.__types = ActionTypes.of(action_spec)
         self.__goal = Outgoing(
             "goal",

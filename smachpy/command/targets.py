@@ -231,10 +231,26 @@ def _import_file(text: str, path: Path) -> ModuleType:
     except Exception as error:
         sys.modules.pop(name, None)  # it was executed only in part
         why = clash(error, [path.parent]) if isinstance(error, ImportError) else None
+        why = why or _ros1_text(error)
         raise TargetError(text, why or f"running the file raised {raised_text(error)}") from error
     finally:
         sys.path.remove(str(path.parent.resolve()))
     return module
+
+
+def _ros1_text(error: Exception) -> str:
+    """Return what to try if a file needs the modules of ROS 1; "" if that is not the cause."""
+    from smachpy.ros1.hook import OLD_NAMES
+
+    name = (getattr(error, "name", None) or "").partition(".")[0]
+    if not isinstance(error, ModuleNotFoundError) or not (
+        name in OLD_NAMES or importlib.util.find_spec(f"actionlib_core.interfaces.{name}")
+    ):
+        return ""
+    return (
+        f"{name!r} is a module of ROS 1, which is not installed: {trace_of(error).strip()}; "
+        "expected a file without such modules. Try the option --ros1."
+    )
 
 
 def _free_name(stem: str) -> str:

@@ -9,6 +9,8 @@ import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from actionlib_core.exceptions import InvalidNameError
+from actionlib_core.names import check_name
 from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.machines.names import unique_names
 from smachpy.slips import accepts
@@ -92,6 +94,15 @@ class Problems:
         if isinstance(given, str) and given:
             return given
         self.add(f"{argument}: got {given!r}; expected a string, not empty.")
+        return ""
+
+    def network_name(self, argument: str, given: Any) -> str:
+        """Check the name of an action, service or topic."""
+        name = self.word(argument, given)
+        try:
+            return name and check_name(name)
+        except InvalidNameError as error:
+            self.add(f"{argument}: got {given!r}; {error.reason}.")
         return ""
 
     def kind_of(self, argument: str, given: Any, attribute: str, what: str) -> None:

@@ -220,7 +220,10 @@ class State:
             Args:
                 ud: The declared userdata keys, as attributes or items.
             """
-            raise NotImplementedError(f"{type(self).__name__}.execute")
+            raise NotImplementedError(
+                f"{type(self).__name__}.execute is missing; expected a method "
+                "`def execute(self, userdata):`."
+            )
 
     # -- interface -----------------------------------------------------------------------------
 

@@ -27,11 +27,16 @@ from actionlib_core.interfaces.actionlib.msg import (
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from actionlib_core.interfaces.std_msgs.msg import Float32
+from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.time import Duration
 from smachpy import (
+    ActionServerWrapper,
     Concurrence,
     InvalidStateError,
     InvalidUserCodeError,
+    MonitorState,
+    ServiceState,
     StateMachine,
     UserData,
     cb_interface,
@@ -679,3 +684,18 @@ def test_states_of_one_action_share_a_client(world):
     for _ in range(5):
         assert world.state(goal=Goal(1)).execute(UserData()) == "succeeded"
     assert len(list_endpoints(world.robot.transport, kind=Kind.ACTION_CLIENT)) == 1
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda name: SimpleActionState(name, Action),
+        lambda name: ServiceState(name, SetBool),
+        lambda name: MonitorState(name, Float32, lambda _userdata, _message: True),
+        lambda name: ActionServerWrapper(name, Action, StateMachine(["done"])),
+    ],
+    ids=["action", "service", "topic", "server"],
+)
+def test_a_name_that_breaks_the_rules_of_ros_is_refused_when_the_state_is_made(make):
+    with pytest.raises(InvalidStateError, match="' ' is not allowed"):
+        make("move base")

@@ -589,3 +589,16 @@ def test_a_coroutine_that_is_cancelled_by_no_preempt_has_failed(clock):
 def test_what_is_no_list_of_names_is_told(names):
     with pytest.raises(smachpy.InvalidStateError, match=r"outcomes: got .*; expected strings"):
         smachpy.State(outcomes=names)
+
+
+def test_a_state_without_execute_says_what_to_define():
+    class Empty(smachpy.State):
+        def __init__(self):
+            super().__init__(["done"])
+
+    machine = smachpy.StateMachine(["done"], name="M")
+    machine.add("A", Empty())
+    with pytest.raises(
+        smachpy.InvalidUserCodeError, match=r"/M/A: .*def execute\(self, userdata\)"
+    ):
+        machine.execute()

@@ -222,3 +222,15 @@ def test_no_control_character_of_an_exception_reaches_the_terminal(tmp_path):
         assert done.returncode == 2 if not more else done.returncode != 0
         assert "title" in done.stderr
         assert "\x1b" not in done.stderr + done.stdout
+
+
+@pytest.mark.parametrize("line", ["import rospy", "from geometry_msgs.msg import Pose"])
+def test_a_script_for_ros_1_is_told_of_the_option_for_it(tmp_path, line):
+    path = tmp_path / "old.py"
+    path.write_text(f"{line}\n")
+    with pytest.raises(TargetError, match=r"is a module of ROS 1.*Try the option --ros1"):
+        load_target(str(path))
+    path.write_text("import no_such_module\n")
+    with pytest.raises(TargetError) as raised:
+        load_target(str(path))
+    assert "--ros1" not in str(raised.value)
