@@ -20,7 +20,7 @@ from typing import (
 )
 
 from smachpy.exceptions import InvalidStateError
-from smachpy.machines.names import missing_init
+from smachpy.machines.problems import missing_init
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

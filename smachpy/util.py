@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
-from smachpy.machines.names import unique_names
-from smachpy.machines.problems import Problems
+from smachpy.machines.problems import Problems, unique_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

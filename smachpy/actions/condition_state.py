@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
-from smachpy.machines.names import name_of
-from smachpy.machines.problems import Problems
+from smachpy.machines.problems import Problems, name_of
 from smachpy.machines.state import State
 
 if TYPE_CHECKING:

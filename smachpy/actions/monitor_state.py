@@ -10,8 +10,7 @@ from smachpy import log
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.events import CallbackFailed
-from smachpy.machines.names import name_of
-from smachpy.machines.problems import Problems
+from smachpy.machines.problems import Problems, name_of
 from smachpy.machines.state import State
 from smachpy.run.frame import current_scope
 

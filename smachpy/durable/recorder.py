@@ -16,7 +16,7 @@ from smachpy.durable.position import OF_PROCESS
 from smachpy.durable.store import FencedError, StoreError
 from smachpy.exceptions import InvalidUserCodeError, MissionError
 from smachpy.machines.container import Container, control_of
-from smachpy.machines.names import name_of
+from smachpy.machines.problems import name_of
 from smachpy.machines.state import get_options
 from smachpy.run.grace import ask, ask_child, asking, current_origin, request_soon
 from smachpy.run.interrupt import Interruption

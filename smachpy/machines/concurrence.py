@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy import log
@@ -13,20 +14,18 @@ from smachpy.exceptions import (
     InvalidUserCodeError,
     did_you_mean,
 )
-from smachpy.introspection import RuleRecord, Structure
+from smachpy.introspection import RuleRecord
 from smachpy.machines.construction import construction_method
-from smachpy.machines.container import Container, below
-from smachpy.machines.names import name_of
+from smachpy.machines.container import NO_STATES, Container, below
 from smachpy.machines.old_states import as_state
-from smachpy.machines.problems import Problems
+from smachpy.machines.problems import Problems, name_of, unknown_name
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.state import DataOf
-from smachpy.machines.validate import ChildSpec, ConcurrenceSpec, concurrence_problems
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
 from smachpy.run.grace import asking
 from smachpy.run.interrupt import Interruption
-from smachpy.run.step import make_step
+from smachpy.run.step import Plan
 from smachpy.run.threads import Group
 from smachpy.run.visit import End
 from smachpy.slips import accepting, accepts
@@ -36,30 +35,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence as SequenceOf
     from typing import Unpack
 
-    from smachpy.introspection import Kind
+    from smachpy.introspection import Kind, Structure
     from smachpy.machines.state import State, StateOptions
     from smachpy.run.frame import Frame
-    from smachpy.run.step import Step
     from smachpy.run.threads import ChildBranch
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
-
-
-class _Plan:
-    """A concurrence, compiled."""
-
-    __slots__ = ("epoch", "steps", "userdata")
-
-    def __init__(self, concurrence: Concurrence, steps: list[Step]) -> None:
-        self.epoch = 0
-        self.userdata = concurrence.userdata
-        self.steps = steps
-        for step in self.steps:
-            step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
-
-    def is_stale(self) -> bool:
-        return any(step.is_stale() for step in self.steps)
 
 
 class ConcurrenceData(ContainerData):
@@ -133,8 +115,7 @@ class Concurrence(Container):
             problems.add("outcome policy: got none; expected default_outcome at least")
         for what, named in (("default outcome", [default_outcome]), ("outcome map", outcome_map)):
             unknown = (
-                f"{what}: got {outcome!r}; expected one of {sorted(known)}."
-                f"{did_you_mean(outcome, known)}"
+                unknown_name(what, outcome, known)
                 for outcome in named
                 if outcome not in known and (outcome or outcome_map is named)
             )
@@ -191,10 +172,6 @@ class Concurrence(Container):
 
     # -- structure -----------------------------------------------------------------------------
 
-    def get_initial_states(self) -> list[str]:
-        """Return all labels."""
-        return list(self._smachpy.children)
-
     def set_initial_state(
         self, initial_states: SequenceOf[str], userdata: UserData | None = None
     ) -> None:
@@ -203,17 +180,9 @@ class Concurrence(Container):
         Raises:
             InvalidStateError: an unknown label.
         """
-        known = self._smachpy.children
-        unknown = sorted(set(initial_states) - set(known))
-        if unknown:
-            raise InvalidStateError(
-                f"initial states: got {unknown}; expected labels of {sorted(known)}."
-                f"{did_you_mean(unknown[0], known)}"
-            )
+        super().set_initial_state(initial_states, userdata)
         if initial_states and set(initial_states) != set(self._smachpy.children):
             log.logwarn("Concurrence.set_initial_state: all children start together; ignored.")
-        if userdata is not None:
-            self.userdata.update(userdata)
 
     def get_active_states(self) -> list[str]:
         """Return the labels of the children that are running."""
@@ -224,29 +193,36 @@ class Concurrence(Container):
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the conditions of the outcome map as (child outcome, child label, outcome)."""
         return [
-            (child_outcome, label, outcome)
-            for outcome, rule in self._smachpy.rules
-            for label, wanted in rule.conditions
-            for child_outcome in wanted
+            (child_outcome, label, rule.outcome)
+            for rule in self.describe_structure().rules
+            for label, child_outcome in rule.conditions
         ]
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this concurrence itself."""
-        children = tuple(
-            ChildSpec(label, state._smachpy.outcomes)
-            for label, state in self._smachpy.children.items()
-        )
-        spec = ConcurrenceSpec(
-            where,
-            self._smachpy.outcomes,
-            children,
-            self._smachpy.default_outcome,
-            self._smachpy.rules,
-        )
-        shared = (problem for problem in self.__shared_states(where) if not accepts(problem))
-        return (*concurrence_problems(spec), *shared)
+        nothing = () if self._smachpy.children else (f"{where}: {NO_STATES}",)
+        found = (f"{where}: {problem}" for problem in (*self.__unknown(), *self.__shared_states()))
+        return (*nothing, *(problem for problem in found if not accepts(problem)))
 
-    def __shared_states(self, where: str) -> Iterator[str]:
+    def __unknown(self) -> Iterator[str]:
+        """Yield a problem for each unknown name in the outcome policy."""
+        data = self._smachpy
+        if data.default_outcome is not None and data.default_outcome not in data.outcomes:
+            yield unknown_name("default outcome", data.default_outcome, data.outcomes)
+        for outcome, rule in data.rules:
+            if outcome not in data.outcomes:
+                yield unknown_name("outcome map", outcome, data.outcomes)
+            what = f"outcome map: {outcome!r}"
+            for label, wanted in rule.conditions:
+                if label not in data.children:
+                    yield unknown_name(what, label, data.children)
+                    continue
+                known = (*data.children[label]._smachpy.outcomes, "preempted")
+                for one in wanted:
+                    if one not in known:
+                        yield unknown_name(f"{what}: outcome of {label}", one, known)
+
+    def __shared_states(self) -> Iterator[str]:
         """Yield a problem for each state that two branches would run at the same time."""
         if len(self._smachpy.children) == 1:
             return
@@ -256,44 +232,41 @@ class Concurrence(Container):
                 other = branch_of.setdefault(id(state), label)
                 if other != label:
                     yield (
-                        f"{where}: one state in two branches: got one {type(state).__name__} "
-                        f"below both {other!r} and {label!r}; expected an instance for each."
+                        f"one state in two branches: got one {type(state).__name__} below both "
+                        f"{other!r} and {label!r}; expected an instance for each."
                     )
 
     def describe_structure(self) -> Structure:
         """Return the children and the rules."""
-        children = tuple(
-            (label, state, tuple(self._smachpy.remappings[label].items()))
-            for label, state in self._smachpy.children.items()
-        )
-        rules = [
+        data = self._smachpy
+        rules = tuple(
             RuleRecord(
                 outcome,
                 tuple((label, one) for label, wanted in rule.conditions for one in wanted),
                 str(rule),
             )
-            for outcome, rule in self._smachpy.rules
-        ]
-        return Structure(
-            children,
-            tuple(self._smachpy.children),
-            (),
-            tuple(rules),
-            self._smachpy.default_outcome or None,
-            (("outcome callback", name_of(self._smachpy.outcome_cb)),)
-            if self._smachpy.outcome_cb
-            else (),
+            for outcome, rule in data.rules
+        )
+        details = (("outcome callback", name_of(data.outcome_cb)),) if data.outcome_cb else ()
+        return replace(
+            super().describe_structure(),
+            rules=rules,
+            default_outcome=data.default_outcome or None,
+            details=details,
         )
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self) -> _Plan:
-        return _Plan(self, [make_step(self, label) for label in self._smachpy.children])
+    def _smachpy_compile(self) -> Plan:
+        plan = Plan(self)
+        for step in plan.steps.values():
+            step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
+        return plan
 
-    def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+    def _smachpy_run_children(self, frame: Frame, plan: Plan) -> str:
         # Without callbacks the container wakes up once, after the last child.
         each = bool(self._smachpy.child_termination_cb or self._smachpy.transition_cbs)
-        group = frame.group = Group(frame, plan.steps, each=each)
+        group = frame.group = Group(frame, [*plan.steps.values()], each=each)
         try:
             journal = frame.run.journal
             if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
@@ -309,9 +282,6 @@ class Concurrence(Container):
             frame.group = None
             if not group.started:
                 group.release()
-
-    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  overrides
-        return list(self._smachpy.children)
 
     def __run_group(self, group: Group) -> None:
         """Start the branches and handle their ends.

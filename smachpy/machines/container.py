@@ -11,20 +11,17 @@ import signal
 import sys
 import threading
 from types import MethodType
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.clock import RealClock
 from smachpy.context import THREAD
 from smachpy.events import Preempted
-from smachpy.exceptions import (
-    InconsistentMachineError,
-    InvalidStateError,
-    did_you_mean,
-)
+from smachpy.exceptions import InconsistentMachineError, InvalidStateError
+from smachpy.introspection import Structure
 from smachpy.log import MESSAGES
 from smachpy.machines.callbacks import Callbacks
 from smachpy.machines.construction import Openable
-from smachpy.machines.problems import Problems, takes
+from smachpy.machines.problems import Problems, takes, unknown_name
 from smachpy.machines.state import DataOf, Shown, State
 from smachpy.run.child import EPOCH, ContainerData
 from smachpy.run.frame import Frame, clock_of_run
@@ -46,6 +43,8 @@ if TYPE_CHECKING:
     from smachpy.machines.state import StateOptions
 
 __all__ = ["Container"]
+
+NO_STATES = "states: got none; expected at least one. Try add()."
 
 
 class Container(Openable, Callbacks, State):
@@ -109,7 +108,8 @@ class Container(Openable, Callbacks, State):
         try:
             child: State = self._smachpy.children[key]
         except KeyError:
-            self.__no_child(key)
+            what = f"{type(self).__name__}: no such state"
+            raise KeyError(unknown_name(what, key, self._smachpy.children)) from None
         return child
 
     def get_children(self) -> dict[str, State]:
@@ -126,13 +126,32 @@ class Container(Openable, Callbacks, State):
             userdata: Values to set in the container's userdata; None changes nothing.
 
         Raises:
-            InvalidStateError: a label is unknown, or not possible here.
+            InvalidStateError: a label is unknown.
         """
-        raise NotImplementedError
+        known = self._smachpy.children
+        for label in initial_states:
+            if label not in known:
+                raise InvalidStateError(unknown_name("initial state", label, known))
+        if userdata is not None:
+            self.userdata.update(userdata)
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of the children that run first: all of them."""
+        return list(self._smachpy.children)
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
         """Return the edges as (outcome, from label, to label or container outcome)."""
-        raise NotImplementedError
+        edges = self.describe_structure().transitions
+        return [(edge.outcome, edge.source, edge.target) for edge in edges]
+
+    def describe_structure(self) -> Structure:
+        """Return the children; the kinds of containers add what is between them."""
+        data = self._smachpy
+        children = tuple(
+            (label, state, tuple(data.remappings[label].items()))
+            for label, state in data.children.items()
+        )
+        return Structure(children, tuple(self.get_initial_states()))
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this container itself, not of its children."""
@@ -233,13 +252,6 @@ class Container(Openable, Callbacks, State):
         self._smachpy.children[label] = state
         self._smachpy.plan = self._smachpy.plain_plan = None
 
-    def __no_child(self, key: str) -> NoReturn:
-        labels = sorted(self.get_children())
-        raise KeyError(
-            f"{type(self).__name__}: no such state: got {key!r}; expected one of {labels}."
-            f"{did_you_mean(key, labels)}"
-        ) from None
-
     # -- running -------------------------------------------------------------------------------
 
     def execute(self, parent_ud: UserData | Remapper | None = None) -> str:
@@ -312,7 +324,7 @@ class Container(Openable, Callbacks, State):
             journal = frame.run.journal
             resumed = journal is not None and journal.resumes(frame)
             if data.input_keys and parent_ud is not None and not resumed:
-                self.__copy_input_keys(parent_ud, self.userdata)
+                self.__copy_keys(data.input_keys, "input", parent_ud, self.userdata)
             try:
                 outcome = self._smachpy_run_children(frame, plan)
             except Interruption:  # a callback outlasted its grace
@@ -320,7 +332,7 @@ class Container(Openable, Callbacks, State):
             if data.termination_cbs:
                 outcome = self.__call_at_end(frame, outcome)
             if data.output_keys and parent_ud is not None:
-                self.__copy_output_keys(self.userdata, parent_ud)
+                self.__copy_keys(data.output_keys, "output", self.userdata, parent_ud)
             raised = False
             return outcome
         finally:
@@ -358,17 +370,16 @@ class Container(Openable, Callbacks, State):
         return "preempted"
 
     def __call_at_end(self, frame: Frame, outcome: str) -> str:
-        labels = self._smachpy_terminal_labels(frame)
+        labels, frame.step = self._smachpy_terminal_labels(frame), None
         try:
             self.call_termination_cbs(labels, outcome)
         except Interruption:
             return self.__interrupted(frame)
         return outcome
 
-    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
-        """Return the children that ended last."""
-        step, frame.step = frame.step, None
-        return [] if step is None else [step.label]
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  overridden
+        """Return the children that ended last: all of them."""
+        return list(self._smachpy.children)
 
     def __current_plan(self, frame: Frame, plan: Any) -> Any:
         """Return a plan for the children as they are now.
@@ -443,19 +454,12 @@ class Container(Openable, Callbacks, State):
         # A new clock, because the interrupted code may hold the locks of the run's clock.
         RealClock().spawn(ask, name=f"preempt of {frame.here()}")
 
-    def __copy_input_keys(self, parent_ud: UserData | Remapper, ud: UserData) -> None:
-        for key in self._smachpy.input_keys:
-            if key in parent_ud:
-                ud[key] = parent_ud[key]
+    def __copy_keys(self, keys: Iterable[str], what: str, source: Any, target: Any) -> None:
+        for key in keys:
+            if key in source:
+                target[key] = source[key]
             else:
-                MESSAGES.warn(f"{type(self).__name__}: input key {key!r} has no value to copy.")
-
-    def __copy_output_keys(self, ud: UserData, parent_ud: UserData | Remapper) -> None:
-        for key in self._smachpy.output_keys:
-            if key in ud:
-                parent_ud[key] = ud[key]
-            else:
-                MESSAGES.warn(f"{type(self).__name__}: output key {key!r} has no value to copy.")
+                MESSAGES.warn(f"{type(self).__name__}: {what} key {key!r} has no value to copy.")
 
     @Shown
     def control(self) -> Control:
@@ -521,11 +525,8 @@ def _key_problems(container: Container, where: str) -> Iterator[str]:
         keys = (*state.get_registered_input_keys(), *state.get_registered_output_keys())
         for key in dict.fromkeys(names.get(key, key) for key in keys):
             if "." not in key and key not in fields.types:
-                yield (
-                    f"{where}/{label}: userdata key is no field of {fields.kind.__name__}: got "
-                    f"{key!r}; expected one of {sorted(fields.types)}."
-                    f"{did_you_mean(key, fields.types)}"
-                )
+                what = f"{where}/{label}: userdata key is no field of {fields.kind.__name__}"
+                yield unknown_name(what, key, fields.types)
 
 
 _MAX_ARGUMENTS = 4  # of a signal handler: self, the number, the interrupted frame, one default

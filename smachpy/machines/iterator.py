@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.events import Iterated, Preempted
@@ -9,58 +10,35 @@ from smachpy.exceptions import (
     InvalidStateError,
     InvalidUserCodeError,
     SmachError,
-    did_you_mean,
 )
-from smachpy.introspection import RuleRecord, Structure, TransitionRecord
+from smachpy.introspection import RuleRecord, TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container
-from smachpy.machines.names import name_of
 from smachpy.machines.old_states import as_state
-from smachpy.machines.problems import Problems
+from smachpy.machines.problems import Problems, name_of, unknown_name
 from smachpy.machines.state import DataOf
-from smachpy.machines.validate import ChildSpec, LoopSpec, loop_problems
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
 from smachpy.run.grace import end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
-from smachpy.run.step import make_step, run_watched, user_error
+from smachpy.run.step import Plan, run_watched, user_error
 from smachpy.run.visit import End, Why
-from smachpy.slips import accepting
+from smachpy.slips import accepting, accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from collections.abc import Iterator as IteratorOf
-    from collections.abc import Sequence as SequenceOf
     from typing import Unpack
 
-    from smachpy.introspection import Kind
+    from smachpy.introspection import Kind, Structure
     from smachpy.machines.state import State, StateOptions
     from smachpy.run.frame import Frame
     from smachpy.run.step import Step
-    from smachpy.userdata.user_data import UserData
 
 __all__ = ["Iterator"]
 
 _PLAIN = frozenset({list, tuple, range, set, dict, str})  # iterating runs no code of the user
 _END = object()
-
-
-class _Plan:
-    """A compiled iterator: its step leads to itself for the next item, or to an end."""
-
-    __slots__ = ("epoch", "step", "userdata")
-
-    def __init__(self, iterator: Iterator, step: Step, breaks: frozenset[str]) -> None:
-        self.epoch = 0
-        self.userdata = iterator.userdata
-        self.step = step
-        step.next = {
-            outcome: End(outcome) if outcome in breaks else step
-            for outcome in step.state._smachpy.outcomes
-        }
-
-    def is_stale(self) -> bool:
-        return self.step.is_stale()
 
 
 class IteratorData(ContainerData):
@@ -197,120 +175,90 @@ class Iterator(Container):
 
     # -- structure -----------------------------------------------------------------------------
 
-    @property
-    def __label(self) -> str | None:
-        return next(iter(self._smachpy.children), None)
-
     def __breaks(self) -> frozenset[str]:
         """Return the child's outcomes that end the iterator."""
-        if self._smachpy.break_outcomes:
-            return frozenset(self._smachpy.break_outcomes)
-        label = self.__label
-        if not self._smachpy.loop_outcomes or label is None:
+        data = self._smachpy
+        if data.break_outcomes:
+            return frozenset(data.break_outcomes)
+        if not data.loop_outcomes:
             return frozenset()
-        outcomes = self._smachpy.children[label].get_registered_outcomes()
-        return frozenset(o for o in outcomes if o not in self._smachpy.loop_outcomes)
-
-    def get_initial_states(self) -> list[str]:
-        """Return the child's label."""
-        return list(self._smachpy.children)
-
-    def set_initial_state(
-        self, initial_states: SequenceOf[str], userdata: UserData | None = None
-    ) -> None:
-        """Update the userdata; there is only one state to begin with.
-
-        Raises:
-            InvalidStateError: a label that is not the child's.
-        """
-        unknown = sorted(set(initial_states) - set(self._smachpy.children))
-        if unknown:
-            raise InvalidStateError(
-                f"initial state: got {unknown}; expected {sorted(self._smachpy.children)}."
-                f"{did_you_mean(unknown[0], self._smachpy.children)}"
-            )
-        if userdata is not None:
-            self.userdata.update(userdata)
+        outcomes = (o for state in data.children.values() for o in state._smachpy.outcomes)
+        return frozenset(outcomes).difference(data.loop_outcomes)
 
     def get_active_states(self) -> list[str]:
         """Return the child's label while the iterator runs."""
         return list(self._smachpy.children) if self._smachpy.frame is not None else []
 
-    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the edges as (outcome, from label, to label or container outcome)."""
-        return [
-            (edge.outcome, edge.source, edge.target)
-            for edge in self.describe_structure().transitions
-        ]
-
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this iterator itself."""
-        label = self.__label
-        child = None
-        breaks: tuple[str, ...] = ()
-        if label is not None:
-            outcomes = tuple(self._smachpy.children[label].get_registered_outcomes())
-            child = ChildSpec(label, outcomes)
-            breaks = self._smachpy.break_outcomes or tuple(
-                o for o in outcomes if o in self.__breaks() and o != "preempted"
-            )
-        final = tuple(self._smachpy.final_outcome_map.items())
-        spec = LoopSpec(
-            where,
-            self._smachpy.outcomes,
-            child,
-            self._smachpy.exhausted_outcome,
-            self._smachpy.loop_outcomes,
-            breaks,
-            final,
+        data, problems = self._smachpy, []
+        if not data.children:
+            return (f"{where}: contained state: got none; expected one. Try set_contained_state.",)
+        ((label, state),) = data.children.items()
+        outcomes, final = state._smachpy.outcomes, data.final_outcome_map
+        # Without `break_outcomes`, all that is no loop outcome breaks; 'preempted' needs no way on.
+        breaks = data.break_outcomes or tuple(
+            o for o in outcomes if o in self.__breaks() and o != "preempted"
         )
-        return loop_problems(spec)
+        for what, names in (
+            ("loop", data.loop_outcomes),
+            ("break", breaks),
+            ("final", [name for name in final if name != data.exhausted_outcome]),
+        ):
+            problems += [
+                unknown_name(f"{where}/{label}: {what} outcome", name, outcomes)
+                for name in names
+                if name not in outcomes
+            ]
+        for name in (*breaks, data.exhausted_outcome):
+            end = final.get(name, name)
+            if end not in data.outcomes:
+                problems.append(
+                    unknown_name(f"{where}: outcome after {name!r}", end, data.outcomes)
+                )
+        return tuple(problem for problem in problems if not accepts(problem))
 
     def describe_structure(self) -> Structure:
         """Return the child, its edges and the loop's rules."""
-        label = self.__label
-        if label is None:
-            return Structure()
-        state = self._smachpy.children[label]
-        breaks = self.__breaks()
-        final = self._smachpy.final_outcome_map
+        structure, data = super().describe_structure(), self._smachpy
+        if not data.children:
+            return structure
+        ((label, state),) = data.children.items()
+        breaks, final = self.__breaks(), data.final_outcome_map
         edges = tuple(
             TransitionRecord(
                 label, o, final.get(o, o), target_is_outcome=True, implicit=o not in final
             )
             if o in breaks
             else TransitionRecord(label, o, label)
-            for o in state.get_registered_outcomes()
+            for o in state._smachpy.outcomes
         )
-        data = self._smachpy
         end = final.get(data.exhausted_outcome, data.exhausted_outcome)
         rules = (RuleRecord(end, (), "no item left"),)
         details = (("items", _describe_items(data.items)), ("item key", data.items_label))
-        children = ((label, state, tuple(self._smachpy.remappings[label].items())),)
-        return Structure(children, (label,), edges, rules, None, details)
+        return replace(structure, transitions=edges, rules=rules, details=details)
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self) -> _Plan:
-        label = self.__label
-        assert label is not None
-        return _Plan(self, make_step(self, label), self.__breaks())
+    def _smachpy_compile(self) -> Plan:
+        plan, breaks = Plan(self), self.__breaks()
+        for step in plan.steps.values():  # it leads to itself for the next item, or to an end
+            step.next = {
+                outcome: End(outcome) if outcome in breaks else step
+                for outcome in step.state._smachpy.outcomes
+            }
+        return plan
 
-    def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+    def _smachpy_run_children(self, frame: Frame, plan: Plan) -> str:
         journal = frame.run.journal
         if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
             self.call_start_cbs()
-        outcome = self.__loop(frame, plan.step)
+        (step,) = plan.steps.values()
+        outcome = self.__loop(frame, step)
         outcome = self._smachpy.final_outcome_map.get(outcome, outcome)
         if outcome not in self._smachpy.outcomes and outcome != "preempted":
             raise unknown_outcome(frame.path, self._smachpy.outcomes, outcome)
         return outcome
-
-    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
-        """Return the child, even if there was no item, as in SMACH."""
-        super()._smachpy_terminal_labels(frame)
-        assert self.__label is not None
-        return [self.__label]
 
     def __loop(self, frame: Frame, step: Step) -> str:
         """Run the child for item after item; return its last outcome, or the exhausted one."""

@@ -1,8 +1,9 @@
-"""Checks of users' arguments; all problems of a call are reported at once."""
+"""Checks of users' arguments, all problems of a call at once; and texts about users' objects."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import inspect
 import math
 import numbers
@@ -12,7 +13,6 @@ from typing import Any
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.names import check_name
 from smachpy.exceptions import InvalidStateError, did_you_mean
-from smachpy.machines.names import unique_names
 from smachpy.slips import accepts
 
 
@@ -184,6 +184,12 @@ class Problems:
         return given
 
 
+def unknown_name(what: str, got: object, known: Iterable[str]) -> str:
+    """Return the problem of a name that is not one of the names in `known`."""
+    known = sorted(known)
+    return f"{what}: got {got!r}; expected one of {known}.{did_you_mean(got, known)}"
+
+
 def unknown_arguments(given: Iterable[str], known: Iterable[str]) -> str:
     """Return the error text for keyword arguments that do not exist, or "" if there are none."""
     known = sorted(known)
@@ -233,3 +239,55 @@ def _shown(function: Any) -> str:
         return f"{name}{inspect.signature(function, follow_wrapped=False)}"
     except (TypeError, ValueError):
         return str(name)
+
+
+def name_of(function: object) -> str:
+    """Return the name of a user's function for texts, never with a memory address.
+
+    A method is named with its class, a `functools.partial` as its function, and any other callable
+    object as its class.
+    """
+    while isinstance(function, functools.partial):
+        function = function.func
+    name = getattr(function, "__qualname__", None) or getattr(function, "__name__", None)
+    return str(name or type(function).__name__).rpartition("<locals>.")[2]
+
+
+def missing_init(state: object, error: BaseException) -> str:
+    """Return a hint if `error` comes from a base class whose `__init__` was not called."""
+    # Private attributes carry the name of the class whose `__init__` sets them: `_CBState__args`.
+    lacks = getattr(error, "name", None) or ""
+    for kind in type(state).__mro__:
+        ours = kind.__module__.startswith("smachpy.")
+        if ours and lacks.startswith(f"_{kind.__name__.lstrip('_')}__"):
+            name = type(state).__name__
+            return (
+                f" {name}.__init__ did not call {kind.__name__}.__init__. Try as its first line "
+                f"`super().__init__(...)` with the arguments of {kind.__name__}."
+            )
+    return ""
+
+
+def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
+    """Return `names` without repeats, in their order.
+
+    Raises:
+        InvalidStateError: `names` is a string or not iterable, or an item is not a string.
+    """
+    # A plain string is iterable too, and would silently become names of one letter each.
+    if isinstance(names, str):
+        problem = f"{what}: got the string {names!r}; expected a list of strings. Try [{names!r}]."
+        if not accepts(problem):
+            raise InvalidStateError(problem)
+        names = [names]
+    try:
+        found = list(names)
+    except TypeError as error:
+        raise InvalidStateError(f"{what}: got {names!r}; expected strings, in a list.") from error
+    bad = [name for name in found if not isinstance(name, str)]
+    if bad:
+        problem = f"{what}: got {bad}; expected strings."
+        if not accepts(problem):
+            raise InvalidStateError(problem)
+        found = [str(name) for name in found]
+    return tuple(dict.fromkeys(found))

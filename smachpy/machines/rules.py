@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from smachpy.exceptions import InvalidStateError
-from smachpy.machines.names import unique_names
-from smachpy.machines.problems import as_number
+from smachpy.machines.problems import as_number, unique_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -20,8 +20,7 @@ from actionlib_core.clock import current_clock
 from smachpy.context import THREAD, current_path
 from smachpy.exceptions import InvalidStateError
 from smachpy.introspection import Structure
-from smachpy.machines.names import name_of, unique_names
-from smachpy.machines.problems import Problems, as_number, unknown_arguments
+from smachpy.machines.problems import Problems, as_number, name_of, unique_names, unknown_arguments
 from smachpy.run.child import StateData
 from smachpy.run.frame import clock_of_run, current_scope
 from smachpy.run.grace import (

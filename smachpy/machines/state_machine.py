@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from smachpy import log
@@ -13,20 +14,18 @@ from smachpy.exceptions import (
     SmachError,
     did_you_mean,
 )
-from smachpy.introspection import Structure, TransitionRecord
+from smachpy.introspection import TransitionRecord
 from smachpy.machines.construction import construction_method
-from smachpy.machines.container import Container
-from smachpy.machines.names import unique_names
+from smachpy.machines.container import NO_STATES, Container
 from smachpy.machines.old_states import adopt_slips, as_state
-from smachpy.machines.problems import Problems
+from smachpy.machines.problems import Problems, unique_names, unknown_name
 from smachpy.machines.state import DataOf, Shown
-from smachpy.machines.validate import ChildSpec, MachineSpec, machine_problems
 from smachpy.run.child import EPOCH, ContainerData
 from smachpy.run.frame import SUBSCRIPTIONS, Frame
 from smachpy.run.grace import asking, end_visit, forget_visit, leave, request_soon, unknown_outcome
 from smachpy.run.interrupt import Interruption
 from smachpy.run.step import (
-    make_step,
+    Plan,
     only_buffer,
     publish_left,
     publish_raised,
@@ -38,51 +37,16 @@ from smachpy.slips import accepting, accepts
 from smachpy.util import is_shutdown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from typing import Unpack
 
     from smachpy.events.buffer import EventBuffer
-    from smachpy.introspection import Kind
+    from smachpy.introspection import Kind, Structure
     from smachpy.machines.state import State, StateOptions
     from smachpy.run.step import Following, Step
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["StateMachine"]
-
-
-class _Plan:
-    """A compiled state machine: each step has the next step or end for each of its outcomes.
-
-    Attributes:
-        epoch: The `EPOCH.value` for which the plan is valid.
-        first: The initial step.
-    """
-
-    __slots__ = ("epoch", "first", "steps", "userdata")
-    first: Step
-
-    def __init__(
-        self,
-        userdata: UserData,
-        steps: dict[str, Step],
-        outcomes: Iterable[str],
-        transitions: Mapping[str, Mapping[str, str | None]],
-    ) -> None:
-        self.epoch = 0
-        self.userdata = userdata
-        self.steps = steps
-        ends = {outcome: End(outcome) for outcome in outcomes}
-        for label, step in steps.items():
-            step.nested = _nested(step)
-            for outcome in step.state._smachpy.outcomes:
-                target = transitions[label].get(outcome)
-                if target in steps:
-                    step.next[outcome] = steps[target]
-                elif (target or outcome) in ends:
-                    step.next[outcome] = ends[target or outcome]
-
-    def is_stale(self) -> bool:
-        return any(step.is_stale() for step in self.steps.values())
 
 
 def _nested(step: Step) -> MachineData | None:
@@ -295,14 +259,6 @@ class StateMachine(Container):
         """Return the label of the active state; ['None'] when idle."""
         return [str(_current(self, "label"))]
 
-    def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the edges as (outcome, from label, to label or container outcome)."""
-        return [
-            (outcome, child.label, target or outcome)
-            for child in self.__child_specs()
-            for outcome, target in child.targets().items()
-        ]
-
     def check_state_spec(
         self, label: str, state: State, transitions: Mapping[str, str | None]
     ) -> None:
@@ -314,49 +270,85 @@ class StateMachine(Container):
         outcomes = state.get_registered_outcomes()
         for outcome in transitions:
             if outcome not in outcomes:
-                raise InvalidTransitionError(
-                    f"{label}: transition from an unknown outcome: got {outcome!r}; expected one "
-                    f"of {sorted(outcomes)}.{did_you_mean(outcome, outcomes)}"
-                )
+                what = f"{label}: transition from an unknown outcome"
+                raise InvalidTransitionError(unknown_name(what, outcome, outcomes))
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this machine itself."""
         data = self._smachpy
-        # A subclass with its own `execute` needs no children.
-        if not data.children and type(self).execute is not Container.execute:
-            return ()
+        if not data.children:
+            # A subclass with its own `execute` needs no children.
+            is_own = type(self).execute is not Container.execute
+            return () if is_own else (f"{where}: {NO_STATES}",)
+        problems: list[str] = []
         initial = data.next_initial or data.initial
-        spec = MachineSpec(where, data.outcomes, tuple(self.__child_specs()), initial)
-        return machine_problems(spec)
+        if initial not in data.children:
+            problems.append(unknown_name(f"{where}: initial state", initial, data.children))
+        for label in data.children:
+            problems += self.__child_problems(label, f"{where}/{label}")
+        return tuple(problems)
 
-    def __child_specs(self) -> Iterable[ChildSpec]:
+    def __child_problems(self, label: str, where: str) -> Iterator[str]:
+        states, own = self._smachpy.children, self._smachpy.outcomes
+        outcomes = states[label]._smachpy.outcomes
+        if not outcomes:
+            problem = f"{where}: outcomes: got none; expected at least one."
+            if not accepts(problem):
+                yield problem
+        for outcome, target in self.__targets(label).items():
+            if outcome not in outcomes:
+                yield unknown_name(
+                    f"{where}: transition from an unknown outcome", outcome, outcomes
+                )
+            elif not target and outcome not in own:
+                yield (
+                    f"{where}: outcome has no transition: got {outcome!r}; expected a transition, "
+                    f"or a container outcome of that name among {sorted(own)}."
+                    f"{did_you_mean(outcome, own)}"
+                )
+            elif target and target not in states and target not in own:
+                yield (
+                    f"{where}: transition {outcome!r} leads nowhere: got {target!r}; expected one "
+                    f"of the states {sorted(states)} or outcomes {sorted(own)}."
+                    f"{did_you_mean(target, [*states, *own])}"
+                )
+
+    def __targets(self, label: str) -> dict[str, str | None]:
+        """Return outcome -> target for every outcome of a child; None is that of the same name."""
         data = self._smachpy
-        for label, state in data.children.items():
-            transitions = tuple(data.transitions[label].items())
-            yield ChildSpec(label, state._smachpy.outcomes, transitions)
+        return dict.fromkeys(data.children[label]._smachpy.outcomes) | data.transitions[label]
 
     def describe_structure(self) -> Structure:
         """Return the children and the edges between them."""
-        edges = []
-        for child in self.__child_specs():
-            for outcome, target in child.targets().items():
-                ends = not target or target not in self._smachpy.children
-                edges.append(
-                    TransitionRecord(child.label, outcome, target or outcome, ends, not target)
-                )
-        children = tuple(
-            (label, state, tuple(self._smachpy.remappings[label].items()))
-            for label, state in self._smachpy.children.items()
+        children = self._smachpy.children
+        edges = tuple(
+            TransitionRecord(label, outcome, target or outcome, target not in children, not target)
+            for label in children
+            for outcome, target in self.__targets(label).items()
         )
-        return Structure(children, tuple(self.get_initial_states()), tuple(edges))
+        return replace(super().describe_structure(), transitions=edges)
 
     # -- running -------------------------------------------------------------------------------
 
-    def _smachpy_compile(self) -> _Plan:
-        steps = {label: make_step(self, label) for label in self._smachpy.children}
-        return _Plan(self.userdata, steps, self._smachpy.outcomes, self._smachpy.transitions)
+    def _smachpy_compile(self) -> Plan:
+        plan = Plan(self)
+        steps = plan.steps
+        ends = {outcome: End(outcome) for outcome in self._smachpy.outcomes}
+        for label, step in steps.items():
+            step.nested = _nested(step)
+            transitions = self._smachpy.transitions[label]
+            for outcome in step.state._smachpy.outcomes:
+                target = transitions.get(outcome)
+                if target in steps:
+                    step.next[outcome] = steps[target]
+                elif (target or outcome) in ends:
+                    step.next[outcome] = ends[target or outcome]
+        return plan
 
-    def _smachpy_run_children(self, frame: Frame, plan: _Plan) -> str:
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
+        return [] if frame.step is None else [frame.step.label]
+
+    def _smachpy_run_children(self, frame: Frame, plan: Plan) -> str:
         data: Any = frame.data
         # A durable run that goes on in here has called the start callbacks in an earlier process.
         resumed = None if frame.run.journal is None else frame.run.journal.resumed_label(frame)

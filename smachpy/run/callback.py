@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.machines.names import name_of
+from smachpy.machines.problems import name_of
 from smachpy.run.child import StateData
 from smachpy.run.frame import Frame
 from smachpy.run.grace import ask, forget_visit

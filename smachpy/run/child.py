@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from smachpy.machines.names import unique_names
+from smachpy.machines.problems import unique_names
 from smachpy.run.options import NO_OPTIONS
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from actionlib_core.clock._serial import report_thread_exception
 from smachpy import log
 from smachpy.context import current_frame
 from smachpy.events import CallbackFailed
-from smachpy.machines.names import name_of
+from smachpy.machines.problems import name_of
 
 if TYPE_CHECKING:
     from collections import deque

@@ -12,7 +12,7 @@ from actionlib_core import shutdown
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
 from smachpy.exceptions import InvalidUserCodeError
-from smachpy.machines.names import missing_init, name_of
+from smachpy.machines.problems import missing_init, name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
 from smachpy.run.grace import (
@@ -144,6 +144,29 @@ def make_step(container: Parent, label: str) -> Step:
         container.userdata, of_child.input_keys, of_child.output_keys, data.remappings[label]
     )
     return step
+
+
+class Plan:
+    """The children of one container, compiled.
+
+    Attributes:
+        epoch: The `EPOCH.value` for which the plan is valid.
+        userdata: The container's userdata, to which the windows of the steps refer.
+        steps: Label -> step.
+        first: Of a state machine: the initial step.
+    """
+
+    __slots__ = ("epoch", "first", "steps", "userdata")
+    first: Step
+
+    def __init__(self, container: Parent) -> None:
+        self.epoch = 0
+        self.userdata = container.userdata
+        self.steps = {label: make_step(container, label) for label in container._smachpy.children}
+
+    def is_stale(self) -> bool:
+        """Return whether the interface of a child has changed since the plan was compiled."""
+        return any(step.is_stale() for step in self.steps.values())
 
 
 class _NoTransitions(dict[str, Any]):

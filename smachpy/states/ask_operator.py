@@ -26,7 +26,7 @@ from smachpy import State, UserData
 from smachpy.events import QuestionAnswered, QuestionAsked
 from smachpy.exceptions import MissionError
 from smachpy.log import logwarn
-from smachpy.machines.names import name_of
+from smachpy.machines.problems import name_of
 from smachpy.run.frame import current_scope
 from smachpy.run.grace import on_preempt
 from smachpy.states.questions import (

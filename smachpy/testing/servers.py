@@ -12,7 +12,7 @@ from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
-from smachpy.machines.names import name_of
+from smachpy.machines.problems import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable
