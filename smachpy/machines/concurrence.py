@@ -25,7 +25,7 @@ from smachpy.run.callback import call_bounded
 from smachpy.run.child import ContainerData
 from smachpy.run.grace import asking
 from smachpy.run.interrupt import Interruption
-from smachpy.run.step import Plan
+from smachpy.run.step import Plan, raised
 from smachpy.run.threads import Group
 from smachpy.run.visit import End
 from smachpy.slips import accepting, accepts
@@ -349,10 +349,7 @@ class Concurrence(Container):
                 self, group.frame, self._smachpy.child_termination_cb, (_outcomes(group),)
             )
         except Exception as error:
-            raise InvalidUserCodeError(
-                f"{group.frame.path}: child_termination_cb raised {type(error).__name__}: {error}",
-                path=group.frame.path,
-            ) from error
+            raise raised(group.frame.path, "child_termination_cb", error) from error
         with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):
             group.ask(self.__chosen(group, answer))
 
@@ -395,34 +392,23 @@ class Concurrence(Container):
             frame.answered = asked and set(rule.met_by(outcomes)) <= set(answered)
             return outcome
         frame.answered = asked and bool(answered)
-        if frame.answered and self.__may_end_preempted():
+        default, known = self._smachpy.default_outcome, self._smachpy.outcomes
+        if frame.answered and ("preempted" in known or not default):
             if frame.run.watched:
                 frame.emit_own(Preempted, "")
             return "preempted"
-        return self._smachpy.default_outcome
+        return default
 
     def __ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
         assert self._smachpy.outcome_cb is not None
         try:
             answer = call_bounded(self, frame, self._smachpy.outcome_cb, (dict(outcomes),))
         except Exception as error:
-            raise InvalidUserCodeError(
-                f"{frame.path}: outcome_cb raised {type(error).__name__}: {error}",
-                path=frame.path,
-            ) from error
-        return self.__registered(frame, answer) if answer else None
-
-    def __may_end_preempted(self) -> bool:
-        return "preempted" in self._smachpy.outcomes or not self._smachpy.default_outcome
-
-    def __registered(self, frame: Frame, answer: object) -> str:
+            raise raised(frame.path, "outcome_cb", error) from error
         known = self._smachpy.outcomes
-        if answer in known:
-            return str(answer)
-        raise InvalidTransitionError(
-            f"{frame.path}: outcome_cb: got {answer!r}; expected one of {sorted(known)}."
-            f"{did_you_mean(answer, known)}"
-        )
+        if answer and answer not in known:
+            raise InvalidTransitionError(unknown_name(f"{frame.path}: outcome_cb", answer, known))
+        return str(answer) if answer else None
 
 
 def _outcomes(group: Group) -> dict[str, str | None]:

@@ -199,7 +199,6 @@ class Child(Protocol):
     @property
     def execute(self) -> Callable[[Any], Any]:
         """Runs the state and returns the outcome; may be a coroutine function."""
-        ...
 
     def request_preempt(self) -> None:
         """Ask it to stop; may be overridden by the user."""
@@ -207,7 +206,6 @@ class Child(Protocol):
     @property
     def _smachpy_grace(self) -> Callable[[Any], Any] | None:
         """Computes its grace from that of its containers; None to use its option."""
-        ...
 
 
 class Parent(Child, Protocol):
@@ -218,17 +216,13 @@ class Parent(Child, Protocol):
     @property
     def name(self) -> str | None:
         """Name of the machine when it is the root."""
-        ...
 
     @property
     def userdata(self) -> UserData:
         """Its userdata."""
-        ...
 
     def get_initial_states(self) -> list[str]:
         """Return the labels of the children that run first."""
-        ...
 
     def get_children(self) -> Mapping[str, Any]:
         """Return label -> child."""
-        ...

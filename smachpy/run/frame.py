@@ -62,7 +62,6 @@ class RunJournal(Protocol):
 
     def recovered(self) -> tuple[Any, ...] | None:
         """Return the fields of the event `Recovered` for a resumed run; None for a new one."""
-        ...
 
     def finish(self, outcome: str) -> None:
         """Write that the run ends."""
@@ -78,11 +77,9 @@ class RunJournal(Protocol):
 
     def resumes(self, frame: Frame) -> bool:
         """Return whether children of the container of `frame` had begun before the resume."""
-        ...
 
     def resumed_label(self, frame: Frame) -> str | None:
         """Return the child in which the state machine of `frame` resumes; None if it starts."""
-        ...
 
     def item(self, frame: Frame, number: int) -> int:
         """Compare an item of the iterator of `frame` with the position before the resume.
@@ -91,7 +88,6 @@ class RunJournal(Protocol):
             < 0: the item was done. 0: it was the current one, and is in the userdata. > 0: it is
             new.
         """
-        ...
 
     def check_items(self, frame: Frame, count: int) -> None:
         """Check that there are at least as many items as before the resume."""
@@ -125,23 +121,18 @@ class RunJournal(Protocol):
             has ended, with the fields: outcome (None while it runs); begun_ns [ns since the epoch];
             stopping (a transition has asked it to stop); again (it starts again after that).
         """
-        ...
 
     def began_inside(self, frame: Frame) -> bool:
         """Return whether `frame` runs a container whose children had begun before the resume."""
-        ...
 
     def attempt(self, frame: Frame) -> tuple[int, float]:
         """Return the number of the first attempt, and the rest of the pause before it [s]."""
-        ...
 
     def time_left(self, frame: Frame, seconds: float) -> float:
         """Return the rest of a timeout that began with the attempt [s]."""
-        ...
 
     def goes_on(self, frame: Frame) -> bool:
         """Return whether the child of `frame` had children that began, or a goal, to resume."""
-        ...
 
     def retried(self, frame: Frame, attempt: int, wait: float, reason: str) -> None:
         """Write that attempt number `attempt` has ended, and the next begins in `wait` [s]."""
@@ -153,7 +144,6 @@ class RunJournal(Protocol):
             Whether the journal will pass the request on itself, once all states that were active
             have been entered again: a state that is not entered yet could not cancel its goal.
         """
-        ...
 
     def asked_one(self, frame: Frame, step: Any, override: Any) -> None:
         """Write that an operator asked the child of `step` to stop, with the override.
@@ -174,7 +164,6 @@ class RunJournal(Protocol):
         it had ended, status, text, result and preempted (the state had been asked to stop);
         stopped: the end of the process had cancelled it.
         """
-        ...
 
     def goal_sent(self, frame: Frame, action: str, goal_id: str) -> None:
         """Write that a goal is about to be sent."""
@@ -199,7 +188,6 @@ class Group(Protocol):
 
     def running(self) -> Sequence[Frame]:
         """Return the branches that have not ended."""
-        ...
 
 
 class Run:
@@ -440,14 +428,15 @@ class Frame:
     def emit(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the state that runs now."""
         if self.run.watched:
-            self._emit(self.here(), kind, fields)
+            self.emit_at(self.here(), kind, *fields)
 
     def emit_own(self, kind: Callable[..., Event], *fields: Any) -> None:
         """Publish an event about the container itself."""
         if self.run.watched:
-            self._emit(self.path, kind, fields)
+            self.emit_at(self.path, kind, *fields)
 
-    def _emit(self, path: str, kind: Callable[..., Event], fields: Any) -> None:
+    def emit_at(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
+        """Publish an event about the state at `path`; the run is watched."""
         run = self.run
         if run.pending:  # keeps the order of the events
             run.flush()
@@ -507,12 +496,8 @@ class Scope:
 
         Threads: any.
         """
-        frame = self._frame
-        if frame.run.watched:
-            if frame.run.pending:
-                frame.run.flush()
-            clock = self.clock
-            frame.publish(kind(self.path, clock.now(), clock.time_ns(), *fields))
+        if self._frame.run.watched:
+            self._frame.emit_at(self.path, kind, *fields)
 
 
 def current_scope() -> Scope | None:

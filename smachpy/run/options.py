@@ -70,21 +70,7 @@ class Retry:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Options:
-    """The options of one state, checked; `smachpy.machines.state.StateOptions` describes them.
-
-    Attributes:
-        timeout: [s], or None.
-        timeout_outcome: Outcome after a timeout.
-        preempt_timeout: [s]; None waits for ever, "inherit" takes the container's.
-        retry: When to run again, or None.
-        on_exception: Exception type -> outcome.
-        on_enter: Called before the state runs, or None.
-        on_exit: Called after it ran, or None.
-        resume: What a resumed durable run does instead of executing the state again, or None.
-        on_resume: Called before the state continues in a resumed durable run, or None.
-        idempotent: Its goal may be sent again if it is unknown whether it was done.
-        transient: Keys of a container that the journal of a durable run does not keep.
-    """
+    """The options of one state, checked; `smachpy.machines.state.StateOptions` describes them."""
 
     timeout: float | None = None
     timeout_outcome: str = "aborted"

@@ -204,8 +204,7 @@ class _WatchedRemapper(Remapper):
             fields = (path, clock.now(), clock.time_ns(), self._output[key], item)
             frame.publish(_new(UserdataWritten, fields))
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        self[name] = value
+    __setattr__ = __setitem__
 
 
 # -- options -----------------------------------------------------------------------------------
@@ -271,11 +270,11 @@ def runner_of(
         is_callback: `execute` is the user's override of a container's `execute`.
     """
     if is_async:
-        execute = _Async(state, execute)
+        execute = _run_async(state, execute)
     if is_callback:
-        execute = _OwnExecute(state, execute)
+        execute = _bounded(state, execute)
     if ACCEPTING[0]:  # only programs for ROS 1 wait in rospy, whose waits raise `ProgramEnds`
-        execute = _EndsWithProgram(execute)
+        execute = _ended_by_program(execute)
     plain = options is NO_OPTIONS or (
         options.timeout is None
         and options.retry is None
@@ -283,69 +282,58 @@ def runner_of(
         and options.on_exit is None
         and not options.on_exception
     )
-    return execute if plain else _WithOptions(state, options, execute)
+    return execute if plain else _with_options(state, options, execute)
 
 
-class _Async:
-    """Runs a state's coroutine. A preempt cancels it."""
+def _run_async(
+    state: Any, execute: Callable[[Any], Coroutine[Any, Any, Any]]
+) -> Callable[[Any], Any]:
+    """Return a function that runs the state's coroutine. A preempt cancels it."""
 
-    def __init__(self, state: Child, execute: Callable[[Any], Coroutine[Any, Any, Any]]) -> None:
-        self._state: Any = state
-        self._execute = execute
-
-    def __call__(self, userdata: Any) -> Any:
-        return clock_of_run().run_async(self._main(userdata))
-
-    async def _main(self, userdata: Any) -> Any:
+    async def main(userdata: Any) -> Any:
         import asyncio
 
         loop = asyncio.get_running_loop()
-        task = asyncio.ensure_future(self._execute(userdata))
-
-        def cancel() -> None:
-            # Runs in the requester's thread; `Task.cancel` is not thread-safe.
-            loop.call_soon_threadsafe(task.cancel)
-
-        forget = on_preempt(self._state, cancel)
+        task = asyncio.ensure_future(execute(userdata))
+        # The request comes in another thread; `Task.cancel` is not thread-safe.
+        forget = on_preempt(state, lambda: loop.call_soon_threadsafe(task.cancel))
         try:
             return await task
         except asyncio.CancelledError as error:
-            if not self._state.preempt_requested():
+            if not state.preempt_requested():
                 own = asyncio.current_task()
                 if own is not None and own.cancelling():
                     raise  # the loop itself is ending: Ctrl-C in a program that handles it
                 raise RuntimeError("the coroutine was cancelled, by no preempt") from error
-            self._state.service_preempt()
+            state.service_preempt()
             return "preempted"
         finally:
             forget()
 
+    return lambda userdata: clock_of_run().run_async(main(userdata))
 
-class _OwnExecute:
-    """Runs the user's override of a container's `execute`; the container's grace bounds it.
 
-    The grace pauses inside `super().execute()`, where each child has its own.
+def _bounded(container: Any, execute: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function that runs the user's override of a container's `execute`.
+
+    The container's grace bounds it, but pauses inside `super().execute()`, where each child has its
+    own.
     """
 
-    def __init__(self, container: Any, execute: Callable[[Any], Any]) -> None:
-        self._container = container
-        self._execute = execute
-
-    def __call__(self, userdata: Any) -> Any:
+    def run(userdata: Any) -> Any:
         frame: Frame | None = current_frame()
         assert frame is not None  # a container runs it
-        return call_bounded(self._container, frame, self._execute, (userdata,))
+        return call_bounded(container, frame, execute, (userdata,))
+
+    return run
 
 
-class _EndsWithProgram:
-    """Runs a state whose waits raise `ProgramEnds` at shutdown, and treats that as a preempt."""
+def _ended_by_program(execute: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return `execute` for a state whose waits raise `ProgramEnds` at shutdown: a preempt here."""
 
-    def __init__(self, execute: Callable[[Any], Any]) -> None:
-        self._execute = execute
-
-    def __call__(self, userdata: Any) -> Any:
+    def run(userdata: Any) -> Any:
         try:
-            return self._execute(userdata)
+            return execute(userdata)
         except Exception as error:
             frame: Frame | None = current_frame()
             asked = shutdown.requested() and frame is not None and not frame.dead
@@ -361,76 +349,80 @@ class _EndsWithProgram:
                     request_soon(frame.container)
             raise Interruption from error
 
+    return run
 
-class _WithOptions:
-    """Runs a state with its hooks, timeout, retry and `on_exception`."""
 
-    def __init__(self, state: Child, options: Options, execute: Callable[[Any], Any]) -> None:
-        self._state = state
-        self._options = options
-        self._execute = execute
+def _with_options(
+    state: Child, options: Options, execute: Callable[[Any], Any]
+) -> Callable[[Any], Any]:
+    """Return a function that runs a state with its hooks, timeout, retry and `on_exception`."""
 
-    def __call__(self, userdata: Any) -> Any:
-        options = self._options
+    def run(userdata: Any) -> Any:
         frame: Frame | None = current_frame()
         assert frame is not None  # a container runs it
         journal = frame.run.journal
         if options.on_enter is not None and (journal is None or not journal.began_inside(frame)):
-            _call_hook(frame, self._state, options.on_enter, userdata)
-        outcome = self._attempts(frame, userdata)
-        if options.on_exit is not None:
-            _call_hook(frame, self._state, options.on_exit, userdata, outcome)
-        return outcome
-
-    def _attempts(self, frame: Frame, userdata: Any) -> Any:
-        """Run until an attempt succeeds, none are left, or a preempt arrives."""
-        state, attempt = self._state, 1
+            _call_hook(frame, state, options.on_enter, userdata)
         # A durable run that goes on continues with the attempt in which the process ended, after
         # the rest of the pause before it.
-        if frame.run.journal is not None:
-            attempt, wait = frame.run.journal.attempt(frame)
-            if wait and wait_for_preempt(state, clock_of_run(), wait):
-                return "preempted"
-        return self._try(frame, userdata, attempt)
+        attempt, wait = (1, 0.0) if journal is None else journal.attempt(frame)
+        outcome: Any = "preempted"
+        if not (wait and wait_for_preempt(state, clock_of_run(), wait)):
+            outcome = _attempts(frame, state, options, execute, userdata, attempt)
+        if options.on_exit is not None:
+            _call_hook(frame, state, options.on_exit, userdata, outcome)
+        return outcome
 
-    def _try(self, frame: Frame, userdata: Any, attempt: int) -> Any:
-        state, options = self._state, self._options
-        while True:
-            timer, passed = None, False
-            if options.timeout is not None:
-                timer = Timeout(frame, options.timeout)
-                passed = timer.begin()
-            result: Any = None
-            timed_out = False
-            try:
-                result = "preempted" if passed else self._execute(userdata)
-            except (Exception, Interruption) as error:
-                if frame.dead:  # the thread was left behind: no retry, no hook
-                    raise
-                result = error
-            finally:
-                if timer is not None:
-                    timed_out = timer.end(result)
-            asked = state._preempt_requested or (frame.visit is not None and frame.visit.is_asked())
+    return run
+
+
+def _attempts(
+    frame: Frame,
+    state: Child,
+    options: Options,
+    execute: Callable[[Any], Any],
+    userdata: Any,
+    attempt: int,
+) -> Any:
+    """Run until an attempt succeeds, none are left, or a preempt arrives; return the outcome."""
+    while True:
+        timer, passed = None, False
+        if options.timeout is not None:
+            timer = Timeout(frame, options.timeout)
+            passed = timer.begin()
+        result: Any = None
+        timed_out = False
+        try:
+            result = "preempted" if passed else execute(userdata)
+        except (Exception, Interruption) as error:
+            if frame.dead:  # the thread was left behind: no retry, no hook
+                raise
+            result = error
+        finally:
+            if timer is not None:
+                timed_out = timer.end(result)
+        asked = state._preempt_requested or (frame.visit is not None and frame.visit.is_asked())
+        decision = after_attempt(
+            result, options, attempt, asked=asked, timed_out=timed_out, applies=_applies
+        )
+        if isinstance(decision, Again):
+            wait, result = decision
+            _tell_retried(frame, attempt, wait, result)
+            if not (wait and wait_for_preempt(state, clock_of_run(), wait)):
+                attempt += 1
+                continue
+            # Preempted during the pause: decide again without the retry.
             decision = after_attempt(
-                result, options, attempt, asked=asked, timed_out=timed_out, applies=_applies
+                result, options, attempt, asked=True, timed_out=False, applies=_applies
             )
-            if isinstance(decision, Again):
-                wait, result = decision
-                _tell_retried(frame, attempt, wait, _reason(result))
-                if not (wait and wait_for_preempt(state, clock_of_run(), wait)):
-                    attempt += 1
-                    continue
-                # Preempted during the pause: decide again without the retry.
-                decision = after_attempt(
-                    result, options, attempt, asked=True, timed_out=False, applies=_applies
-                )
-            if isinstance(decision, BaseException):
-                raise decision
-            return decision
+        if isinstance(decision, BaseException):
+            raise decision
+        return decision
 
 
-def _tell_retried(frame: Frame, attempt: int, wait: float, reason: str) -> None:
+def _tell_retried(frame: Frame, attempt: int, wait: float, result: Any) -> None:
+    is_error = isinstance(result, Exception)
+    reason = f"{type(result).__name__}: {result}" if is_error else str(result)
     if frame.run.journal is not None:
         frame.run.journal.retried(frame, attempt, wait, reason)
     frame.emit(Retried, attempt, reason)
@@ -443,11 +435,7 @@ def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments
         else:
             hook(*arguments)
     except Exception as error:
-        where = frame.here()
-        name = name_of(hook)
-        raise InvalidUserCodeError(
-            f"{where}: hook {name} raised {type(error).__name__}: {error}", path=where
-        ) from error
+        raise raised(frame.here(), f"hook {name_of(hook)}", error) from error
 
 
 class Timeout:
@@ -521,10 +509,6 @@ class Timeout:
                 return
             self._passed = ask(frame, self._step, timeout=self._seconds)
         frame.run.flush_soon()
-
-
-def _reason(result: Any) -> str:
-    return f"{type(result).__name__}: {result}" if isinstance(result, Exception) else str(result)
 
 
 def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
@@ -633,6 +617,10 @@ class ChildErrors(ExceptionGroup[Exception]):
 def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCodeError:
     """Return the error to raise, `from error`, when a state's code has raised."""
     hint = missing_init(state, error) if isinstance(error, AttributeError) else ""
-    return InvalidUserCodeError(
-        f"{path}: {type(state).__name__} raised {type(error).__name__}: {error}{hint}", path=path
-    )
+    return raised(path, type(state).__name__, error, hint)
+
+
+def raised(path: str, what: str, error: BaseException, hint: str = "") -> InvalidUserCodeError:
+    """Return the error to raise, `from error`, when `what`, the user's code, has raised."""
+    text = f"{path}: {what} raised {type(error).__name__}: {error}{hint}"
+    return InvalidUserCodeError(text, path=path)

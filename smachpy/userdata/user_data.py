@@ -233,13 +233,7 @@ class Remapper:
 
     __getattr__ = __getitem__  # the same rules, without a second call
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        try:
-            key = self._output[name]
-        except KeyError:
-            self._refuse_write(name)
-            return
-        self._data[key] = value if type(value) in ATOMS else writable(value)
+    __setattr__ = __setitem__
 
     def __dir__(self) -> list[str]:
         return [*object.__dir__(self), *self.keys()]
