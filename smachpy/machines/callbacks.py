@@ -38,29 +38,33 @@ class Callbacks:
     ) -> None:
         """Call `start_cb(userdata, initial_states, *cb_args)` at the start of each run."""
         call = "start_cb(userdata, initial_states, *cb_args)"
-        self._smachpy.start_cbs.append(_checked("start_cb", start_cb, call, 2, cb_args))
-        EPOCH.value += 1
+        self.__register(self._smachpy.start_cbs, start_cb, call, 2, cb_args)
 
     def register_transition_cb(
         self, transition_cb: Callable[..., object], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call `transition_cb(userdata, active_states, *cb_args)` after each transition."""
         call = "transition_cb(userdata, active_states, *cb_args)"
-        self._smachpy.transition_cbs.append(
-            _checked("transition_cb", transition_cb, call, 2, cb_args)
-        )
-        EPOCH.value += 1
-        SUBSCRIPTIONS.version = object()  # a running `_buffered` loop must notice it
+        self.__register(self._smachpy.transition_cbs, transition_cb, call, 2, cb_args)
 
     def register_termination_cb(
         self, termination_cb: Callable[..., object], cb_args: Iterable[Any] = ()
     ) -> None:
         """Call `termination_cb(userdata, terminal_states, outcome, *cb_args)` at the end."""
         call = "termination_cb(userdata, terminal_states, outcome, *cb_args)"
-        self._smachpy.termination_cbs.append(
-            _checked("termination_cb", termination_cb, call, 3, cb_args)
-        )
+        self.__register(self._smachpy.termination_cbs, termination_cb, call, 3, cb_args)
+
+    def __register(
+        self, known: list[Callback], function: Any, call: str, ours: int, args: Iterable[Any]
+    ) -> None:
+        name = call.partition("(")[0]
+        problems = Problems(f"register_{name}")
+        more = problems.values("cb_args", args)
+        problems.function(name, function, call, ours + len(more), optional=False)
+        problems.raise_all()
+        known.append((function, more))
         EPOCH.value += 1
+        SUBSCRIPTIONS.version = object()  # a running `_buffered` loop must notice it
 
     def call_start_cbs(self) -> None:
         """Call the start callbacks; one that raises is reported, the others still run."""
@@ -147,16 +151,3 @@ class Callbacks:
         frame = self._smachpy.frame or self._smachpy.root
         if frame is not None:
             frame.run.watched = True
-
-
-def _checked(name: str, function: Any, call: str, ours: int, args: Iterable[Any]) -> Callback:
-    """Check the arguments of a `register_..._cb` method.
-
-    Raises:
-        InvalidStateError: the callback cannot be called as `call`.
-    """
-    problems = Problems(f"register_{name}")
-    more = problems.values("cb_args", args)
-    problems.function(name, function, call, ours + len(more), optional=False)
-    problems.raise_all()
-    return function, more

@@ -17,7 +17,6 @@ from smachpy.exceptions import (
 from smachpy.introspection import RuleRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import NO_STATES, Container, below
-from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems, name_of, unknown_name
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.state import DataOf
@@ -28,7 +27,7 @@ from smachpy.run.interrupt import Interruption
 from smachpy.run.step import Plan, raised
 from smachpy.run.threads import Group
 from smachpy.run.visit import End
-from smachpy.slips import accepting, accepts
+from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -165,9 +164,7 @@ class Concurrence(Container):
                 )
                 if not accepts(problem):
                     raise InvalidStateError(problem)
-        self._smachpy_store_child(
-            label, as_state(state, label) if accepting() else state, remapping
-        )
+        self._smachpy_store_child(label, state, remapping)
         return state
 
     # -- structure -----------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from smachpy.introspection import Structure
 from smachpy.log import MESSAGES
 from smachpy.machines.callbacks import Callbacks
 from smachpy.machines.construction import Openable
+from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems, takes, unknown_name
 from smachpy.machines.state import DataOf, Shown, State
 from smachpy.run.child import EPOCH, ContainerData
@@ -213,8 +214,8 @@ class Container(Openable, Callbacks, State):
         state: object,
         remapping: Mapping[str, str] | None,
         problems: Problems | None = None,
-    ) -> None:
-        """Add a child.
+    ) -> State:
+        """Add a child and return it: `state`, or a state that runs it if it is no `State`.
 
         Raises:
             InvalidStateError: an argument is wrong, or `problems` has some already.
@@ -232,20 +233,22 @@ class Container(Openable, Callbacks, State):
             )
             if not (self._smachpy_replaces and accepts(f"{label}: {problem}")):
                 problems.add(problem)
+        state = as_state(state, label)
         if isinstance(state, State):
             with problems:
                 problems.add(*state_problems(state))
+            if any(each is self for each in below(state)):
+                problems.add(f"state: got {state!r}, which contains this container.")
         else:
             hint = f" Try {state.__name__}()." if isinstance(state, type) else ""
             problems.add(f"state: got {state!r}; expected an instance of State.{hint}")
-        if isinstance(state, State) and any(each is self for each in below(state)):
-            problems.add(f"state: got {state!r}, which contains this container.")
         names = problems.names_of("remapping", remapping, "key of the state -> key here")
         problems.raise_all()
         assert isinstance(state, State)
         self._smachpy.children[label] = state
         self._smachpy.remappings[label] = names
         self._smachpy.plan = self._smachpy.plain_plan = None
+        return state
 
     def _smachpy_exchange(self, label: str, state: State) -> None:
         """Replace a child between two runs, by a test double for instance."""

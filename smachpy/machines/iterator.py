@@ -14,7 +14,6 @@ from smachpy.exceptions import (
 from smachpy.introspection import RuleRecord, TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container
-from smachpy.machines.old_states import as_state
 from smachpy.machines.problems import Problems, name_of, unknown_name
 from smachpy.machines.state import DataOf
 from smachpy.run.callback import call_bounded
@@ -23,7 +22,7 @@ from smachpy.run.grace import end_visit, unknown_outcome
 from smachpy.run.interrupt import Interruption
 from smachpy.run.step import Plan, run_watched, user_error
 from smachpy.run.visit import End, Why
-from smachpy.slips import accepting, accepts
+from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -158,8 +157,7 @@ class Iterator(Container):
         before = self._smachpy.children, self._smachpy.remappings
         self._smachpy.children, self._smachpy.remappings = {}, {}
         try:
-            stored = as_state(state, label) if accepting() else state
-            self._smachpy_store_child(label, stored, remapping, problems)
+            self._smachpy_store_child(label, state, remapping, problems)
         except InvalidStateError:
             self._smachpy.children, self._smachpy.remappings = before
             raise

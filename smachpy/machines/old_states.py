@@ -50,7 +50,7 @@ def as_state(state: Any, label: object) -> Any:
 
 
 def adopt_slips(
-    label: object, state: Any, transitions: Mapping[str, str | None]
+    label: str, state: State, transitions: Mapping[str, str | None]
 ) -> dict[str, str | None]:
     """Return transitions as SMACH understood them.
 
@@ -58,7 +58,7 @@ def adopt_slips(
     """
     # Some programs write the string 'None' for "no transition".
     given = {o: None if target == "None" else target for o, target in transitions.items()}
-    if isinstance(state, State) and given and not state.get_registered_outcomes():
+    if given and not state.get_registered_outcomes():
         name = type(state).__name__
         problem = f"{label}: outcomes of {name}: got none; expected {sorted(map(str, given))}."
         if accepts(problem):

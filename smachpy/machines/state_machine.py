@@ -17,7 +17,7 @@ from smachpy.exceptions import (
 from smachpy.introspection import TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import NO_STATES, Container
-from smachpy.machines.old_states import adopt_slips, as_state
+from smachpy.machines.old_states import adopt_slips
 from smachpy.machines.problems import Problems, unique_names, unknown_name
 from smachpy.machines.state import DataOf, Shown
 from smachpy.run.child import EPOCH, ContainerData
@@ -194,12 +194,10 @@ class StateMachine(Container):
         problems = Problems(str(label))
         holds = "outcome -> label of the next state, outcome of this machine, or None"
         given = problems.names_of("transitions", transitions, holds, optional=True)
-        stored = state
-        if accepting():  # programs for ROS 1 may add objects that only look like states
-            stored = as_state(state, label)
-            given = adopt_slips(label, stored, given)
         fixed = problems.mapping("constants", constants, "key of the state -> value")
-        self._smachpy_store_child(label, stored, remapping, problems)
+        stored = self._smachpy_store_child(label, state, remapping, problems)
+        if accepting():
+            given = adopt_slips(label, stored, given)
         self._smachpy.transitions[label] = given
         for key, value in fixed.items():
             # The dot keeps it apart from the user's keys and lets typed userdata accept it.
