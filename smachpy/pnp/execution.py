@@ -42,7 +42,7 @@ class Branches(Group):
         self.started = True
         with self.frame.run.lock:
             self.branches.append(branch)
-            self._left += 1
+            self.left += 1
         container = self.frame.container
         # A request that came before the branch was in the list has not reached it.
         if container._preempt_requested:
@@ -71,7 +71,7 @@ class Branches(Group):
 
     def notice(self) -> None:
         """Wake the plan's thread."""
-        self._wake.set()
+        self.wake.set()
 
     def wait_for_change(self, timeout: float | None) -> None:
         """Wait until a child ends, `notice` is called, or the time [s] is over.
@@ -80,8 +80,8 @@ class Branches(Group):
         """
         # Cleared after the wait: callers look at reports and conditions only after this returns.
         if not self.reports:
-            self._wake.wait(timeout)
-        self._wake.clear()
+            self.wake.wait(timeout)
+        self.wake.clear()
 
 
 class Execution:

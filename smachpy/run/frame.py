@@ -398,7 +398,8 @@ class Frame:
             try:
                 listener(event)
             except Exception as error:  # noqa: BLE001  the user's listener: reported in the log
-                self._listener_failed(listener, error, event)
+                where = f"{self.path or self.here()}: listener {name_of(listener)}"
+                log.log_exception(f"{where} raised {error!r} on {event!r}", error)
 
     def find_subscribers(self) -> Subscribers:
         """Look up the subscribers of this frame, and keep them until somebody comes or goes."""
@@ -464,11 +465,6 @@ class Frame:
         text = f"{type(error).__name__}: {error}"
         log.log_exception(f"{self.path}: callback {name} raised {text}", error)
         self.emit_own(CallbackFailed, name, text)
-
-    def _listener_failed(self, listener: object, error: BaseException, event: Event) -> None:
-        name = name_of(listener)
-        path = self.path or self.here()
-        log.log_exception(f"{path}: listener {name} raised {error!r} on {event!r}", error)
 
 
 class Scope:

@@ -551,17 +551,13 @@ def request(container: Parent, only: Frame | None = None) -> Run | None:
             if frame is data.root:
                 ask(frame)
             elif frame is data.frame or frame is data.callback:
-                _pass_on_reported(container, frame)
+                try:
+                    pass_on(container)
+                except Exception as error:  # noqa: BLE001  reported; all children were asked
+                    frame.note_failure(frame.path, _request_of(container), error)
             else:  # it has just ended: the request is for its next run
                 container._preempt_requested = True
         return frame.run
-
-
-def _pass_on_reported(container: Parent, frame: Frame) -> None:
-    try:
-        pass_on(container)
-    except Exception as error:  # noqa: BLE001  reported; all children were asked
-        frame.note_failure(frame.path, _request_of(container), error)
 
 
 def request_soon(container: Parent, only: Frame | None = None) -> None:

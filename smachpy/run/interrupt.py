@@ -18,7 +18,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,15 +41,6 @@ class ProgramEnds(Exception):  # noqa: N818  not an error
 
     A state that does not catch it ends as a preempted one.
     """
-
-
-@runtime_checkable
-class InterruptingClock(Protocol):
-    """A clock that can end a wait with an exception."""
-
-    def interrupt(self, ident: int, error: BaseException) -> bool:
-        """Raise `error` in the thread `ident` if it waits on this clock; return whether it did."""
-        ...
 
 
 class _SignalHandler:
@@ -81,7 +72,8 @@ def interrupt(clock: Clock, ident: int, is_wanted: Callable[[], bool]) -> bool:
     """
     if not ident:
         return False
-    if isinstance(clock, InterruptingClock) and clock.interrupt(ident, Interruption()):
+    end_wait = getattr(clock, "interrupt", None)  # a virtual clock ends the waits on it itself
+    if end_wait is not None and end_wait(ident, Interruption()):
         return False
     handler: Any = signal.getsignal(SIGNAL)
     if ident == threading.main_thread().ident and handler is _handler:

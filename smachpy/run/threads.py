@@ -143,8 +143,30 @@ class ChildBranch(Branch):
         return run_watched(self, step) if self.run.watched else step.execute(step.userdata)
 
     def end(self, outcome: str | None, error: BaseException | None) -> ClockEvent | None:
-        """Report how the child ended."""
-        return self._group.end(self, outcome, error)
+        """Report how the child ended; the event returned wakes the container."""
+        group = self._group
+        with self.run.lock:  # after this no request is being passed on to the branch
+            if self.ended:  # its thread was left behind, and has ended now
+                return None
+            visit = self.visit
+            if visit is not None:
+                self.answered = self.answered or visit.has_answered(outcome)
+                visit.happen(Event.END)  # from here on no interruption arrives
+            if not self.dead:  # else `Visit._cut_off` has cleared the flag
+                self.step.state._preempt_requested = False
+            self.ended = True
+            self.outcome, self.error = outcome, error
+            if error is not None:
+                group.failed = True
+            # First the report, then the count: `wait` reads them without the lock, and must find
+            # every report when the count is 0.
+            group.reports.append(self)
+            group.left -= 1
+            last = group.left == 0
+            when_ended = group.when_ended if last else None
+        if when_ended is not None:  # it takes the lock again and may end the container
+            when_ended()
+        return group.wake if last or group.each or error is not None else None
 
     def end_thread(self) -> None:
         """Break the reference cycles through this frame: its run is freed without the collector."""
@@ -223,19 +245,21 @@ class Group:
         started: The branches have threads, or will have them in a moment.
         interruption: What interrupted a callback that outlasted its grace; the container will end
             'preempted'.
+        left: Number of branches that have not ended.
+        wake: Set to wake the container.
         when_ended: Called once after the last branch has ended; None for nothing.
     """
 
     __slots__ = (
-        "_left",
-        "_wake",
         "branches",
         "each",
         "failed",
         "frame",
         "interruption",
+        "left",
         "reports",
         "started",
+        "wake",
         "when_ended",
     )
 
@@ -248,8 +272,8 @@ class Group:
         self.when_ended: Callable[[], object] | None = None
         self.reports: deque[ChildBranch] = deque()
         self.branches = [ChildBranch(self, step) for step in steps]
-        self._left = len(steps)
-        self._wake: ClockEvent = frame.run.clock.event()
+        self.left = len(steps)
+        self.wake: ClockEvent = frame.run.clock.event()
 
     def start(self) -> None:
         """Start every branch, in a thread named after its path."""
@@ -270,37 +294,6 @@ class Group:
                     ask(branch)
         self.frame.run.flush()
 
-    def end(
-        self, branch: ChildBranch, outcome: str | None, error: BaseException | None
-    ) -> ClockEvent | None:
-        """Record how a branch ended; only the first call for a branch counts.
-
-        Returns:
-            An event for the caller to set, which wakes the container; None if it shall sleep on.
-        """
-        with self.frame.run.lock:  # after this no request is being passed on to the branch
-            if branch.ended:  # its thread was left behind, and has ended now
-                return None
-            visit = branch.visit
-            if visit is not None:
-                branch.answered = branch.answered or visit.has_answered(outcome)
-                visit.happen(Event.END)  # from here on no interruption arrives
-            if not branch.dead:  # else `Visit._cut_off` has cleared the flag
-                branch.step.state._preempt_requested = False
-            branch.ended = True
-            branch.outcome, branch.error = outcome, error
-            if error is not None:
-                self.failed = True
-            # First the report, then the count: `wait` reads them without the lock, and must find
-            # every report when the count is 0.
-            self.reports.append(branch)
-            self._left -= 1
-            last = self._left == 0
-            when_ended = self.when_ended if last else None
-        if when_ended is not None:  # it takes the lock again and may end the container
-            when_ended()
-        return self._wake if last or self.each or error is not None else None
-
     def wait(self) -> bool:
         """Wait for reports.
 
@@ -310,10 +303,10 @@ class Group:
         Blocks: until a branch has ended; one that ignores its preempt is reported too, once its
             thread is left behind.
         """
-        if not self.reports or not (self.each or self._left == 0):
-            self._wake.wait()
-        self._wake.clear()
-        return self._left > 0
+        if not self.reports or not (self.each or self.left == 0):
+            self.wake.wait()
+        self.wake.clear()
+        return self.left > 0
 
     def running(self) -> list[ChildBranch]:
         """Return the branches that have not ended."""
@@ -406,13 +399,9 @@ def execute_root(root: Parent, execute: Callable[[Any], Any], parent_ud: Any) ->
                 if end is not None:
                     end(outcome)
         finally:
-            _forget_late_request(root)
-
-
-def _forget_late_request(root: Parent) -> None:
-    """Clear the flag of a request that arrived while the run was ending: it was for that run."""
-    if root._smachpy.frame is None:
-        root._preempt_requested = False
+            # A request that arrived while the run was ending was for that run.
+            if root._smachpy.frame is None:
+                root._preempt_requested = False
 
 
 def already_runs(path: str) -> InvalidStateError:
