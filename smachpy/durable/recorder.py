@@ -24,8 +24,7 @@ from smachpy.run.options import ASK
 from smachpy.run.visit import Override
 from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
-from smachpy.userdata.typed import CheckedDict
-from smachpy.userdata.user_data import data_of
+from smachpy.userdata.user_data import CheckedDict, data_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -12,18 +12,9 @@ instead of `Left`. If another process resumes the run, its events begin with `Re
 from __future__ import annotations
 
 import json
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from smachpy.userdata.shown import (
-    DEEPEST,
-    LONGEST_LIST,
-    LONGEST_TEXT,
-    MOST_TEXT,
-    WIDEST_INT,
-    Room,
-    text_of,
-)
+from smachpy.userdata.shown import LONGEST_TEXT, MOST_TEXT, Room, plain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -465,7 +456,7 @@ def to_record(event: Event) -> dict[str, Any]:
     record: dict[str, Any] = {"kind": type(event).__name__}
     room = Room()
     for key, value in event._asdict().items():
-        record[key] = _listed(value) if key in _NAMES else _plain(value, room)
+        record[key] = _listed(value) if key in _NAMES else plain(value, room)
     return record
 
 
@@ -485,7 +476,7 @@ def record_text(record: dict[str, Any]) -> str:
     try:
         return json.dumps(record)
     except (TypeError, ValueError, RecursionError):
-        return json.dumps({key: _plain(value, Room()) for key, value in record.items()})
+        return json.dumps({key: plain(value, Room()) for key, value in record.items()})
 
 
 def was_cut(text: str, size: int) -> bool:
@@ -519,53 +510,3 @@ def from_record(record: dict[str, Any]) -> Event:
         raise ValueError(
             f"event record: {name}: got fields {sorted(fields)}; expected {list(kind._fields)}."
         ) from error
-
-
-def _plain(value: Any, room: Room, depth: int = 0) -> Any:
-    if value is None or isinstance(value, bool):
-        return value
-    if isinstance(value, int):
-        bits = value.bit_length()
-        return value if bits <= WIDEST_INT else f"<int of {bits} bits>"
-    if isinstance(value, float) and math.isfinite(value):
-        return value
-    if isinstance(value, str):
-        return _cut(value, room)
-    try:
-        shown = _container(value, room, depth) if depth < DEEPEST else None
-    except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
-        return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
-    return _cut(text_of(value, room), room) if shown is None else shown
-
-
-def _cut(text: str, room: Room) -> str:
-    most = min(LONGEST_TEXT, max(room.text, 0))
-    room.text -= min(len(text), most)
-    return text if len(text) <= most else text[:most] + "\u2026"
-
-
-def _container(value: Any, room: Room, depth: int) -> Any:
-    """Return the JSON form of a container; None if `value` is none, or is too long."""
-    if isinstance(value, (list, tuple, dict)):
-        if len(value) > min(LONGEST_LIST, room.items):
-            return None
-        room.items -= len(value)
-        if not isinstance(value, dict):
-            return [_plain(item, room, depth + 1) for item in value]
-        pairs = list(value.items())
-        if all(isinstance(key, str) for key, _ in pairs):
-            room.text -= sum(len(key) for key, _ in pairs)
-            return {key[:LONGEST_TEXT]: _plain(item, room, depth + 1) for key, item in pairs}
-        return None
-    return _fields_of(value, room, depth)
-
-
-def _fields_of(value: Any, room: Room, depth: int) -> Any:
-    """Return the fields of a message, or of a ROS time or duration; None for anything else."""
-    if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
-        fields = {name: getattr(value, name, None) for name in value.__slots__}
-        return {"$msg": str(value._type), "fields": _plain(fields, room, depth + 1)}
-    if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
-        parts = {"secs": value.secs, "nsecs": value.nsecs}
-        return {name: _plain(part, room, depth + 1) for name, part in parts.items()}
-    return None

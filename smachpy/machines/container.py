@@ -32,8 +32,14 @@ from smachpy.run.options import retry_problems
 from smachpy.run.threads import already_runs, execute_root
 from smachpy.run.visit import Origin
 from smachpy.slips import accepts
-from smachpy.userdata.typed import CheckedDict
-from smachpy.userdata.user_data import Remapper, UserData, data_of, reset, typed_userdata
+from smachpy.userdata.user_data import (
+    CheckedDict,
+    Remapper,
+    UserData,
+    data_of,
+    reset,
+    typed_userdata,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -23,8 +23,7 @@ from smachpy.pnp.reading import find_plan, read_net
 from smachpy.run.child import ContainerData
 from smachpy.run.step import make_step
 from smachpy.run.visit import End
-from smachpy.userdata.typed import CheckedDict
-from smachpy.userdata.user_data import data_of
+from smachpy.userdata.user_data import CheckedDict, data_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -35,8 +34,7 @@ if TYPE_CHECKING:
     from smachpy.pnp.knowledge import Events
     from smachpy.pnp.server import PNPServer
     from smachpy.run.frame import Frame
-    from smachpy.userdata.typed import Fields
-    from smachpy.userdata.user_data import UserData
+    from smachpy.userdata.user_data import Fields, UserData
 
 __all__ = ["PetriNetPlan", "load"]
 

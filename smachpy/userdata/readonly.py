@@ -174,9 +174,7 @@ def _maker(kind: type) -> Callable[[Any, str], Any] | None:
     if kind.__module__ == "numpy" and kind.__name__ == "ndarray":
         return _array_view
     if issubclass(kind, tuple):
-        if kind is tuple:
-            return _tuple_view
-        return _named_tuple_view if hasattr(kind, "_make") else None
+        return _tuple_view if kind is tuple or hasattr(kind, "_make") else None
     base = next((base for base in _CHANGES if issubclass(kind, base)), None)
     # A class implemented in C without known methods, such as a lock or a file: what would change it
     # is not known.
@@ -185,16 +183,11 @@ def _maker(kind: type) -> Callable[[Any, str], Any] | None:
     return _view_maker(kind, base)
 
 
-def _tuple_view(value: tuple[Any, ...], key: str) -> tuple[Any, ...]:
+def _tuple_view(value: Any, key: str) -> Any:
     if all(type(item) in ATOMS for item in value):
         return value
-    return tuple([read_only(item, key) for item in value])
-
-
-def _named_tuple_view(value: Any, key: str) -> Any:
-    if all(type(item) in ATOMS for item in value):
-        return value
-    return type(value)._make([read_only(item, key) for item in value])
+    items = [read_only(item, key) for item in value]
+    return tuple(items) if type(value) is tuple else type(value)._make(items)
 
 
 def _array_view(value: Any, _key: str) -> Any:

@@ -1,4 +1,4 @@
-"""The text of a value for display: its `repr`, unless that would take too long.
+"""Values for display: their JSON form, or the text of their `repr`, unless that takes too long.
 
 `repr` has no limit, so the parts of the value are counted first. That works for Python's
 containers, messages, dataclasses, namespaces and exceptions, and for anything with a length; the
@@ -7,6 +7,7 @@ containers, messages, dataclasses, namespaces and exceptions, and for anything w
 
 from __future__ import annotations
 
+import math
 from collections import UserDict, UserList, deque
 from collections.abc import ItemsView, KeysView, ValuesView
 from dataclasses import fields
@@ -156,3 +157,54 @@ def _joined(
         if length > LONGEST_TEXT:
             break
     return f"{before}{', '.join(parts)}{after}"
+
+
+def plain(value: Any, room: Room, depth: int = 0) -> Any:
+    """Return `value` as JSON has it, cut to the limits above; see `smachpy.events.to_record`."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int):
+        bits = value.bit_length()
+        return value if bits <= WIDEST_INT else f"<int of {bits} bits>"
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    if isinstance(value, str):
+        return _cut(value, room)
+    try:
+        shown = _container(value, room, depth) if depth < DEEPEST else None
+    except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
+        return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
+    return _cut(text_of(value, room), room) if shown is None else shown
+
+
+def _cut(text: str, room: Room) -> str:
+    most = min(LONGEST_TEXT, max(room.text, 0))
+    room.text -= min(len(text), most)
+    return text if len(text) <= most else text[:most] + "\u2026"
+
+
+def _container(value: Any, room: Room, depth: int) -> Any:
+    """Return the JSON form of a container; None if `value` is none, or is too long."""
+    if isinstance(value, (list, tuple, dict)):
+        if len(value) > min(LONGEST_LIST, room.items):
+            return None
+        room.items -= len(value)
+        if not isinstance(value, dict):
+            return [plain(item, room, depth + 1) for item in value]
+        pairs = list(value.items())
+        if all(isinstance(key, str) for key, _ in pairs):
+            room.text -= sum(len(key) for key, _ in pairs)
+            return {key[:LONGEST_TEXT]: plain(item, room, depth + 1) for key, item in pairs}
+        return None
+    return _fields_of(value, room, depth)
+
+
+def _fields_of(value: Any, room: Room, depth: int) -> Any:
+    """Return the fields of a message, or of a ROS time or duration; None for anything else."""
+    if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
+        fields = {name: getattr(value, name, None) for name in value.__slots__}
+        return {"$msg": str(value._type), "fields": plain(fields, room, depth + 1)}
+    if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
+        parts = {"secs": value.secs, "nsecs": value.nsecs}
+        return {name: plain(part, room, depth + 1) for name, part in parts.items()}
+    return None

@@ -1,4 +1,4 @@
-"""Values shared by states: `UserData`, and `Remapper`, a state's window into it.
+"""Values shared by states: `UserData`, its declared fields, and `Remapper`, a window into it.
 
 A state reads the keys that it declares as input and writes those that it declares as output;
 anything else raises `UserDataKeyError`. The value of a key that is only input is read-only
@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import dataclasses
+import types
+import typing
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from smachpy.context import current_path
-from smachpy.exceptions import UserDataKeyError
+from smachpy.exceptions import InvalidStateError, UserDataKeyError, UserDataTypeError
 from smachpy.slips import accepts
 from smachpy.userdata.readonly import ATOMS, read_only, still_shows, writable
-from smachpy.userdata.typed import CheckedDict, Fields
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, MutableMapping
@@ -105,11 +107,7 @@ class UserData:
         values = ", ".join(f"{key}={value!r}" for key, value in self._data.items())
         return f"UserData({values})"
 
-    def __copy__(self) -> UserData:
-        data = self._data
-        return _rebuild(data, data.fields.kind if isinstance(data, CheckedDict) else None)
-
-    def __reduce__(self) -> tuple[object, ...]:
+    def __reduce__(self) -> tuple[object, ...]:  # also for `copy.copy`
         data = self._data
         kind = data.fields.kind if isinstance(data, CheckedDict) else None
         return (_rebuild, (dict(data), kind))
@@ -136,17 +134,16 @@ def typed_userdata(kind: type) -> UserData:
 
 def reset(userdata: UserData) -> None:
     """Remove all values; typed userdata gets its defaults back. Constants ("LABEL.key") stay."""
-    data = userdata._data  # noqa: SLF001  its own module
-    if isinstance(data, CheckedDict):
-        data.reset()
-        return
+    data = data_of(userdata)
     for key in [key for key in data if "." not in key]:
         del data[key]
+    if isinstance(data, CheckedDict):
+        data.update(data.fields.defaults())
 
 
 def _rebuild(data: dict[str, Any], kind: type | None = None) -> UserData:
     made = UserData() if kind is None else typed_userdata(kind)
-    made._data.update(data)  # noqa: SLF001  its own module
+    data_of(made).update(data)
     return made
 
 
@@ -156,6 +153,94 @@ def data_of(userdata: UserData) -> dict[str, Any]:
     The copy `dict(data_of(ud))` is atomic: other threads cannot change the keys meanwhile.
     """
     return userdata._data  # noqa: SLF001  its own module
+
+
+class Fields:
+    """The fields of a userdata type: names, types, defaults.
+
+    Args:
+        kind: A dataclass, a TypedDict, or a class with annotations.
+
+    Raises:
+        InvalidStateError: `kind` has no annotated fields.
+    """
+
+    def __init__(self, kind: type) -> None:
+        self.kind = kind
+        try:
+            self.types: dict[str, Any] = typing.get_type_hints(kind)
+        except TypeError as error:
+            raise InvalidStateError(f"userdata_type: got {kind!r}; expected a class.") from error
+        if not self.types:
+            raise InvalidStateError(
+                f"userdata_type: {kind.__name__}: got no annotated fields; expected a dataclass or "
+                "a TypedDict."
+            )
+
+    def defaults(self) -> dict[str, Any]:
+        """Return field -> default, for the fields that have one; default factories are called."""
+        if not dataclasses.is_dataclass(self.kind):
+            return {
+                name: getattr(self.kind, name) for name in self.types if name in vars(self.kind)
+            }
+        found: dict[str, Any] = {}
+        for field in dataclasses.fields(self.kind):
+            if field.default is not dataclasses.MISSING:
+                found[field.name] = field.default
+            elif field.default_factory is not dataclasses.MISSING:
+                found[field.name] = field.default_factory()
+        return found
+
+    def check(self, key: str, value: Any) -> None:
+        """Check that the field `key` may have `value`.
+
+        Raises:
+            UserDataKeyError: the type has no such field.
+            UserDataTypeError: the field has another type.
+        """
+        wanted = self.types.get(key, _MISSING)
+        if wanted is _MISSING:
+            problem = (
+                f"userdata key is no field of {self.kind.__name__}: got {key!r}; fields: "
+                f"{sorted(self.types)}."
+            )
+            raise UserDataKeyError(key, problem, self.types)
+        if not _fits(value, wanted):
+            raise UserDataTypeError(key, value, wanted, path=current_path())
+
+
+class CheckedDict(dict[str, Any]):
+    """The values of typed userdata; checks every write."""
+
+    def __init__(self, fields: Fields) -> None:
+        self.fields = fields
+        super().__init__(fields.defaults())
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        if "." not in key:  # keys of constants, "LABEL.key", belong to the machine
+            self.fields.check(key, value)
+        super().__setitem__(key, value)
+
+
+_MISSING = object()
+
+
+def _fits(value: Any, wanted: Any) -> bool:
+    """Return whether `value` has the annotated type; the elements of containers are not checked."""
+    origin = typing.get_origin(wanted)
+    arguments = typing.get_args(wanted)
+    if origin is typing.Union or origin is types.UnionType:
+        return any(_fits(value, one) for one in arguments)
+    if origin is typing.Literal:
+        return value in arguments
+    if origin in {typing.Annotated, typing.Required, typing.NotRequired, typing.Final}:
+        return _fits(value, arguments[0])
+    kind = type(None) if wanted is None else origin or wanted
+    if kind is Any or not isinstance(kind, type) or getattr(kind, "_is_protocol", False):
+        return True
+    if typing.is_typeddict(kind):
+        return isinstance(value, dict)
+    return isinstance(value, (int, float) if kind is float else kind)  # as for type checkers
 
 
 class Remapper:
