@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from smachpy import log
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean
-from smachpy.run.child import ContainerData
-from smachpy.run.frame import SUBSCRIPTIONS
+from smachpy.run.child import EPOCH, ContainerData
 from smachpy.run.grace import ask_child, asking, on_preempt, request_soon
 from smachpy.run.visit import Override
 
@@ -313,7 +312,7 @@ class Control:
             run.control = self
         if run is not None:
             run.watched = run.careful = True
-            SUBSCRIPTIONS.version = object()  # a loop that runs now must notice the flags
+            EPOCH.value = object()  # a loop that runs now must notice the flags
 
     # -- finding -------------------------------------------------------------------------------
 

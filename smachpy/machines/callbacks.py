@@ -9,7 +9,6 @@ from smachpy.events.buffer import LONGEST, EventBuffer
 from smachpy.machines.problems import Problems
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import EPOCH
-from smachpy.run.frame import SUBSCRIPTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -63,8 +62,7 @@ class Callbacks:
         problems.function(name, function, call, ours + len(more), optional=False)
         problems.raise_all()
         known.append((function, more))
-        EPOCH.value += 1
-        SUBSCRIPTIONS.version = object()  # a running `_buffered` loop must notice it
+        EPOCH.value = object()
 
     def call_start_cbs(self) -> None:
         """Call the start callbacks; one that raises is reported, the others still run."""
@@ -146,8 +144,7 @@ class Callbacks:
         self.__subscriptions_changed()
 
     def __subscriptions_changed(self) -> None:
-        EPOCH.value += 1
-        SUBSCRIPTIONS.version = object()
+        EPOCH.value = object()
         frame = self._smachpy.frame or self._smachpy.root
         if frame is not None:
             frame.run.watched = True

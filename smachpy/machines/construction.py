@@ -7,6 +7,7 @@ threads and coroutines at once, and an exception inside a `with` leaves no conta
 from __future__ import annotations
 
 import contextlib
+import functools
 import types
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, NoReturn, ParamSpec, TypeVar
@@ -33,25 +34,6 @@ def innermost(kind: type) -> Any:
     return None
 
 
-class _NoneOpen:
-    """Takes the place of the container when none is open: any use of it raises the error.
-
-    The error comes at the use, not at the look-up of the method, so that `StateMachine.add` itself
-    can still be read, by `help` for instance.
-    """
-
-    def __init__(self, kind: type, name: str) -> None:
-        object.__setattr__(self, "_what", (kind.__name__, name))
-
-    def __getattr__(self, _name: str) -> NoReturn:
-        kind, name = object.__getattribute__(self, "_what")
-        opened = [type(container).__name__ for container in OPEN.get()]
-        raise InvalidConstructionError(
-            f"{kind}.{name}: no {kind} is open: got open containers {opened}; expected one. "
-            f"Try `with sm:` around it, or call {name} on the container itself."
-        )
-
-
 class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
     """A method that works on the innermost open container if it is called on the class."""
 
@@ -64,9 +46,21 @@ class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
 
     def __get__(self, instance: Any, owner: type[Any]) -> Callable[P, R_co]:
         container = instance if instance is not None else innermost(owner)
-        if container is None:
-            container = _NoneOpen(owner, self._name)
-        return types.MethodType(self._function, container)
+        if container is not None:
+            return types.MethodType(self._function, container)
+
+        # Raised by the call, not here, so that `StateMachine.add` itself can be read, by `help` for
+        # instance.
+        @functools.wraps(self._function)
+        def refuse(kind: type, *_args: Any, **_kwargs: Any) -> NoReturn:
+            opened = [type(container).__name__ for container in OPEN.get()]
+            raise InvalidConstructionError(
+                f"{kind.__name__}.{self._name}: no {kind.__name__} is open: got open containers "
+                f"{opened}; expected one. Try `with sm:` around it, or call {self._name} on the "
+                "container itself."
+            )
+
+        return types.MethodType(refuse, owner)
 
 
 class Openable:

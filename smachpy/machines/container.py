@@ -177,8 +177,10 @@ class Container(Openable, Callbacks, State):
 
     def __own_problems(self, where: str) -> Iterator[str]:
         """Yield the problems of its options; those of a child are found by `add`."""
-        for problem in retry_problems(self._smachpy.options, self._smachpy.outcomes):
-            yield f"{where}: {problem}"
+        data = self._smachpy
+        if data.options.retry is not None:
+            for problem in retry_problems(data.options, data.outcomes):
+                yield f"{where}: {problem}"
 
     def is_running(self) -> bool:
         """Return whether the container is running."""
@@ -320,7 +322,7 @@ class Container(Openable, Callbacks, State):
         plan = data.plan
         # Compiled again only if something has changed. The windows of a plan refer to one userdata
         # object, so replacing `self.userdata` makes the plan stale as well.
-        if plan is None or plan.userdata is not self.userdata or plan.epoch != EPOCH.value:
+        if plan is None or plan.userdata is not self.userdata or plan.epoch is not EPOCH.value:
             plan = data.plan = self.__current_plan(frame, plan)
         if data.frame is not None or data.callback is not None:
             return self.__run_inside(frame, parent_ud)
@@ -398,11 +400,9 @@ class Container(Openable, Callbacks, State):
         """
         epoch = EPOCH.value  # read first: a change during compilation makes the plan stale again
         if plan is None or plan.userdata is not self.userdata or plan.is_stale():
-            is_root = self._smachpy.root is not None and self._smachpy.options.retry is not None
-            own = self.__own_problems if is_root else lambda _where: ()
-            if any((*own(""), *self.find_problems(""))):
+            if any((*self.__own_problems(""), *self.find_problems(""))):
                 where = frame.path  # expensive, so it is made only for the error text
-                problems = [*own(where), *self.find_problems(where)]
+                problems = (*self.__own_problems(where), *self.find_problems(where))
                 raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
             plan = self._smachpy_compile()
         plan.epoch = epoch

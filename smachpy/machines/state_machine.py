@@ -21,7 +21,7 @@ from smachpy.machines.old_states import adopt_slips
 from smachpy.machines.problems import Problems, unique_names, unknown_name
 from smachpy.machines.state import DataOf, Shown
 from smachpy.run.child import EPOCH, ContainerData
-from smachpy.run.frame import SUBSCRIPTIONS, Frame
+from smachpy.run.frame import Frame
 from smachpy.run.grace import asking, end_visit, forget_visit, leave, request_soon, unknown_outcome
 from smachpy.run.interrupt import Interruption
 from smachpy.run.step import (
@@ -244,7 +244,7 @@ class StateMachine(Container):
                 self._smachpy.next_initial = labels[0]
             else:
                 self._smachpy.initial = labels[0]
-            EPOCH.value += 1
+            EPOCH.value = object()
         if userdata is not None:
             self.userdata.update(userdata)
 
@@ -356,7 +356,7 @@ class StateMachine(Container):
         assert label is not None
         assert data.initial is not None
         # From its second run on, a machine that has none of these is entered by the parent's loop.
-        # Whatever changes one of them increases EPOCH, which makes `plain_plan` stale.
+        # Whatever changes one of them replaces EPOCH's value, which makes `plain_plan` stale.
         callbacks = data.start_cbs or data.transition_cbs or data.termination_cbs
         keys = data.input_keys or data.output_keys
         must_be_called = callbacks or keys or data.listeners or data.buffers
@@ -446,7 +446,7 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
                         plan = nested.plain_plan
                         if (
                             plan is not None
-                            and plan.epoch == EPOCH.value
+                            and plan.epoch is EPOCH.value
                             and plan.userdata is state.userdata
                         ):
                             parent, frame, machine = frame, Frame(), state
@@ -501,8 +501,8 @@ def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
     own because one entry of the buffer records both the end of a step and the begin of the next
     one, with one look at the clock. So a recorded transition costs little more than a plain one.
     """
-    run, subscriptions, container = frame.run, SUBSCRIPTIONS, frame.container
-    version = subscriptions.version
+    run, changes, container = frame.run, EPOCH, frame.container
+    epoch = changes.value
     if frame.data.transition_cbs or run.careful:
         return step
     base, now = frame.path, run.clock.now
@@ -537,7 +537,7 @@ def _buffered(frame: Frame, step: Step, buffer: EventBuffer) -> Following:
             if (
                 container._preempt_requested
                 or frame.visit is not None
-                or subscriptions.version is not version
+                or changes.value is not epoch
             ):
                 # The end of `step` is not in the buffer yet, and an event is about `frame.step`.
                 frame.step = step

@@ -27,13 +27,14 @@ if TYPE_CHECKING:
 
 
 class _Epoch:
-    """Counts changes of anything that plans are compiled from.
+    """Its value is replaced whenever anything changes that a run keeps in another form.
 
-    These are the interfaces of states, and the callbacks, listeners and initial states of machines.
-    A run compares one number instead of asking every state below it whether it has changed.
+    That are the interfaces of states, and the callbacks, initial states, subscribers and controls
+    of machines. A run compares one object instead of asking every state below it whether it has
+    changed. It is no counter: two threads that add to one at once could count one change only.
     """
 
-    value = 0
+    value = object()
 
 
 EPOCH = _Epoch()
@@ -88,7 +89,7 @@ class StateData:
     def changed(self) -> None:
         """Mark the plans of all machines with this state as stale."""
         self.version += 1
-        EPOCH.value += 1
+        EPOCH.value = object()
 
     def copy(self) -> Self:
         """Return the data for a copy of the state, without anything that belongs to a run."""

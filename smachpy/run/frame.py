@@ -16,6 +16,7 @@ from smachpy import log
 from smachpy.context import current_frame
 from smachpy.events import CallbackFailed
 from smachpy.machines.problems import name_of
+from smachpy.run.child import EPOCH
 
 if TYPE_CHECKING:
     from collections import deque
@@ -255,34 +256,25 @@ def _log_error(text: str) -> None:
         report_thread_exception()
 
 
-class _Subscriptions:
-    """Its version is replaced whenever a subscriber, callback or control is added or removed."""
-
-    version = object()
-
-
-SUBSCRIPTIONS = _Subscriptions()
-
-
 class Subscribers:
-    """The subscribers of a frame, valid until `SUBSCRIPTIONS.version` changes.
+    """The subscribers of a frame.
 
     Attributes:
-        version: The `SUBSCRIPTIONS.version` for which they are valid.
+        epoch: The `EPOCH.value` for which they are valid.
         listeners: Those of the container, then those of the containers above.
         buffers: The same for event buffers.
         buffer: The only subscriber, if that is a buffer, else None.
     """
 
-    __slots__ = ("buffer", "buffers", "listeners", "version")
+    __slots__ = ("buffer", "buffers", "epoch", "listeners")
 
     def __init__(
         self,
-        version: object,
+        epoch: object,
         listeners: tuple[Callable[[Event], object], ...],
         buffers: tuple[EventBuffer, ...],
     ) -> None:
-        self.version = version
+        self.epoch = epoch
         self.listeners = listeners
         self.buffers = buffers
         self.buffer = buffers[0] if len(buffers) == 1 and not listeners else None
@@ -385,7 +377,7 @@ class Frame:
         A listener that raises is reported in the log; the others still get the event.
         """
         subscribers = self.subscribers
-        if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
+        if subscribers is None or subscribers.epoch is not EPOCH.value:
             subscribers = self.find_subscribers()
         self.give(subscribers, event)
 
@@ -403,15 +395,15 @@ class Frame:
 
     def find_subscribers(self) -> Subscribers:
         """Look up the subscribers of this frame, and keep them until somebody comes or goes."""
-        version = SUBSCRIPTIONS.version  # read first: a change during the look-up counts as newer
+        epoch = EPOCH.value  # read first: a change during the look-up counts as newer
         if self.dead:  # a thread that was left behind must not publish
-            self.subscribers = Subscribers(version, (), ())
+            self.subscribers = Subscribers(epoch, (), ())
             return self.subscribers
         container, parent = self.container, self.parent
         above = None
         if parent is not None:
             above = parent.subscribers
-            if above is None or above.version is not version:
+            if above is None or above.epoch is not epoch:
                 above = parent.find_subscribers()
         data = self.data
         # The top frame has the root as its container too, so the root's own are taken once.
@@ -419,10 +411,10 @@ class Frame:
             for buffer in data.buffers:
                 buffer.begin(self.here() if parent is None else self.path, self.run.clock)
             if above is None:
-                above = Subscribers(version, data.listeners, data.buffers)
+                above = Subscribers(epoch, data.listeners, data.buffers)
             elif data.listeners or data.buffers:
                 listeners = data.listeners + above.listeners
-                above = Subscribers(version, listeners, data.buffers + above.buffers)
+                above = Subscribers(epoch, listeners, data.buffers + above.buffers)
         self.subscribers = above
         return above
 

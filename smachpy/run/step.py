@@ -14,7 +14,8 @@ from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
 from smachpy.exceptions import InvalidUserCodeError
 from smachpy.machines.problems import missing_init, name_of
 from smachpy.run.callback import call_bounded
-from smachpy.run.frame import SUBSCRIPTIONS, clock_of_run
+from smachpy.run.child import EPOCH
+from smachpy.run.frame import clock_of_run
 from smachpy.run.grace import (
     ask,
     asking,
@@ -160,7 +161,7 @@ class Plan:
     first: Step
 
     def __init__(self, container: Parent) -> None:
-        self.epoch = 0
+        self.epoch: object = None
         self.userdata = container.userdata
         self.steps = {label: make_step(container, label) for label in container._smachpy.children}
 
@@ -402,9 +403,7 @@ def _attempts(
             if timer is not None:
                 timed_out = timer.end(result)
         asked = state._preempt_requested or (frame.visit is not None and frame.visit.is_asked())
-        decision = after_attempt(
-            result, options, attempt, asked=asked, timed_out=timed_out, applies=_applies
-        )
+        decision = after_attempt(result, options, attempt, asked=asked, timed_out=timed_out)
         if isinstance(decision, Again):
             wait, result = decision
             _tell_retried(frame, attempt, wait, result)
@@ -412,9 +411,7 @@ def _attempts(
                 attempt += 1
                 continue
             # Preempted during the pause: decide again without the retry.
-            decision = after_attempt(
-                result, options, attempt, asked=True, timed_out=False, applies=_applies
-            )
+            decision = after_attempt(result, options, attempt, asked=True, timed_out=False)
         if isinstance(decision, BaseException):
             raise decision
         return decision
@@ -511,23 +508,6 @@ class Timeout:
         frame.run.flush_soon()
 
 
-def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
-    """Return whether `wanted` holds for `error`, or for the errors a container wrapped in it.
-
-    If several children of a concurrence have raised, it must hold for all of them: otherwise an
-    unexpected error would disappear beside an expected one. An `ExceptionGroup` that a state has
-    raised itself counts as one error.
-    """
-    if wanted(error):
-        return True
-    cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else None
-    if cause is None:
-        return False
-    if isinstance(cause, ChildErrors):
-        return wanted(cause) or all(_applies(wanted, one) for one in cause.exceptions)
-    return _applies(wanted, cause)
-
-
 # -- events ------------------------------------------------------------------------------------
 
 
@@ -602,16 +582,12 @@ def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
 def only_buffer(frame: Frame) -> EventBuffer | None:
     """Return the event buffer of `frame` if it is the only subscriber, else None."""
     subscribers = frame.subscribers
-    if subscribers is None or subscribers.version is not SUBSCRIPTIONS.version:
+    if subscribers is None or subscribers.epoch is not EPOCH.value:
         subscribers = frame.find_subscribers()
     return subscribers.buffer
 
 
 # -- errors ------------------------------------------------------------------------------------
-
-
-class ChildErrors(ExceptionGroup[Exception]):
-    """The exceptions of a concurrence's children; a group that one child raised is no such one."""
 
 
 def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCodeError:

@@ -30,8 +30,8 @@ from smachpy.run.grace import (
     shutdown_asking,
 )
 from smachpy.run.interrupt import Interruption, use_signals
-from smachpy.run.step import ChildErrors, Step, get_options, run_watched, runner_of
-from smachpy.run.visit import Event, Phase, Why
+from smachpy.run.step import Step, get_options, run_watched, runner_of
+from smachpy.run.visit import ChildErrors, Event, Phase, Why
 from smachpy.util import SHUTDOWN_CHECK
 
 if TYPE_CHECKING:

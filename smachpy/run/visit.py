@@ -15,6 +15,8 @@ from enum import Enum
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from smachpy.exceptions import InvalidUserCodeError
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
@@ -157,7 +159,6 @@ def after_attempt(
     *,
     asked: bool,
     timed_out: bool,
-    applies: Callable[[Callable[[BaseException], bool], BaseException], bool],
 ) -> Any:
     """Decide what follows one attempt at a child with `options`: the first rule that applies.
 
@@ -174,7 +175,6 @@ def after_attempt(
         attempt: Number of this attempt, from 1.
         asked: Anyone except its own timeout has asked it to stop.
         timed_out: Only its own timeout has asked it to stop.
-        applies: Whether a condition holds for an error, or for those a container wrapped in it.
 
     Returns:
         `Again`, the outcome, or the exception to raise.
@@ -186,14 +186,35 @@ def after_attempt(
         return result
     retry = None if asked else options.retry
     if isinstance(result, Exception):
-        if retry is not None and applies(partial(retry.wants, attempt), result):
+        if retry is not None and _applies(partial(retry.wants, attempt), result):
             return Again(retry.wait_s(attempt), result)
         for kind, outcome in options.on_exception.items():
-            if applies(partial(_is_a, kind), result):
+            if _applies(partial(_is_a, kind), result):
                 return outcome
     elif retry is not None and retry.wants(attempt, result):
         return Again(retry.wait_s(attempt), result)
     return result
+
+
+def _applies(wanted: Callable[[BaseException], bool], error: BaseException) -> bool:
+    """Return whether `wanted` holds for `error`, or for the errors a container wrapped in it.
+
+    If several children of a concurrence have raised, it must hold for all of them: otherwise an
+    unexpected error would disappear beside an expected one. An `ExceptionGroup` that a state has
+    raised itself counts as one error.
+    """
+    if wanted(error):
+        return True
+    cause = error.__cause__ if isinstance(error, InvalidUserCodeError) else None
+    if cause is None:
+        return False
+    if isinstance(cause, ChildErrors):
+        return wanted(cause) or all(_applies(wanted, one) for one in cause.exceptions)
+    return _applies(wanted, cause)
+
+
+class ChildErrors(ExceptionGroup[Exception]):
+    """The exceptions of a concurrence's children; a group that one child raised is no such one."""
 
 
 def _is_a(kind: type[BaseException], error: BaseException) -> bool:

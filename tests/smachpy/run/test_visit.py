@@ -133,13 +133,9 @@ def test_a_visit_is_told_armed_and_cleared_in_pairs_on_every_way():
 # -- after an attempt --------------------------------------------------------------------------
 
 
-def plain(wanted, error):
-    return wanted(error)
-
-
 def after_plain_attempt(result, *, attempt=1, asked=False, timed_out=False, **options):
     given = Options(**options)
-    return after_attempt(result, given, attempt, asked=asked, timed_out=timed_out, applies=plain)
+    return after_attempt(result, given, attempt, asked=asked, timed_out=timed_out)
 
 
 def test_the_outcome_stands_if_no_option_wants_anything_else():
