@@ -108,9 +108,7 @@ class Control:
         with self._lock:
             changed, self._paused = self._paused, False
             self._steps = 0
-            waiting = list(self._waiting.values())
-        for event in waiting:
-            event.set()
+        self._wake()
         if changed:  # the listeners are called without the lock
             self._call_listeners()
 
@@ -120,9 +118,7 @@ class Control:
         with self._lock:
             changed, self._paused = not self._paused, True
             self._steps += 1
-            waiting = list(self._waiting.values())[:1]  # one of several branches
-        for event in waiting:
-            event.set()
+        self._wake(1)  # one of several branches
         if changed:
             self._call_listeners()
 
@@ -269,6 +265,13 @@ class Control:
             except Exception as error:  # noqa: BLE001  the user's: logged, the machine goes on
                 log.log_exception(f"{self._path()}: on_change raised {error!r}", error)
 
+    def _wake(self, most: int | None = None) -> None:
+        """Wake the states that wait, or the first `most` of them, to check how they go on."""
+        with self._lock:
+            waiting = list(self._waiting.values())[:most]
+        for event in waiting:
+            event.set()
+
     def _take_step(self) -> bool:
         with self._lock:
             if self._steps == 0:
@@ -345,11 +348,7 @@ class Control:
             frame.run.journal.asked_one(frame, step, override)
         if not ask_child(frame, step, override):
             raise ControlError(path, "it has just ended", self.active())
-        # The state may wait at the gate; all of them check again whether they were called off.
-        with self._lock:
-            waiting = list(self._waiting.values())
-        for event in waiting:
-            event.set()
+        self._wake()  # the state may wait at the gate; each one checks whether it was called off
 
 
 def _frame_of(state: Child) -> Frame | None:

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy import log
-from smachpy.events import Preempted
 from smachpy.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -269,9 +268,7 @@ class Concurrence(Container):
             if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
                 self.call_start_cbs()
             if self._preempt_requested:
-                frame.answered = True
-                frame.emit_own(Preempted, "")
-                return "preempted"
+                return frame.end_preempted()
             self.__run_group(group)
             return self.__outcome(frame, group)
         finally:
@@ -352,8 +349,6 @@ class Concurrence(Container):
 
     def __chosen(self, group: Group, answer: Any) -> list[ChildBranch]:
         """Return the branches to preempt after `child_termination_cb` returned `answer`."""
-        if answer is True or answer is False or answer is None:
-            return group.running() if answer else []
         labels = [answer] if isinstance(answer, str) else answer
         if not isinstance(labels, (list, tuple, set, frozenset)):
             return group.running() if answer else []
@@ -391,9 +386,7 @@ class Concurrence(Container):
         frame.answered = asked and bool(answered)
         default, known = self._smachpy.default_outcome, self._smachpy.outcomes
         if frame.answered and ("preempted" in known or not default):
-            if frame.run.watched:
-                frame.emit_own(Preempted, "")
-            return "preempted"
+            return frame.end_preempted()
         return default
 
     def __ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:

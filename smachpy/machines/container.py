@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.clock import RealClock
 from smachpy.context import THREAD
-from smachpy.events import Preempted
 from smachpy.exceptions import InconsistentMachineError, InvalidStateError
 from smachpy.introspection import Structure
 from smachpy.log import MESSAGES
@@ -375,10 +374,7 @@ class Container(Openable, Callbacks, State):
         """Return the outcome of the container after one of its callbacks was interrupted."""
         if frame.dead:
             raise Interruption
-        if not frame.answered:  # else the event is out already
-            frame.answered = True
-            frame.emit_own(Preempted, "")
-        return "preempted"
+        return "preempted" if frame.answered else frame.end_preempted()
 
     def __call_at_end(self, frame: Frame, outcome: str) -> str:
         labels, frame.step = self._smachpy_terminal_labels(frame), None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.events import Iterated, Preempted
+from smachpy.events import Iterated
 from smachpy.exceptions import (
     InvalidStateError,
     InvalidUserCodeError,
@@ -264,7 +264,7 @@ class Iterator(Container):
         for index in self.__numbers(frame):
             frame.step = step  # first write the step, then read the flag: see `grace.ask`
             if self._preempt_requested:
-                return self.__preempted(frame, step)
+                return frame.end_preempted(step.label)
             if run.watched:
                 frame.emit_own(Iterated, index)
             again = True
@@ -273,7 +273,7 @@ class Iterator(Container):
                 # An operator jumps to the child itself after a pause that cancelled it.
                 again = why is Why.JUMPED
             if why is Why.STOPPED:
-                return self.__preempted(frame, step)
+                return frame.end_preempted(step.label)
             if why is Why.ANSWERED:
                 frame.answered = True
                 return outcome
@@ -327,11 +327,6 @@ class Iterator(Container):
             if self._preempt_requested or frame.visit is not None:  # called off during the pause
                 return "preempted"
         return run_watched(frame, step) if run.watched else step.execute(step.userdata)
-
-    def __preempted(self, frame: Frame, step: Step) -> str:
-        frame.answered = True
-        frame.emit_own(Preempted, step.label)
-        return "preempted"
 
     def __iterate(self, frame: Frame) -> IteratorOf[Any]:
         """Yield the items; an exception of the user's iterable names the iterator."""

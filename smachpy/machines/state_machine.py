@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from smachpy import log
-from smachpy.events import Jumped, Preempted
+from smachpy.events import Jumped
 from smachpy.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -631,8 +631,7 @@ def _follow_interrupted(frame: Frame) -> Following:
 
 def _preempted(frame: Frame, step: Step) -> End:
     """End because of a preempt; `step` was not started, or its outcome is not followed."""
-    frame.answered = True
-    frame.emit_own(Preempted, step.label)
+    frame.end_preempted(step.label)
     return PREEMPTED
 
 

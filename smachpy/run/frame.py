@@ -14,7 +14,7 @@ from actionlib_core.clock import current_clock
 from actionlib_core.clock._serial import report_thread_exception
 from smachpy import log
 from smachpy.context import current_frame
-from smachpy.events import CallbackFailed
+from smachpy.events import CallbackFailed, Preempted
 from smachpy.machines.problems import name_of
 from smachpy.run.child import EPOCH
 
@@ -435,6 +435,16 @@ class Frame:
             run.flush()
         clock = run.clock
         self.publish(kind(path, clock.now(), clock.time_ns(), *fields))
+
+    def end_preempted(self, label: str = "") -> str:
+        """Note that the container ends because of a preempt, and return that outcome.
+
+        Args:
+            label: The child that was not started, or whose outcome is not followed; "" for none.
+        """
+        self.answered = True
+        self.emit_own(Preempted, label)
+        return "preempted"
 
     def note(self, path: str, kind: Callable[..., Event], *fields: Any) -> None:
         """Queue an event while the lock is held; the next `Run.flush` or event publishes it."""
