@@ -15,7 +15,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections import defaultdict
-from itertools import count, repeat
+from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from smachpy import log
@@ -385,25 +385,31 @@ def thin(entries: Sequence[Any]) -> tuple[list[Any], int]:
     """
     found: defaultdict[str, _Kept] = defaultdict(_Kept)
     newest = -1  # always kept: a gap is shown by the event that follows it
-    # The place of an event is twice the number of its entry, one more if the entry has two.
-    for place, (t, what, left, _, entered) in zip(count(0, 2), _each(entries), strict=False):
-        if t is not None:
-            if left is not None:
-                found[f"{what}/{left.label}"].close(place)
-            if entered is not None:
-                found[f"{what}/{entered.label}"].open(place + 1)
-            newest = place + (entered is not None)
-        elif not isinstance(what, (_Begin, _Dropped)):
+    for place, (_, what, left, _, entered) in enumerate(_single_events(entries)):
+        if left is not None:
+            found[f"{what}/{left.label}"].close(place)
+        elif entered is not None:
+            found[f"{what}/{entered.label}"].open(place)
+        elif isinstance(what, (_Begin, _Dropped)):
+            continue
+        else:
             _find(what, place, found)
-            newest = place
+        newest = place
     kept = {newest}.union(
         *((one.opened, one.closed, one.first, *one.within.values()) for one in found.values())
     )
     return _without_the_rest(entries, kept)
 
 
-def _each(entries: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
-    return zip(*[iter(entries)] * SLOTS, strict=True)
+def _single_events(entries: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
+    """Yield the entries; one that has two events becomes two."""
+    for entry in zip(*[iter(entries)] * SLOTS, strict=True):
+        t, what, left, outcome, entered = entry
+        if left is not None and entered is not None:
+            yield t, what, left, outcome, None
+            yield t, what, None, None, entered
+        else:
+            yield entry
 
 
 def _find(what: Any, place: int, found: dict[str, _Kept]) -> None:
@@ -425,23 +431,16 @@ def _without_the_rest(entries: Sequence[Any], kept: set[int]) -> tuple[list[Any]
     thinned: list[Any] = []
     begun: list[Any] = []  # the last `_Begin` note, needed by the next entry that is kept
     dropped = missing = 0  # missing: since the last entry that is kept
-    for place, entry in zip(count(0, 2), _each(entries), strict=False):
-        t, what, left, outcome, entered = entry
-        if t is None and isinstance(what, _Begin):
+    for place, entry in enumerate(_single_events(entries)):
+        what = entry[1]
+        if isinstance(what, _Begin):
             begun = list(entry)
-            continue
-        if t is None and isinstance(what, _Dropped):
+        elif isinstance(what, _Dropped):
             missing += what.events
-            continue
-        parts: list[tuple[int, tuple[Any, ...]]] = [(place + (entered is not None), entry)]
-        if left is not None and entered is not None:
-            end, begin = (t, what, left, outcome, None), (t, what, None, None, entered)
-            parts = [(place, end), (place + 1, begin)]
-        for at, part in parts:
-            if at not in kept:
-                missing, dropped = missing + 1, dropped + 1
-                continue
+        elif place not in kept:
+            missing, dropped = missing + 1, dropped + 1
+        else:
             thinned += begun + ([None, _Dropped(missing), *NOTHING] if missing else [])
-            thinned += part
+            thinned += entry
             begun, missing = [], 0
     return thinned + begun, dropped
