@@ -320,7 +320,13 @@ class StateMachine(Container):
         """Return the children and the edges between them."""
         children = self._smachpy.children
         edges = tuple(
-            TransitionRecord(label, outcome, target or outcome, target not in children, not target)
+            TransitionRecord(
+                label,
+                outcome,
+                target or outcome,
+                target_is_outcome=not target or target not in children,
+                implicit=not target,
+            )
             for label in children
             for outcome, target in self.__targets(label).items()
         )
