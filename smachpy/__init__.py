@@ -49,13 +49,13 @@ from smachpy.machines.concurrence import any_of as any_of
 from smachpy.machines.concurrence import n_of as n_of
 from smachpy.machines.container import Container as Container
 from smachpy.machines.iterator import Iterator as Iterator
-from smachpy.machines.sequence import Sequence as Sequence
 from smachpy.machines.state import CBState as CBState
 from smachpy.machines.state import Options as Options
 from smachpy.machines.state import State as State
 from smachpy.machines.state import get_options as get_options
 from smachpy.machines.state import set_options as set_options
 from smachpy.machines.state import state as state
+from smachpy.machines.state_machine import Sequence as Sequence
 from smachpy.machines.state_machine import StateMachine as StateMachine
 from smachpy.mission_info import mission as mission
 from smachpy.run.frame import current_state as current_state

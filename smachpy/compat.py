@@ -11,7 +11,7 @@ MODULES: Final = {
     "smachpy.container": "smachpy.machines.container",
     "smachpy.iterator": "smachpy.machines.iterator",
     "smachpy.monitor_state": "smachpy.actions.monitor_state",
-    "smachpy.sequence": "smachpy.machines.sequence",
+    "smachpy.sequence": "smachpy.machines.state_machine",
     "smachpy.service_state": "smachpy.actions.service_state",
     "smachpy.simple_action_state": "smachpy.actions.simple_action_state",
     "smachpy.state": "smachpy.machines.state",

@@ -1,4 +1,4 @@
-"""The state machine: runs one child at a time; each outcome leads to the next child."""
+"""The state machine and the sequence: one child at a time; each outcome leads to the next child."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ from smachpy.slips import accepting, accepts
 from smachpy.util import is_shutdown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Sequence as SequenceOf
     from typing import Unpack
 
     from smachpy.events.buffer import EventBuffer
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from smachpy.run.step import Following, Step
     from smachpy.userdata.user_data import UserData
 
-__all__ = ["StateMachine"]
+__all__ = ["Sequence", "StateMachine"]
 
 
 def _nested(step: Step) -> MachineData | None:
@@ -174,9 +175,14 @@ class StateMachine(Container):
         """
         connectors = unique_names(connector_outcomes, "connector_outcomes")
         self._smachpy_add(label, state, transitions, remapping, constants)
-        open_ends = tuple(o for o in connectors if self._smachpy.transitions[label].get(o) is None)
-        self._smachpy.follow_connectors = (label, open_ends)
+        self.__connect(label, connectors)
         return state
+
+    def __connect(self, label: str, connectors: Iterable[str]) -> None:
+        """Let the outcomes of a child that have no transition lead to the child added next."""
+        given = self._smachpy.transitions[label]
+        open_ends = tuple(outcome for outcome in connectors if given.get(outcome) is None)
+        self._smachpy.follow_connectors = (label, open_ends)
 
     def _smachpy_add(
         self,
@@ -209,6 +215,8 @@ class StateMachine(Container):
             before, outcomes = self._smachpy.follow_connectors
             self._smachpy.transitions[before].update(dict.fromkeys(outcomes, label))
             self._smachpy.follow_connectors = None
+        if self._smachpy.connector_outcome:
+            self.__connect(label, [self._smachpy.connector_outcome])
         if self._smachpy.initial is None:
             self._smachpy.initial = label
         return state
@@ -216,7 +224,7 @@ class StateMachine(Container):
     # -- structure -----------------------------------------------------------------------------
 
     def set_initial_state(
-        self, initial_states: Sequence[str], userdata: UserData | None = None
+        self, initial_states: SequenceOf[str], userdata: UserData | None = None
     ) -> None:
         """Choose the initial state of the next run only, and update the userdata.
 
@@ -375,6 +383,55 @@ class StateMachine(Container):
         if logged:
             log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
         return outcome
+
+
+class Sequence(StateMachine):
+    """States one after another: `connector_outcome` leads to the state added next.
+
+    Args:
+        outcomes: Outcomes.
+        connector_outcome: Outcome that connects the states.
+        input_keys: Keys copied from the parent's userdata when it starts.
+        output_keys: Keys copied to the parent's userdata when it ends.
+        name: Name of the machine when it is the root.
+        userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
+        **options: See `StateOptions`.
+    """
+
+    _smachpy_kind: ClassVar[Kind] = "sequence"
+
+    def __init__(
+        self,
+        outcomes: Iterable[str],
+        connector_outcome: str,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        *,
+        name: str | None = None,
+        userdata_type: type | None = None,
+        **options: Unpack[StateOptions],
+    ) -> None:
+        problems = Problems(type(self).__name__)
+        with problems:
+            super().__init__(
+                outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+            )
+        self._smachpy.connector_outcome = problems.word("connector_outcome", connector_outcome)
+        problems.raise_all()
+
+    @construction_method
+    def add(  # type: ignore[override]  # as in SMACH: no constants
+        self: Sequence,
+        label: str,
+        state: State,
+        transitions: Mapping[str, str | None] | None = None,
+        remapping: Mapping[str, str] | None = None,
+    ) -> State:
+        """Add a state after the previous one; the arguments are those of `StateMachine.add`.
+
+        An explicit transition for the connector outcome takes precedence over the connection.
+        """
+        return self._smachpy_add(label, state, transitions, remapping, None)
 
 
 def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see below

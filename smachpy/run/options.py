@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from smachpy.exceptions import InvalidStateError
 from smachpy.machines.problems import Problems, as_number
 
 if TYPE_CHECKING:
@@ -103,24 +102,6 @@ NO_OPTIONS = Options()
 NAMES = tuple(field.name for field in dataclasses.fields(Options))
 
 
-def as_retry(value: Any) -> Retry | None:
-    """Convert a `Retry`, a tuple (attempts, backoff, on), a number of attempts, or None.
-
-    Raises:
-        InvalidStateError: it is none of these, or a part of it is wrong.
-    """
-    if value is None or isinstance(value, Retry):
-        return value
-    if isinstance(value, tuple) and 1 <= len(value) <= 3:  # noqa: PLR2004  the three fields
-        return Retry(*value)
-    if as_number(value) is not None:
-        return Retry(value)
-    raise InvalidStateError(
-        f"retry: got {value!r}; expected Retry(attempts, backoff, on), that as a tuple, or a "
-        "number of attempts."
-    )
-
-
 def _results(problems: Problems, on: Any) -> tuple[Any, ...]:
     found = (on,) if isinstance(on, (str, type)) or not isinstance(on, Iterable) else tuple(on)
     wrong = [
@@ -163,9 +144,18 @@ def _preempt_timeout(problems: Problems, name: str, given: Any) -> Any:
     return given if isinstance(given, str) and given == "inherit" else problems.seconds(name, given)
 
 
-def _retry(problems: Problems, _name: str, given: Any) -> Retry | None:
+def _retry(problems: Problems, name: str, given: Any) -> Retry | None:
+    if given is None or isinstance(given, Retry):
+        return given
     with problems:
-        return as_retry(given)
+        if isinstance(given, tuple) and 1 <= len(given) <= 3:  # noqa: PLR2004  the three fields
+            return Retry(*given)
+        if as_number(given) is not None:
+            return Retry(given)
+        problems.add(
+            f"{name}: got {given!r}; expected Retry(attempts, backoff, on), that as a tuple, or a "
+            "number of attempts."
+        )
     return None
 
 

@@ -399,9 +399,13 @@ def execute_root(root: Parent, execute: Callable[[Any], Any], parent_ud: Any) ->
                 if end is not None:
                     end(outcome)
         finally:
-            # A request that arrived while the run was ending was for that run.
-            if root._smachpy.frame is None:
-                root._preempt_requested = False
+            _forget_late_request(root)
+
+
+def _forget_late_request(root: Parent) -> None:
+    """Clear the flag of a request that arrived while the run was ending: it was for that run."""
+    if root._smachpy.frame is None:
+        root._preempt_requested = False
 
 
 def already_runs(path: str) -> InvalidStateError:

@@ -13,9 +13,8 @@ from smachpy.machines import concurrence, container, iterator, sequence, state, 
 from smachpy.machines.concurrence import Concurrence
 from smachpy.machines.container import Container
 from smachpy.machines.iterator import Iterator
-from smachpy.machines.sequence import Sequence
 from smachpy.machines.state import CBState, State
-from smachpy.machines.state_machine import StateMachine
+from smachpy.machines.state_machine import Sequence, StateMachine
 from smachpy.userdata import user_data
 from smachpy.userdata.user_data import Const, Remapper, UserData, get_const
 from smachpy.util import (
