@@ -578,12 +578,23 @@ def request_soon(container: Parent, only: Frame | None = None) -> None:
 def call_override(state: Child, frame: Frame | None, path: str) -> None:
     """Call the overridden `request_preempt` of a state that was asked; the body of its thread."""
     REQUESTING.set(state)
+
+    def ask_it() -> None:
+        state.request_preempt()  # looked up in here, as a property of the user's may raise
+
+    _call_reported(ask_it, _request_of(state), frame, path)
+
+
+def _call_reported(
+    function: Callable[[], object], named: object, frame: Frame | None, path: str
+) -> None:
+    """Call the user's `function` in a thread of its own; what it raises is reported as `named`."""
     try:
-        state.request_preempt()
-    except BaseException as error:  # the end of this thread: reported, nobody else is affected
-        if frame is None:
+        function()
+    except BaseException as error:  # the end of this thread: nobody else is affected
+        if frame is None:  # outside of any machine: the clock reports what its threads raise
             raise
-        frame.note_failure(path or frame.path, _request_of(state), error)
+        frame.note_failure(path or frame.path, named, error)
         frame.run.flush()
 
 
@@ -619,20 +630,9 @@ class PreemptNotice:
                 self._asked = False  # before the call: a request during it needs another one
                 function = self._function
                 if function is not None:
-                    self._call(function)
+                    _call_reported(function, function, self._frame, self._path)
             finally:
                 self._busy.release()
-
-    def _call(self, function: Callable[[], object]) -> None:
-        frame = self._frame
-        if frame is None:  # outside of any machine: the clock reports what its threads raise
-            function()
-            return
-        try:
-            function()
-        except BaseException as error:  # noqa: BLE001  the user's code in its own thread: reported
-            frame.note_failure(self._path, function, error)
-            frame.run.flush()
 
 
 def note_serviced(state: Child) -> None:
