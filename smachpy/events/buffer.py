@@ -16,7 +16,7 @@ import sys
 import threading
 from collections import defaultdict
 from itertools import repeat
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias
 
 from smachpy import log
 from smachpy.events import (
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from smachpy.events import Event
 
 __all__ = ["EventBuffer"]
+
+SubscriberKind: TypeAlias = Literal["listeners", "buffers"]
 
 LONGEST = 100_000
 """Number of entries that wait for a reader. An entry is one event, or a transition: two events."""
@@ -77,8 +79,8 @@ class _Dropped(NamedTuple):
 class Buffered(Protocol):
     """The part of a container that a buffer uses."""
 
-    def _smachpy_add_buffer(self, buffer: EventBuffer) -> None: ...
-    def _smachpy_remove_buffer(self, buffer: EventBuffer) -> None: ...
+    def _smachpy_attach(self, kind: SubscriberKind, subscriber: object) -> None: ...
+    def _smachpy_detach(self, kind: SubscriberKind, subscriber: object) -> None: ...
 
 
 class EventBuffer:
@@ -116,7 +118,6 @@ class EventBuffer:
         self._cut = threading.Lock()  # held while entries are taken away
         self._missing = 0
         self.path = ""
-        self._machine = machine
         self._on_news = on_news
         self._name = name
         self._read_path = ""
@@ -126,10 +127,12 @@ class EventBuffer:
         self._clock: Clock | None = None
         self._offset_ns = 0
         self._last_ns = 0
+        self._machine = machine
+        machine._smachpy_attach("buffers", self)
 
     def close(self) -> None:
         """Stop taking events; those in the buffer can still be read. May be called twice."""
-        self._machine._smachpy_remove_buffer(self)
+        self._machine._smachpy_detach("buffers", self)
 
     def read(self) -> list[dict[str, Any]]:
         """Return the records (`smachpy.events.to_record`) since the last call, in order.
@@ -296,7 +299,6 @@ class RawEventBuffer(EventBuffer):
 
     def __init__(self, machine: Buffered) -> None:
         super().__init__(machine, limit=sys.maxsize)
-        machine._smachpy_add_buffer(self)
 
     def take(self, event: Event) -> None:
         """Append an event."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from smachpy import log
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from smachpy.events import Event
+    from smachpy.events.buffer import SubscriberKind
     from smachpy.run.child import Callback
     from smachpy.userdata.user_data import UserData
 
@@ -103,15 +105,8 @@ class Callbacks:
         problems = Problems("subscribe")
         problems.function("listener", listener, "listener(event)", 1, optional=False)
         problems.raise_all()
-        data = self._smachpy
-        data.listeners = (*data.listeners, listener)
-        self.__subscriptions_changed()
-
-        def unsubscribe() -> None:
-            data.listeners = tuple(item for item in data.listeners if item is not listener)
-            self.__subscriptions_changed()
-
-        return unsubscribe
+        self._smachpy_attach("listeners", listener)
+        return partial(self._smachpy_detach, "listeners", listener)
 
     def event_buffer(
         self, on_news: Callable[[], object] | None = None, *, limit: int = LONGEST, name: str = ""
@@ -127,20 +122,18 @@ class Callbacks:
         problems.function("on_news", on_news, "on_news()", 0)
         problems.whole("limit", limit, 0, "a whole number >= 0")
         problems.raise_all()
-        made = EventBuffer(self, on_news, limit=limit, name=name)
-        self._smachpy_add_buffer(made)
-        return made
+        return EventBuffer(self, on_news, limit=limit, name=name)
 
     tape = event_buffer  # its name in the first release
 
-    def _smachpy_add_buffer(self, buffer: EventBuffer) -> None:
+    def _smachpy_attach(self, kind: SubscriberKind, subscriber: object) -> None:
         data = self._smachpy
-        data.buffers = (*data.buffers, buffer)
+        setattr(data, kind, (*getattr(data, kind), subscriber))
         self.__subscriptions_changed()
 
-    def _smachpy_remove_buffer(self, buffer: EventBuffer) -> None:
+    def _smachpy_detach(self, kind: SubscriberKind, subscriber: object) -> None:
         data = self._smachpy
-        data.buffers = tuple(item for item in data.buffers if item is not buffer)
+        setattr(data, kind, tuple(x for x in getattr(data, kind) if x is not subscriber))
         self.__subscriptions_changed()
 
     def __subscriptions_changed(self) -> None:
