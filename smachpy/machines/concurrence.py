@@ -386,7 +386,7 @@ class Concurrence(Container):
         frame.answered = asked and bool(answered)
         default, known = self._smachpy.default_outcome, self._smachpy.outcomes
         if frame.answered and ("preempted" in known or not default):
-            return frame.end_preempted()
+            return frame.end_preempted() if frame.run.watched else "preempted"
         return default
 
     def __ask_callback(self, frame: Frame, outcomes: dict[str, str | None]) -> str | None:
