@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy import log
@@ -42,17 +42,16 @@ if TYPE_CHECKING:
 __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
 
 
+@dataclass(slots=True, eq=False)
 class ConcurrenceData(ContainerData):
     """The library's data of one concurrence; see the arguments of `Concurrence`."""
 
-    __slots__ = _kept = ("child_termination_cb", "default_outcome", "outcome_cb", "rules")
+    rules: tuple[tuple[str, Rule], ...] = ()
+    default_outcome: str = ""
+    outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None
+    child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.rules: tuple[tuple[str, Rule], ...] = ()
-        self.default_outcome = ""
-        self.outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None
-        self.child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None
+    _kept = ("rules", "default_outcome", "outcome_cb", "child_termination_cb")
 
 
 class Concurrence(Container):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.events import Iterated
@@ -40,26 +40,21 @@ _PLAIN = frozenset({list, tuple, range, set, dict, str})  # iterating runs no co
 _END = object()
 
 
+@dataclass(slots=True, eq=False)
 class IteratorData(ContainerData):
     """The library's data of one iterator; see the arguments of `Iterator`."""
 
-    __slots__ = _kept = (
-        "break_outcomes",
-        "exhausted_outcome",
-        "final_outcome_map",
-        "items",
-        "items_label",
-        "loop_outcomes",
-    )
+    items: Any = ()
+    items_label: str = ""
+    exhausted_outcome: str = ""
+    loop_outcomes: tuple[str, ...] = ()
+    break_outcomes: tuple[str, ...] = ()
+    final_outcome_map: dict[str, str] = field(default_factory=dict)
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.items: Any = ()
-        self.items_label = ""
-        self.exhausted_outcome = ""
-        self.loop_outcomes: tuple[str, ...] = ()
-        self.break_outcomes: tuple[str, ...] = ()
-        self.final_outcome_map: dict[str, str] = {}
+    _kept = (
+        *("items", "items_label", "exhausted_outcome"),
+        *("loop_outcomes", "break_outcomes", "final_outcome_map"),
+    )
 
 
 class Iterator(Container):

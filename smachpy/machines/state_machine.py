@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from smachpy import log
@@ -61,6 +61,7 @@ def _nested(step: Step) -> MachineData | None:
     return state._smachpy if getattr(execute, "__func__", None) is Container.execute else None
 
 
+@dataclass(slots=True, eq=False)
 class MachineData(ContainerData):
     """What the library knows of one state machine.
 
@@ -72,21 +73,13 @@ class MachineData(ContainerData):
         connector_outcome: Of a `Sequence`: the outcome that connects its children.
     """
 
-    __slots__ = _kept = (
-        "connector_outcome",
-        "follow_connectors",
-        "initial",
-        "next_initial",
-        "transitions",
-    )
+    transitions: dict[str, dict[str, str | None]] = field(default_factory=dict)
+    initial: str | None = None
+    next_initial: str | None = None
+    follow_connectors: tuple[str, tuple[str, ...]] | None = None
+    connector_outcome: str = ""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.transitions: dict[str, dict[str, str | None]] = {}
-        self.initial: str | None = None
-        self.next_initial: str | None = None
-        self.follow_connectors: tuple[str, tuple[str, ...]] | None = None
-        self.connector_outcome = ""
+    _kept = ("transitions", "initial", "next_initial", "follow_connectors", "connector_outcome")
 
 
 class StateMachine(Container):

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from smachpy.machines.problems import unique_names
@@ -40,6 +41,7 @@ class _Epoch:
 EPOCH = _Epoch()
 
 
+@dataclass(slots=True, eq=False)
 class StateData:
     """The library's data of one state.
 
@@ -56,28 +58,15 @@ class StateData:
         code: The user's functions that get its userdata, and the messages made from it.
     """
 
-    __slots__ = (
-        "code",
-        "input_keys",
-        "is_async",
-        "options",
-        "outcomes",
-        "output_keys",
-        "preempt_callbacks",
-        "version",
-        "with_hooks",
-    )
-
-    def __init__(self) -> None:
-        self.outcomes: tuple[str, ...] = ()
-        self.input_keys: tuple[str, ...] = ()
-        self.output_keys: tuple[str, ...] = ()
-        self.options = NO_OPTIONS
-        self.version = 0
-        self.with_hooks: tuple[Options, Options] | None = None
-        self.is_async = False
-        self.code: tuple[Any, ...] = ()
-        self.preempt_callbacks: list[Callable[[], object]] = []
+    outcomes: tuple[str, ...] = ()
+    input_keys: tuple[str, ...] = ()
+    output_keys: tuple[str, ...] = ()
+    options: Options = NO_OPTIONS
+    version: int = 0
+    with_hooks: tuple[Options, Options] | None = None
+    is_async: bool = False
+    code: tuple[Any, ...] = ()
+    preempt_callbacks: list[Callable[[], object]] = field(default_factory=list)
 
     def add(self, name: str, names: Iterable[str]) -> None:
         """Add outcomes or keys to the attribute `name`."""
@@ -99,6 +88,7 @@ class StateData:
         return made
 
 
+@dataclass(slots=True, eq=False)
 class ContainerData(StateData):
     """The library's data of one container.
 
@@ -128,58 +118,33 @@ class ContainerData(StateData):
         end_waiters: Events to set when it stops running.
     """
 
-    __slots__ = (
-        "answered",
-        "buffers",
-        "callback",
-        "children",
-        "context_kwargs",
-        "control",
-        "end_waiters",
-        "frame",
-        "is_passing_on",
-        "journal",
-        "listeners",
-        "lock",
-        "open_tokens",
-        "origin",
-        "plain_plan",
-        "plan",
-        "remappings",
-        "root",
-        "start_cbs",
-        "termination_cbs",
-        "transition_cbs",
-    )
-    _kept: ClassVar[tuple[str, ...]] = ()
+    children: dict[str, Any] = field(default_factory=dict)
+    remappings: dict[str, dict[str, str]] = field(default_factory=dict)
+    start_cbs: list[Callback] = field(default_factory=list)
+    transition_cbs: list[Callback] = field(default_factory=list)
+    termination_cbs: list[Callback] = field(default_factory=list)
+    open_tokens: list[Any] = field(default_factory=list)
+    context_kwargs: dict[str, Any] = field(default_factory=dict)
+    frame: Frame | None = None
+    root: Frame | None = None
+    lock: threading.RLock | None = None
+    plan: Any = None
+    plain_plan: Any = None
+    listeners: tuple[Callable[[Event], object], ...] = ()
+    buffers: tuple[EventBuffer, ...] = ()
+    control: Gate | None = None
+    journal: RunJournal | None = None
+    callback: Any = None  # a smachpy.run.callback.CallbackFrame, which imports this module
+    answered: bool = False
+    origin: Origin | None = None
+    is_passing_on: bool = False
+    end_waiters: list[ClockEvent] = field(default_factory=list)
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.children: dict[str, Any] = {}
-        self.remappings: dict[str, dict[str, str]] = {}
-        self.start_cbs: list[Callback] = []
-        self.transition_cbs: list[Callback] = []
-        self.termination_cbs: list[Callback] = []
-        self.open_tokens: list[Any] = []
-        self.context_kwargs: dict[str, Any] = {}
-        self.frame: Frame | None = None
-        self.root: Frame | None = None
-        self.lock: threading.RLock | None = None
-        self.plan: Any = None
-        self.plain_plan: Any = None
-        self.listeners: tuple[Callable[[Event], object], ...] = ()
-        self.buffers: tuple[EventBuffer, ...] = ()
-        self.control: Gate | None = None
-        self.journal: RunJournal | None = None
-        self.callback: Any = None  # a smachpy.run.callback.CallbackFrame, which imports this module
-        self.answered = False
-        self.origin: Origin | None = None
-        self.is_passing_on = False
-        self.end_waiters: list[ClockEvent] = []
+    _kept: ClassVar[tuple[str, ...]] = ()
 
     def copy(self) -> Self:
         """Return the data for a copy of the container: its structure and callbacks only."""
-        made = super().copy()
+        made = StateData.copy(self)  # no `super()`: a dataclass with slots is another class
         own = ("children", "remappings", "start_cbs", "transition_cbs", "termination_cbs")
         for name in (*own, *self._kept):
             value = getattr(self, name)
