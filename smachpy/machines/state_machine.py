@@ -437,10 +437,6 @@ def _run(base: Frame, step: Step) -> End:  # noqa: C901, PLR0912, PLR0915  see b
     `parent`. Every other container is called; `Container.execute` does the same steps as written
     out here. While somebody watches, all containers are called, because the events of a child go
     around its call.
-
-    Args:
-        base: The frame of this machine.
-        step: The child with which it begins.
     """
     frame, run, first = base, base.run, base.first
     machine: Any = base.container

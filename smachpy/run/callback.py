@@ -118,14 +118,7 @@ def call_bounded(
 ) -> Any:
     """Call the user's `function` for `container`; after a preempt the container's grace limits it.
 
-    Args:
-        container: The container to which the callback belongs.
-        parent: The frame in which it runs: the container's own, or that of the container above.
-        function: The callback.
-        arguments: Its arguments.
-
-    Returns:
-        Its result.
+    It runs in the frame `parent`: the container's own, or that of the container above.
 
     Raises:
         Interruption: it outlasted the grace; with `parent.dead`, its thread was left behind.

@@ -263,12 +263,8 @@ def runner_of(
 ) -> Callable[[Any], Any]:
     """Return `execute` wrapped by `options`, or `execute` itself if there is nothing to add.
 
-    Args:
-        state: The child.
-        options: Its options.
-        execute: Runs the child.
-        is_async: `execute` is a coroutine function.
-        is_callback: `execute` is the user's override of a container's `execute`.
+    With `is_async` it is a coroutine function, with `is_callback` the user's override of a
+    container's `execute`.
     """
     if is_async:
         execute = _run_async(state, execute)
