@@ -9,7 +9,8 @@ from smachpy.exceptions import (
     SmachError,
 )
 from smachpy.log import logdebug, logerr, loginfo, logwarn, set_loggers
-from smachpy.machines import concurrence, container, iterator, sequence, state, state_machine
+from smachpy.machines import concurrence, container, iterator, state, state_machine
+from smachpy.machines import state_machine as sequence
 from smachpy.machines.concurrence import Concurrence
 from smachpy.machines.container import Container
 from smachpy.machines.iterator import Iterator
