@@ -15,6 +15,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections import defaultdict
+from dataclasses import dataclass, field
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias
 
@@ -343,6 +344,7 @@ _WITHIN = {
 """Kind -> prefix of the path in the key under which `thin` keeps events of this kind."""
 
 
+@dataclass(slots=True, eq=False)
 class _Kept:
     """The places of the events of one state, or of its goals, that are kept.
 
@@ -353,11 +355,10 @@ class _Kept:
         within: Slot -> the newest event of that slot since then.
     """
 
-    __slots__ = ("closed", "first", "opened", "within")
-
-    def __init__(self) -> None:
-        self.opened = self.closed = self.first = -1
-        self.within: dict[str, int] = {}
+    first: int = -1
+    opened: int = -1
+    closed: int = -1
+    within: dict[str, int] = field(default_factory=dict)
 
     def open(self, place: int) -> None:
         self.opened, self.closed = place, -1

@@ -14,6 +14,7 @@ import inspect
 import sys
 import threading
 from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -46,6 +47,7 @@ PATIENCE_S = 0.1  # time for an interrupted state to unwind its `finally` blocks
 LONGEST_PATIENCE_S = 1.0  # between two interruptions of a thread that cannot be left behind
 
 
+@dataclass(slots=True, eq=False)
 class Visit:
     """One visit of the child that `frame` runs.
 
@@ -59,34 +61,18 @@ class Visit:
         override_call: The thread of its own `request_preempt`, if it has one that was called.
     """
 
-    __slots__ = (
-        "_frame",
-        "_injected",
-        "_patience",
-        "_timer",
-        "_timer_number",
-        "by_timeout",
-        "override",
-        "override_call",
-        "phase",
-        "serviced",
-        "step",
-        "timeout",
-    )
-
-    def __init__(self, frame: Frame, step: Any, phase: Phase = Phase.RUNNING) -> None:
-        self.phase = phase
-        self.step = step
-        self.by_timeout = False
-        self.serviced = False
-        self.timeout: float | None = None
-        self.override: Override | None = None
-        self._frame = frame
-        self._injected = 0  # the thread for which an exception is pending, 0 for none
-        self.override_call: Task | None = None
-        self._patience = PATIENCE_S
-        self._timer: Timer | None = None
-        self._timer_number = 0
+    _frame: Frame
+    step: Any
+    phase: Phase = Phase.RUNNING
+    by_timeout: bool = False
+    serviced: bool = False
+    timeout: float | None = None
+    override: Override | None = None
+    override_call: Task | None = None
+    _injected: int = 0  # the thread for which an exception is pending, 0 for none
+    _patience: float = PATIENCE_S
+    _timer: Timer | None = None
+    _timer_number: int = 0
 
     def happen(self, event: Event) -> None:
         """Apply `event`: change the phase, then perform the effects; with the run's lock held."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import UserDict, UserList, deque
 from collections.abc import ItemsView, KeysView, ValuesView
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from itertools import chain
 from types import MappingProxyType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -37,14 +37,12 @@ _MAPPINGS = (dict, UserDict, MappingProxyType)
 _LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, ItemsView)
 
 
+@dataclass(slots=True)
 class Room:
     """The remaining room in a record."""
 
-    __slots__ = ("items", "text")
-
-    def __init__(self, items: int = MOST_ITEMS, text: int = MOST_TEXT) -> None:
-        self.items = items
-        self.text = text
+    items: int = MOST_ITEMS
+    text: int = MOST_TEXT
 
 
 def text_of(value: Any, room: Room, depth: int = 0) -> str:
