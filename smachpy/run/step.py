@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 import os
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import actionlib_core
@@ -49,6 +49,7 @@ _OURS: Final = tuple(
 _new = tuple.__new__  # takes half as long as the `__new__` of a NamedTuple
 
 
+@dataclass(slots=True, eq=False)
 class Step:
     """One child, ready to run.
 
@@ -64,35 +65,22 @@ class Step:
         watched_window: The latest window that reports writes; None after its run has ended.
     """
 
-    __slots__ = (
-        "_base",
-        "_path",
-        "execute",
-        "final",
-        "interface",
-        "label",
-        "nested",
-        "next",
-        "state",
-        "userdata",
-        "watched_window",
-        "writes",
-    )
-    final: Literal[False]
+    label: str
+    state: Child
+    execute: Callable[[Any], Any]
+    userdata: Any = None
+    next: dict[str, Any] = field(default_factory=dict)
+    nested: Any = None
+    interface: int = field(init=False)
+    writes: bool = field(init=False)
+    watched_window: _WatchedRemapper | None = None
+    final: Literal[False] = False  # a slot is found faster than a class attribute; see `End`
+    _base: str = ""
+    _path: str = ""
 
-    def __init__(self, label: str, state: Child, execute: Callable[[Any], Any]) -> None:
-        data = state._smachpy
-        self.label = label
-        self.final = False  # a slot is found faster than a class attribute; see `End`
-        self.state = state
-        self.execute = execute
-        self.userdata: Any = None
-        self.next: dict[str, Any] = {}
-        self.nested: Any = None
-        self.interface = data.version
-        self.writes = bool(data.output_keys)
-        self._base = self._path = ""
-        self.watched_window: _WatchedRemapper | None = None
+    def __post_init__(self) -> None:
+        self.interface = self.state._smachpy.version
+        self.writes = bool(self.state._smachpy.output_keys)
 
     def is_stale(self) -> bool:
         """Return whether the child's interface has changed since the step was compiled."""
@@ -233,7 +221,7 @@ def get_options(state: Child) -> Options:
         for name, count in _HOOKS
         if getattr(options, name) is None and _is_hook(type(state), name, count)
     }
-    found = dataclasses.replace(options, **hooks) if hooks else options
+    found = replace(options, **hooks) if hooks else options
     data.with_hooks = options, found
     return found
 
