@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 
 
 class _Epoch:
-    """Its value is replaced whenever anything changes that a run keeps in another form.
+    """Its value is replaced whenever anything changes that a run keeps in a compiled form.
 
-    That are the interfaces of states, and the callbacks, initial states, subscribers and controls
+    These are the interfaces of states, and the callbacks, initial states, subscribers and control
     of machines. A run compares one object instead of asking every state below it whether it has
-    changed. It is no counter: two threads that add to one at once could count one change only.
+    changed. It is no counter, because two threads that increase one at once may count one change
+    only.
     """
 
     value = object()
