@@ -7,6 +7,7 @@ keep their default values, or are left out on the way back.
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core.exceptions import CorrespondenceError, FieldError
@@ -62,12 +63,11 @@ def converter(
         raise CorrespondenceError(*pairs.problems)
 
     def checked(message: Any) -> Any:
-        try:
+        with contextlib.suppress(AttributeError, TypeError, ValueError):
             return convert(message)
-        except (AttributeError, TypeError, ValueError):
-            # A value is not exactly of its field's type. `coerced` converts what may be converted,
-            # such as a stamp in seconds, and reports the rest; it is too slow for each message.
-            exact = coerced(message)
+        # A value is not exactly of its field's type. `coerced` converts what may be converted, such
+        # as a stamp in seconds, and reports the rest; it is too slow for each message.
+        exact = coerced(message)
         try:
             return convert(exact)
         except (TypeError, ValueError) as error:  # ROS 1 has no times before 1970
