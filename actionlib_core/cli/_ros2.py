@@ -6,7 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import UsageError
-from actionlib_core.exceptions import ConfigError, InterfaceError
+from actionlib_core.exceptions import InterfaceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -76,16 +76,8 @@ def explain_absence(node: Node, full: str) -> str:
     """
     if not node.config.ros2:
         return ""
-    from actionlib_core.wire.ros2 import diagnosis
-    from actionlib_core.wire.ros2.network import ros_network
-
-    try:
-        network = ros_network(node, full)
-    except ConfigError:  # the name is on none of them
-        return ""
-    settings, there = network.settings, network.name(full)
-    others = network.ros.list_others()
-    return diagnosis.explain_absence(there, others, settings.domain, settings.router)
+    found: str = _ends().explain_absence(node, full)
+    return found
 
 
 def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]) -> list[Closable]:

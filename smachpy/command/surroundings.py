@@ -405,12 +405,19 @@ class ServerWait:
 
 
 def missing_on_robot(missing: Mapping[str, str], timeout: float) -> str:
-    """Return the error for actions without a server, if a ROS 2 robot is in use."""
+    """Return the error for actions without a server, if a ROS 2 robot is in use.
+
+    Blocks: until the robot's network has answered, 1 s at most.
+    """
+    from actionlib_core.wire.ros2.ends import explain_absence
+
     what = "action" if len(missing) == 1 else "actions"
-    listed = ", ".join(f"'/{full}'" for full in sorted(missing))
+    names = sorted(missing)
+    listed = ", ".join(f"'/{full}'" for full in names)
+    there = explain_absence(get_node(), names[0])
     return (
-        f"{what} {listed}: no server after {timeout:g} s, neither on the ROS 2 robot nor here; "
-        "names there are told by 'map' in the configuration."
+        f"{what} {listed}: no server after {timeout:g} s, neither on the ROS 2 robot nor here. "
+        f"{there[:1].upper()}{there[1:]} Another name there is given by 'map' in the configuration."
     )
 
 

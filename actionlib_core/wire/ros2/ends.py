@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.exceptions import InterfaceError
+from actionlib_core.exceptions import ConfigError, InterfaceError
 from actionlib_core.interfaces import ros2
 from actionlib_core.wire.presence import Endpoint, Kind
+from actionlib_core.wire.ros2 import diagnosis
 from actionlib_core.wire.ros2.names import Kind as RosKind
 from actionlib_core.wire.ros2.names import action_of
-from actionlib_core.wire.ros2.network import choose_network, name_here, network_of
+from actionlib_core.wire.ros2.network import choose_network, name_here, network_of, ros_network
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -98,6 +99,20 @@ def watch_ends(node: Node, on_end: Callable[[Endpoint, str, bool], object]) -> l
         return network.ros.watch(on_token)
 
     return [watch(network) for network in networks(node)]
+
+
+def explain_absence(node: Node, full: str) -> str:
+    """Return why there may be no server of an action on ROS 2, and what to try.
+
+    "" if the name is on no ROS 2 network. Blocks: as `RosNode.list_others`.
+    """
+    try:
+        network = ros_network(node, full)
+    except ConfigError:  # the name is on none of them
+        return ""
+    settings, there = network.settings, network.name(full)
+    others = network.ros.list_others()
+    return diagnosis.explain_absence(there, others, settings.domain, settings.router)
 
 
 def class_of(node: Node, end: Endpoint) -> Any:

@@ -7,9 +7,15 @@ import signal
 
 import pytest
 
+from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.config import Config, Ros2
+from actionlib_core.interfaces.nav2_msgs.action import Spin
+from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.transport.memory import MemoryNetwork
 from smachpy.command import main
-from smachpy.command.surroundings import REAL_TIME, Pace, missing_text
+from smachpy.command.surroundings import REAL_TIME, Pace, missing_on_robot, missing_text
 from smachpy.events.recording import read_recording
 
 NAP = """
@@ -234,3 +240,17 @@ def test_what_has_no_server_is_named_in_full_with_those_that_may_be_meant(missin
     text = missing_text(missing, there, 2.0)
     assert [part for part in parts if part not in text] == []
     assert text.count("charge'") <= 4
+
+
+def test_action_missing_on_a_ros2_robot_is_told_with_what_is_there():
+    with VirtualClock() as clock, use_clock(clock):
+        network, config = MemoryNetwork(clock), Config(ros2=(Ros2(),))
+        robot, mission = (
+            Node(name, transport=network.session(), clock=clock, config=config)
+            for name in ("robot", "mission")
+        )
+        with robot, mission, use_node(mission):
+            SimpleActionServer("spin", Spin, print, auto_start=True, node=robot)
+            text = missing_on_robot({"spinn": "spinn", "wait": "wait"}, 10.0)
+    assert text.startswith("actions '/spinn', '/wait': no server after 10 s, neither on the ROS 2")
+    assert "actions: /spin. Did you mean '/spin'?" in text
