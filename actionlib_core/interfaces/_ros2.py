@@ -158,7 +158,8 @@ def _entries(package: str) -> dict[tuple[str, str], list[_Entry]]:
     """Read the bundled definitions of a package, by kind and name."""
     path = _DEFINITIONS / f"{package}.txt"
     found: dict[tuple[str, str], list[_Entry]] = {}
-    if not package.isidentifier() or not path.is_file():
+    # Unlike `Path.is_file`, this is False also for a name that no file can have.
+    if not package.isidentifier() or not os.path.isfile(path):  # noqa: PTH113
         return found
     lines = path.read_text(encoding="utf-8").splitlines()
     starts = [number for number, line in enumerate(lines) if _ENTRY.match(line)]

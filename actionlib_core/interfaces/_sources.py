@@ -161,7 +161,8 @@ class Sources:
         for root in self.search_path():
             for folder in _folders_of(root, package):
                 path = folder / kind / f"{name}.{kind}"
-                if path.is_file():
+                # Unlike `Path.is_file`, this is False also for a name that no file can have.
+                if os.path.isfile(path):  # noqa: PTH113
                     return Source(_text_of(path), str(path))
         return None
 
@@ -235,7 +236,7 @@ def _text_of(path: Path) -> str:
 
 
 def _is_package(folder: Path) -> bool:
-    return any((folder / kind).is_dir() for kind in KINDS)
+    return any(os.path.isdir(folder / kind) for kind in KINDS)  # noqa: PTH112  as in `find`
 
 
 def _folders_of(root: Path, package: str) -> list[Path]:

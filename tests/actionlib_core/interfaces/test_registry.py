@@ -120,6 +120,8 @@ def test_unreadable_file(tmp_path: Path) -> None:
         ("get_message", "String", "expected 'package/Name'"),
         ("get_message", "a/b/c", "expected 'package/Name'"),
         ("get_message", "../etc/passwd", "expected 'package/Name'"),
+        ("get_message", f"{'a' * 5000}/B", "unknown message"),  # longer than a file's name may be
+        ("get_service", f"b_srvs/{'A' * 5000}", "unknown service"),
     ],
 )
 def test_unknown_names(call: str, name: str, said: str) -> None:

@@ -80,7 +80,7 @@ def test_own_types_that_differ_or_are_unknown_here():
 
 @pytest.mark.parametrize("name", [
     "plain", "a/b", "std_msgs/msg/", "/msg/String", "a::b/msg/C", "../srv/..%..%etc",
-    "std_msgs/foo/String", "std_srvs/srv/Nope", "a/action/B_FeedbackMessage", "Std/msg/Event",
+    f"{'a' * 5000}/msg/String", f"std_msgs/msg/{'A' * 5000}", "std_msgs/foo/String", "std_srvs/srv/Nope", "a/action/B_FeedbackMessage", "Std/msg/Event",
 ])  # fmt: skip
 def test_any_text_may_stand_for_a_type(name):
     tokens = [*action(), end(Kind.SERVICE, "odd", name, "RIHS01_" + "3" * 64)]
