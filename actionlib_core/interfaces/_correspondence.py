@@ -38,6 +38,7 @@ def converter(
     fields: Mapping[str, str] | None = None,
     *,
     whole: Literal["source", "target"] = "source",
+    part: str = "",
 ) -> Convert:
     """Return a function that converts a `source` to a `target`; for one class, the identity.
 
@@ -51,13 +52,14 @@ def converter(
         fields: Counterparts that do not follow from names and types: field of the side `whole` ->
             field of the other side; "" for a field without counterpart.
         whole: The side of which every field needs a counterpart.
+        part: In front of the names of `fields` in the configuration, such as "goal.".
 
     Raises:
         CorrespondenceError: Fields have no counterpart; the error lists all of them.
     """
     if source is target:
         return lambda message: message
-    pairs = _Pairs(whole)
+    pairs = _Pairs(whole, part)
     convert = pairs.message(source, target, "", dict(fields or {}))
     if pairs.problems:
         raise CorrespondenceError(*pairs.problems)
@@ -79,9 +81,10 @@ def converter(
 class _Pairs:
     """Pairs the fields of two classes, also nested ones; collects those without counterpart."""
 
-    def __init__(self, whole: Literal["source", "target"]) -> None:
+    def __init__(self, whole: Literal["source", "target"], part: str) -> None:
         self.problems: list[str] = []
         self._whole = whole
+        self._part = part
         self._made: dict[tuple[type, type], Convert] = {}
 
     def message(
@@ -90,8 +93,7 @@ class _Pairs:
         # With fields of the user, which apply to one place only, nothing is reused.
         if not fields and (source, target) in self._made:
             return self._made[source, target]
-        at = f"{source._type} -> {target._type}: {path}"
-        pairs = self._pairs(source, target, at, fields)
+        pairs = self._pairs(source, target, path, fields)
         plan = [
             (theirs.attribute, mine.attribute, self._field(source, mine, target, theirs, path))
             for mine, theirs in pairs
@@ -108,9 +110,10 @@ class _Pairs:
         return convert
 
     def _pairs(
-        self, source: type[Message], target: type[Message], at: str, fields: dict[str, str]
+        self, source: type[Message], target: type[Message], path: str, fields: dict[str, str]
     ) -> list[tuple[Field, Field]]:
         """Return the pairs (of the source, of the target)."""
+        at = f"{_named(source, target)} -> {_named(target, source)}: {path}"
         forward = self._whole == "source"
         whole, other = (source, target) if forward else (target, source)
         mine = {field.name: field for field in whole._definition.fields}
@@ -143,11 +146,22 @@ class _Pairs:
             else:
                 self.problems.append(
                     f"{at}{name}: got a field without counterpart; expected one of "
-                    f"{', '.join(others) or 'none'}. Try 'fields: {{{name}: ...}}' in the "
-                    "configuration of the name, with '' for a field to do without."
+                    f"{', '.join(others) or 'none'}.{self._way_out(whole, other, path + name)}"
                 )
         ordered = [(mine[name], found[name]) for name in mine if name in found]
         return ordered if forward else [(theirs, field) for field, theirs in ordered]
+
+    def _way_out(self, whole: type[Message], other: type[Message], name: str) -> str:
+        """Return what to try for a field of `whole` without counterpart."""
+        if whole._type == other._type:
+            distro = getattr(other, "_distro", "")
+            return f" Try the class of {distro}, with SMACHPY_ROS2_DISTRO={distro}."
+        if "." in name:  # the configuration cannot name a field of a nested message
+            return ""
+        return (
+            f" Try 'fields: {{{self._part}{name}: ...}}' in the configuration of the name, with '' "
+            "for a field to do without."
+        )
 
     def _field(
         self, source: type[Message], mine: Field, target: type[Message], theirs: Field, path: str
@@ -195,6 +209,11 @@ class _Pairs:
             f"{source._type} -> {target._type}: {here}: got {mine.type}; expected {theirs.type}, "
             f"the type of {theirs.name!r}."
         )
+
+
+def _named(cls: type[Message], other: type[Message]) -> str:
+    """Return the name of a type, with its distribution if the other one has the same name."""
+    return f"{cls._type} ({getattr(cls, '_distro', '')})" if cls._type == other._type else cls._type
 
 
 def _array(values: Any) -> Any:

@@ -145,7 +145,7 @@ def action_on_ros2(network: Ros2, name: str, types: ActionTypes) -> ActionOnRos2
 
     def ways(part: str) -> tuple[Convert, Convert]:
         ours, theirs = getattr(types, part), getattr(action, part.title())
-        return _ways(ours, theirs, fields[part], problems)
+        return _ways(ours, theirs, fields[part], problems, f"{part}.")
 
     goal, result, feedback = ways("goal"), ways("result"), ways("feedback")
     if problems:
@@ -178,7 +178,7 @@ def service_on_ros2(
     fields = _fields_of_parts(mapped, ("request", "response"), problems)
     there = mapped.name_there if mapped else name
     request, response = (
-        MessageOnRos2(there, part, *_ways(ours, part, fields[which], problems))
+        MessageOnRos2(there, part, *_ways(ours, part, fields[which], problems, f"{which}."))
         for which, ours, part in (
             ("request", cls._request_class, theirs.Request),
             ("response", cls._response_class, theirs.Response),
@@ -231,7 +231,7 @@ def _looked_up(network: Ros2, name: str, kind: str, type_name: str) -> Any:
 
 
 def _ways(
-    ours: Any, theirs: Any, fields: dict[str, str], problems: list[str]
+    ours: Any, theirs: Any, fields: dict[str, str], problems: list[str], part: str = ""
 ) -> tuple[Convert, Convert]:
     """Return the conversions from `ours` to `theirs` and back; add what does not fit to `problems`.
 
@@ -239,8 +239,8 @@ def _ways(
     """
     try:
         return (
-            converter(ours, theirs, fields, whole="source"),
-            converter(theirs, ours, fields, whole="target"),
+            converter(ours, theirs, fields, whole="source", part=part),
+            converter(theirs, ours, fields, whole="target", part=part),
         )
     except CorrespondenceError as error:
         problems += error.problems

@@ -160,6 +160,11 @@ def test_the_configuration_has_the_last_word() -> None:
     with pytest.raises(ConfigError) as caught:
         action_on_ros2(wrong, "move_base", MOVE_BASE)
     assert len(caught.value.problems) == 2
+    # The way out that is named works.
+    assert "Try 'fields: {goal.target_pose: ...}'" in caught.value.problems[0]
+    without = (("goal.target_pose", ""), ("feedback.base_position", ""))
+    mapped = Mapped("move_base", type="nav2_msgs/Spin", fields=without)
+    assert action_on_ros2(Ros2(map=(mapped,)), "move_base", MOVE_BASE).name == "move_base"
     with pytest.raises(ConfigError, match="nav2_msgs/Spinn"):
         action_on_ros2(Ros2(map=(Mapped("a", type="nav2_msgs/Spinn"),)), "a", MOVE_BASE)
 
@@ -194,8 +199,13 @@ def test_another_distribution_takes_the_goals_of_a_class() -> None:
     assert found.action._distro == "rolling"
     assert type(found.to_goal(NavigateToPose.Goal())) is found.action.Goal
     assert type(found.from_feedback(found.action.Feedback())) is NavigateToPose.Feedback
-    with pytest.raises(ConfigError, match="error_code"):
+    with pytest.raises(ConfigError, match="error_code") as caught:
         action_on_ros2(Ros2(distro="humble"), "go", ActionTypes.of(NavigateToPose))
+    result = "nav2_msgs/action/NavigateToPose_Result"
+    assert caught.value.problems[0] == (
+        f"{result} (jazzy) -> {result} (humble): error_code: got a field without counterpart; "
+        "expected one of result. Try the class of humble, with SMACHPY_ROS2_DISTRO=humble."
+    )
 
 
 def test_actions_of_one_name_in_both_worlds() -> None:
