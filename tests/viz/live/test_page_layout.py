@@ -128,6 +128,25 @@ def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(ser
     wait_for(page, "smachpy.store.overview.value")
 
 
+@pytest.mark.parametrize("count", [8, 100, 1000])
+def test_each_branch_of_a_concurrence_has_its_bar_however_many_they_are(served, look, count):
+    fleet = Concurrence(outcomes=["done"], default_outcome="done", name="FLEET")
+    with fleet:
+        for n in range(count):
+            Concurrence.add(f"R{n}", CBState(lambda _: "done", outcomes=["done"]))
+    paths = [f"/FLEET/R{n}" for n in range(count)]
+    events = [("Started", "/FLEET"), *(("Entered", path) for path in paths)]
+    served.add("fleet", sm=fleet, events=events)
+    page = look(served.start())  # an error in the page fails the test
+    bars = page.evaluate(
+        "() => smachpy.page.timeline.hits.filter((one) => one.span.path !== '/FLEET')"
+    )
+    assert {bar["span"]["path"] for bar in bars} == set(paths)
+    tops = [bar["top"] for bar in sorted(bars, key=lambda bar: paths.index(bar["span"]["path"]))]
+    assert tops == sorted(tops)
+    assert min(bar["bottom"] - bar["top"] for bar in bars) > 0.99
+
+
 def test_three_hundred_states_are_there_in_time(served, look):
     served.add("big", sm=nested(17, 1))  # 307
     assert all_levels(look(served.start()))["ms"] < MOST_LAYOUT_MS

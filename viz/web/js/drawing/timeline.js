@@ -343,8 +343,10 @@ export class Timeline {
       if (rows === 1 && right - lastPx < THINNEST && ended) continue; // too thin to see
       lastPx = right;
       const row = rows > 1 ? lane.children.indexOf(node) : 0;
-      const top = y + 1.5 + (row * (h - 3)) / rows;
-      const tall = (h - 3) / rows - (rows > 1 ? 1.5 : 0);
+      const pitch = (h - 3) / rows;
+      const top = y + 1.5 + row * pitch;
+      // Of very many branches each bar is a line, and the lines overlap.
+      const tall = Math.max(1, pitch - (rows > 1 ? Math.min(1.5, pitch / 4) : 0));
       const hit = { left, right: left + Math.max(2, right - left), top, bottom: top + tall, span };
       g.globalAlpha = later ? 0.35 : 1;
       this.#bar(hit, node, ended, x, later ? Infinity : now);
