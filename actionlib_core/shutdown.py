@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import os
 import signal
 import threading
 import weakref
@@ -24,7 +25,7 @@ from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from actionlib_core.clock._serial import report_thread_exception
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from types import FrameType
 
     from actionlib_core.clock import Clock, Event
@@ -193,8 +194,9 @@ class _SignalHandler:
     for the handler makes the request.
     """
 
-    def __init__(self, shutdown: Shutdown) -> None:
+    def __init__(self, shutdown: Shutdown, signals: Iterable[signal.Signals]) -> None:
         self._shutdown = shutdown
+        self._before = {number: signal.getsignal(number) for number in signals}
         self._clock = RealClock()
         self._wake = self._clock.event()
         self._over = False
@@ -218,12 +220,41 @@ class _SignalHandler:
         if not self._over:
             self._shutdown.request(self._shutdown.reason or "signal")
 
+    def begin(self) -> None:
+        """Handle the signals."""
+        _handlers.append(self)
+        for number in self._before:
+            signal.signal(number, self)
+
+    def restore(self) -> None:
+        """Return the signals to their handlers of before."""
+        _handlers.remove(self)
+        # None: the old handler was not installed from Python, and cannot be restored.
+        for number, old in self._before.items():
+            signal.signal(number, signal.SIG_DFL if old is None else old)
+
     def end(self) -> None:
         """End the thread; a pending request is still made."""
         if not self._wake.is_set():
             self._over = True
             self._wake.set()
 
+
+_handlers: list[_SignalHandler] = []
+
+
+def _restore_in_child() -> None:
+    """In a forked process, return the signals to the handlers of before.
+
+    The thread that makes the request exists only in the parent: a signal would do nothing here, and
+    `multiprocessing.Process.terminate` not end a worker.
+    """
+    for handler in reversed(_handlers.copy()):  # nested ones: the oldest handlers are set last
+        handler.restore()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_restore_in_child)
 
 _process = Shutdown()
 _current: ContextVar[Shutdown] = ContextVar("shutdown", default=_process)
@@ -280,14 +311,11 @@ def handle_signals(
             "handle_signals before starting threads."
         )
     shutdown = current_shutdown()
-    handler = _SignalHandler(shutdown)
-    before = {number: signal.getsignal(number) for number in signals}
+    handler = _SignalHandler(shutdown, signals)
     try:
-        for number in signals:
-            signal.signal(number, handler)
+        handler.begin()
         yield shutdown
     finally:
-        # None: the old handler was not installed from Python, and cannot be restored.
-        for number, old in before.items():
-            signal.signal(number, signal.SIG_DFL if old is None else old)
+        if handler in _handlers:  # else a forked process has left the block
+            handler.restore()
         handler.end()

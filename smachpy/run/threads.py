@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _signal  # type: ignore[import-not-found]  # `signal` without enums saves 20 us a run
+import os
 import signal
 import threading
 from collections import deque
@@ -357,6 +358,19 @@ _DEFAULTS = (
     (int(signal.SIGTERM), _signal.SIG_DFL),
 )
 
+
+def _restore_in_child() -> None:
+    """In a forked process, restore the default handlers, as the machine runs in the parent only.
+
+    With the inherited handler, Ctrl-C and `multiprocessing.Process.terminate` would do nothing.
+    """
+    for number, default in _DEFAULTS:
+        if getattr(_signal.getsignal(number), "__func__", None) is Root.on_signal:
+            _signal.signal(number, default)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_restore_in_child)
 
 OBSERVERS: list[Callable[[Any], Callable[[str | None], object] | None]] = []
 """Each is called with every root before it runs, and returns a function to call with its outcome

@@ -1,0 +1,83 @@
+"""A process that is forked during a run gets its own signals: the run is its parent's."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from actionlib_core import shutdown
+from actionlib_core.shutdown import Shutdown, use_shutdown
+from smachpy import CBState, Concurrence, StateMachine
+
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork"),
+    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),  # 3.12, with threads
+]
+IGNORED = 7
+
+
+def end_of_child(number):
+    """Fork, send the signal to the child, and return how it ended."""
+    ready, go_on = os.pipe(), os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.close(go_on[1])
+            os.write(ready[1], b"!")
+            os.read(go_on[0], 1)
+        except KeyboardInterrupt:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        finally:
+            os._exit(IGNORED)
+    os.read(ready[0], 1)
+    os.kill(child, number)
+    for end in (*ready, *go_on):
+        os.close(end)
+    return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def machine_of(kind, work):
+    state = CBState(work, outcomes=["done"])
+    if kind is Concurrence:
+        machine = Concurrence(["done"], "done")
+        with machine:
+            machine.add("FORK", state)
+        return machine
+    machine = StateMachine(["done"])
+    with machine:
+        machine.add("FORK", state)
+    return machine
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("kind", [StateMachine, Concurrence])
+def test_a_signal_ends_a_process_that_a_state_has_forked(kind, number):
+    """`multiprocessing.Process.terminate` did nothing, so that its `join` waited for ever."""
+    ends = []
+
+    def work(userdata):
+        ends.append(end_of_child(number))
+        return "done"
+
+    assert machine_of(kind, work).execute() == "done"
+    assert ends == [number]
+
+
+def test_the_parent_is_preempted_by_signals_also_after_a_fork():
+    def work(userdata):
+        end_of_child(signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGTERM)
+        return "done"
+
+    with use_shutdown(Shutdown()) as ending:
+        machine_of(StateMachine, work).execute()
+        assert ending.reason == "SIGTERM"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_process_that_was_forked_in_handle_signals(number):
+    with use_shutdown(Shutdown()), shutdown.handle_signals(), shutdown.handle_signals():
+        assert end_of_child(number) == number
