@@ -229,12 +229,11 @@ def parameters() -> str:
         lines.append(f"{part.name}:")
         for item in dataclasses.fields(default):
             text = f"  {item.name}: {str(getattr(default, item.name)).lower()}"
-            if item.metadata:
-                unit, limits = item.metadata["unit"], item.metadata["limits"].text()
-                notes = "; ".join(note for note in (f"[{unit}]" if unit else "", limits) if note)
-                text = f"{text:<32}# {item.metadata['doc']} {notes}"
-            lines.append(text)
-    lines += ["start: {x: 0, y: 0, yaw: 0}     # Where it begins. [m, m, rad]"]
+            unit, limits = item.metadata.get("unit"), item.metadata.get("limits")
+            notes = [f"[{unit}]" if unit else "", limits.text() if limits else ""]
+            words = [item.metadata["doc"], "; ".join(note for note in notes if note)]
+            lines.append(f"{text:<32}# {' '.join(words).rstrip()}")
+    lines += ["start: {x: 0, y: 0, yaw: 0}     # Where it begins, in the map frame. [m, m, rad]"]
     lines += ["dock: {x: 0, y: 0, yaw: 0}      # Where it charges; left out: it has no dock."]
     return "\n".join(lines)
 

@@ -52,42 +52,58 @@ class RobotConfig:
     radius: float = _quantity(0.25, "m", "Radius of the body.", above=0, high=5)
     max_speed: float = _quantity(0.8, "m/s", "Fastest forward speed.", above=0, high=10)
     max_reverse_speed: float = _quantity(0.2, "m/s", "Fastest speed backwards.", above=0, high=10)
-    max_turn_rate: float = _quantity(1.5, "rad/s", "Fastest turn.", above=0, high=20)
-    acceleration: float = _quantity(0.8, "m/s^2", "Speeding up.", above=0, high=50)
-    braking: float = _quantity(1.2, "m/s^2", "Slowing down.", above=0, high=50)
-    turn_acceleration: float = _quantity(3.0, "rad/s^2", "Change of turn rate.", above=0, high=100)
-    sight: float = _quantity(3.0, "m", "How far it sees new obstacles.", above=0, high=100)
+    max_turn_rate: float = _quantity(1.5, "rad/s", "Fastest turn rate.", above=0, high=20)
+    acceleration: float = _quantity(0.8, "m/s^2", "Acceleration.", above=0, high=50)
+    braking: float = _quantity(1.2, "m/s^2", "Deceleration.", above=0, high=50)
+    turn_acceleration: float = _quantity(
+        3.0, "rad/s^2", "Acceleration of turns.", above=0, high=100
+    )
+    sight: float = _quantity(
+        3.0,
+        "m",
+        "Distance from which it sees obstacles that are not on the map.",
+        above=0,
+        high=100,
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class PlannerConfig:
     """How ways are chosen on the map."""
 
-    margin: float = _quantity(0.03, "m", "Room kept beside the body at all times.", low=0, high=2)
+    margin: float = _quantity(0.03, "m", "Smallest distance between body and walls.", low=0, high=2)
     wall_distance: float = _quantity(
-        0.6, "m", "Closer than this to something solid, a way costs more.", low=0, high=10
+        0.6, "m", "Distance from walls within which a way costs more.", low=0, high=10
     )
     wall_weight: float = _quantity(
-        4.0, "1", "How much more: extra cost of a metre right beside a wall.", low=0, high=100
+        4.0, "1", "Extra cost of a metre right beside a wall, as a factor.", low=0, high=100
     )
-    unknown_is_free: bool = False
+    unknown_is_free: bool = field(
+        default=False, metadata={"doc": "Whether it drives over unknown cells of the map."}
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class ControlConfig:
     """How the way is followed and when the goal counts as reached."""
 
-    rate: float = _quantity(20.0, "Hz", "Control steps a second.", low=5, high=1000)
-    feedback_rate: float = _quantity(5.0, "Hz", "Feedback messages a second.", above=0, high=10)
+    rate: float = _quantity(20.0, "Hz", "Control steps per second.", low=5, high=1000)
+    feedback_rate: float = _quantity(5.0, "Hz", "Feedback messages per second.", above=0, high=10)
     override_time: float = _quantity(
-        0.5, "s", "A message on cmd_vel counts so long.", above=0, high=60
+        0.5, "s", "Time for which a message on cmd_vel drives it.", above=0, high=60
     )
-    xy_tolerance: float = _quantity(0.05, "m", "Distance that counts as there.", low=0.01, high=2)
-    yaw_tolerance: float = _quantity(0.05, "rad", "Heading error allowed.", low=0.01, high=3.2)
-    lookahead_time: float = _quantity(0.7, "s", "It steers to where it is then.", above=0, high=5)
-    lookahead_min: float = _quantity(0.3, "m", "But to no nearer point.", low=0.05, high=5)
+    xy_tolerance: float = _quantity(
+        0.05, "m", "Largest distance from a reached goal.", low=0.01, high=2
+    )
+    yaw_tolerance: float = _quantity(
+        0.05, "rad", "Largest heading error at a reached goal.", low=0.01, high=3.2
+    )
+    lookahead_time: float = _quantity(
+        0.7, "s", "It steers to the point of its way this far ahead in time.", above=0, high=5
+    )
+    lookahead_min: float = _quantity(0.3, "m", "Smallest distance to that point.", low=0.05, high=5)
     turn_on_spot: float = _quantity(
-        0.8, "rad", "Beyond this heading error it stops and turns first.", above=0.1, high=3.2
+        0.8, "rad", "Heading error from which it stops and turns first.", above=0.1, high=3.2
     )
 
 
@@ -97,9 +113,9 @@ class RecoveryConfig:
 
     attempts: int = _count(3, "Recoveries before the goal is aborted.", low=0, high=100)
     back_up: float = _quantity(0.3, "m", "How far it backs up.", low=0, high=5)
-    patience: float = _quantity(1.0, "s", "Wait before it looks again.", low=0, high=600)
+    patience: float = _quantity(1.0, "s", "Pause before it looks again.", low=0, high=600)
     traffic_patience: float = _quantity(
-        20.0, "s", "It waits so long for somebody in its way.", low=0, high=3600
+        20.0, "s", "Longest wait for a robot or person in its way.", low=0, high=3600
     )
 
 
@@ -107,14 +123,16 @@ class RecoveryConfig:
 class ScanConfig:
     """The laser scanner, in the middle of the robot."""
 
-    rate: float = _quantity(5.0, "Hz", "Scans a second, while somebody listens.", above=0, high=50)
+    rate: float = _quantity(
+        5.0, "Hz", "Scans per second, while there are subscribers.", above=0, high=50
+    )
     rays: int = _count(271, "Rays of a scan.", low=2, high=10_000)
     field: float = _quantity(
         4.712389, "rad", "Angle from the first ray to the last.", above=0, high=6.2832
     )
-    range_min: float = _quantity(0.05, "m", "Nearer than this it sees nothing.", low=0, high=10)
-    range_max: float = _quantity(8.0, "m", "Nor farther than this.", above=0, high=100)
-    noise: float = _quantity(0.0, "m", "Standard deviation of a range.", low=0, high=1)
+    range_min: float = _quantity(0.05, "m", "Smallest range.", low=0, high=10)
+    range_max: float = _quantity(8.0, "m", "Greatest range.", above=0, high=100)
+    noise: float = _quantity(0.0, "m", "Standard deviation of the noise of a range.", low=0, high=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +142,11 @@ class BatteryConfig:
     capacity: float = _quantity(1.0, "Wh", "Energy when full.", above=0, high=1e5)
     charge: float = _quantity(0.6, "1", "Fraction left at the start.", low=0, high=1)
     voltage: float = _quantity(24.0, "V", "Nominal voltage.", above=0, high=1000)
-    idle_power: float = _quantity(4.0, "W", "Drain at rest.", low=0, high=1e4)
-    drive_power: float = _quantity(40.0, "W", "Further drain at full speed.", low=0, high=1e5)
-    charge_power: float = _quantity(600.0, "W", "What the dock gives.", above=0, high=1e6)
+    idle_power: float = _quantity(4.0, "W", "Consumption at rest.", low=0, high=1e4)
+    drive_power: float = _quantity(
+        40.0, "W", "Additional consumption at full speed.", low=0, high=1e5
+    )
+    charge_power: float = _quantity(600.0, "W", "Power of the dock.", above=0, high=1e6)
     period: float = _quantity(0.5, "s", "Time between battery messages.", low=0.05, high=60)
 
 

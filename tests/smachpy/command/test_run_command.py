@@ -392,6 +392,7 @@ def test_the_parameters_of_the_robot_are_listed_and_can_be_read_again(tmp_path):
 
     path = tmp_path / "all.yaml"
     path.write_text(parameters())
+    assert all(" # " in line for line in parameters().splitlines() if not line.endswith(":"))
     config = load_config(path)
     assert config.robot == SimConfig().robot
     assert config.battery == SimConfig().battery
