@@ -77,9 +77,10 @@ class Target:
         except (SmachError, ActionlibError):  # these say themselves which argument was wrong
             raise
         except Exception as error:
+            why = advice(error) if isinstance(error, ImportError) else None
             raise TargetError(
                 self.name,
-                f"expected a state machine; {self.source} raised {raised_text(error)}",
+                why or f"expected a state machine; {self.source} raised {raised_text(error)}",
             ) from error
         if not isinstance(machine, Container):
             hint = " Try `return` with it at the end." if machine is None else ""

@@ -20,8 +20,7 @@ class MissingExtraError(ActionlibError, ImportError):
 
     def __init__(self, package: str, what: str) -> None:
         super().__init__(
-            f"{what}: package {package!r} is missing; expected it, as programs for ROS 1 need it. "
-            "Try: pip install 'smachpy[ros1]'"
+            f"{what}: package {package!r} is missing. Try: pip install 'smachpy[ros1]'"
         )
         self.name = package
 

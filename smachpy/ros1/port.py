@@ -93,8 +93,8 @@ def port(source: bytes, filename: str) -> Ported:
         SyntaxError: it is neither Python 3 nor Python 2.
         MissingExtraError: libcst is not installed.
     """
-    cst = import_extra("libcst", "smachpy port")
-    metadata = import_extra("libcst.metadata", "smachpy port")
+    cst = import_extra("libcst", "port")
+    metadata = import_extra("libcst.metadata", "port")
     text = python2.read(source)
     notes: list[tuple[int, str]] = []
     converted = python2.to_text(text, filename)

@@ -234,3 +234,12 @@ def test_a_script_for_ros_1_is_told_of_the_option_for_it(tmp_path, line):
     with pytest.raises(TargetError) as raised:
         load_target(str(path))
     assert "--ros1" not in str(raised.value)
+
+
+def test_a_mission_that_needs_an_extra_when_it_is_built_says_which(tmp_path):
+    path = tmp_path / "drawing.py"
+    path.write_text("def mission():\n    raise ModuleNotFoundError('no PIL', name='PIL')\n")
+    with pytest.raises(
+        TargetError, match=r"package 'PIL' is missing. Try: pip install 'smachpy\[sim\]'"
+    ):
+        load_target(str(path)).build()

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import current_clock
 from smachpy.command.arguments import Text, parameters_of
+from smachpy.command.extras import advice
 from smachpy.command.runner import NO_NAMES, build, needed_servers
 from smachpy.command.surroundings import Pace, RobotOptions, open_surroundings
 from smachpy.command.targets import load_target
@@ -334,6 +335,8 @@ def _end_with_parent() -> None:
 
 
 def _words(error: BaseException) -> str:
+    if isinstance(error, ImportError) and (text := advice(error)):
+        return text
     return f"{type(error).__name__}: {error}".partition("\n")[0]
 
 

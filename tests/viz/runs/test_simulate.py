@@ -16,6 +16,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+import viz.runs.simulate
 from smachpy.command import main
 from smachpy.events.recording import each_recording
 from smachpy.exceptions import MissionError, SmachError
@@ -138,6 +139,15 @@ def test_a_run_that_raises_is_told_and_the_others_go_on(job, tmp_path):
     results = simulate(plan(job, tmp_path, 4, "name=broken,x"), Here())
     assert [result.outcome for result in results] == [None, "succeeded", None, "succeeded"]
     assert "no such tool" in results[0].error
+
+
+def test_a_run_without_the_packages_of_the_robot_says_what_to_install(job, tmp_path, monkeypatch):
+    def fail(*_):
+        raise ModuleNotFoundError("No module named 'scipy'", name="scipy")
+
+    monkeypatch.setattr(viz.runs.simulate, "open_surroundings", fail)
+    (result,) = simulate(plan(job, tmp_path, 1), Here())
+    assert result.error == "package 'scipy' is missing. Try: pip install 'smachpy[sim]'"
 
 
 def test_other_executors_do_it_too(job, tmp_path):
