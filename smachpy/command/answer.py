@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 EXIT_NOTHING = 1
 EXAMPLES = """examples:
-    smachpy answer                       show the current questions
+  smachpy answer                       show the current questions
   smachpy answer yes                   answer the only question
-    smachpy answer yes --state CONFIRM   answer the question of that state, if there are several
+  smachpy answer yes --state CONFIRM   answer the question of that state, if there are several
 """
 
 

@@ -17,7 +17,7 @@ def register(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "port",
-        help="rewrite a script for ROS 1",
+        help="rewrite a ROS 1 script with the API of smachpy",
         description="Rewrite a script for ROS 1 with smachpy's own API, with its comments and "
         "layout, and list what a person must check.",
     )
