@@ -32,8 +32,8 @@ class Deadlock(Exception):  # noqa: N818  the field's word
         self.waits = dict(waits)
         lines = [f"  - {name}: waits for {what}" for name, what in self.waits.items()]
         super().__init__(
-            "virtual clock: every participant waits and no deadline is left; "
-            "expected at least one that can go on:\n" + "\n".join(lines)
+            "virtual clock: every thread waits, and none of them for a time; "
+            "expected at least one that can continue:\n" + "\n".join(lines)
         )
 
 

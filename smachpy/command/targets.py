@@ -17,7 +17,7 @@ from smachpy.command.extras import advice, clash, hidden_by
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
 from smachpy.mission_info import is_mission, mission
-from smachpy.run.step import trace_of
+from smachpy.run.stack_text import trace_of
 
 if TYPE_CHECKING:
     from types import ModuleType

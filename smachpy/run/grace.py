@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import inspect
-import sys
 import threading
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -31,6 +30,7 @@ from smachpy.events import (
 from smachpy.exceptions import InvalidTransitionError, did_you_mean
 from smachpy.run.frame import clock_of_run
 from smachpy.run.interrupt import Interruption, interrupt, take_back
+from smachpy.run.stack_text import stack_of, stack_text
 from smachpy.run.visit import IS_ASKED, STEPS, Decision, Effect, Event, Origin, Phase, Why, after
 
 if TYPE_CHECKING:
@@ -185,16 +185,16 @@ class Visit:
         # Stack, time and subscribers are taken now: by the time the event is published, the thread
         # may be elsewhere and the frame dead, which has no subscribers.
         now = clock.now(), clock.time_ns()
-        lines = lines_of(frame.first.thread)
+        stack = stack_of(frame.first.thread)
         subscribers = frame.find_subscribers() if frame.run.watched else None
 
         def publish() -> None:
-            stack = text_of(lines)  # reads source files: not under the lock
+            text = stack_text(stack)  # reads source files: not under the lock
             if subscribers is not None:
-                frame.give(subscribers, Abandoned(path, *now, grace or 0.0, stack))
+                frame.give(subscribers, Abandoned(path, *now, grace or 0.0, text))
             frame.run.note_log(
                 f"{described}: still runs {grace or 0.0:g} s after its preempt; interrupted. It "
-                f"was at:\n{stack}"
+                f"was at:\n{text}"
             )
 
         frame.run.pending.append(publish)
@@ -761,20 +761,3 @@ def _up_to(frame: Frame, first: Frame) -> list[Frame]:
     while chain[-1] is not first and chain[-1].parent is not None:
         chain.append(chain[-1].parent)
     return chain
-
-
-def lines_of(ident: int) -> list[tuple[str, int, str]]:
-    """Return the stack of the thread `ident` as (file, line, function), innermost last."""
-    top = sys._current_frames().get(ident)
-    lines = []
-    while top is not None:
-        lines.append((top.f_code.co_filename, top.f_lineno or 0, top.f_code.co_name))
-        top = top.f_back
-    return lines[::-1]
-
-
-def text_of(lines: list[tuple[str, int, str]]) -> str:
-    """Return stack lines formatted as in a traceback."""
-    import traceback
-
-    return "".join(traceback.format_list([traceback.FrameSummary(*line) for line in lines]))

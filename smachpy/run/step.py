@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import inspect
-import os
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-import actionlib_core
 from actionlib_core import shutdown
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
@@ -26,6 +24,7 @@ from smachpy.run.grace import (
 )
 from smachpy.run.interrupt import Interruption, ProgramEnds
 from smachpy.run.options import NO_OPTIONS
+from smachpy.run.stack_text import trace_of
 from smachpy.run.visit import Again, End, Event, after_attempt
 from smachpy.slips import ACCEPTING
 from smachpy.userdata.user_data import Remapper, revoke
@@ -38,13 +37,6 @@ if TYPE_CHECKING:
     from smachpy.run.child import Child, Parent
     from smachpy.run.frame import Frame
     from smachpy.run.options import Options
-
-TRACE_LINES: Final = 6
-_OURS: Final = tuple(
-    os.path.dirname(os.path.abspath(path)) + os.sep  # noqa: PTH100, PTH120  texts
-    for path in (actionlib_core.__file__ or "", os.path.dirname(__file__))  # noqa: PTH120
-)
-"""Folders of our packages; a package's is that of its `__init__.py`."""
 
 _new = tuple.__new__  # takes half as long as the `__new__` of a NamedTuple
 
@@ -533,19 +525,6 @@ def publish_raised(frame: Frame, error: BaseException) -> None:
         frame.emit(Left, "preempted")
     else:
         frame.emit(Failed, f"{type(error).__name__}: {error}", trace_of(error))
-
-
-def trace_of(error: BaseException) -> str:
-    """Return the innermost lines of user code in a traceback, one per line."""
-    import traceback  # here, as a machine that works does not need it
-
-    frames = [
-        one
-        for one in traceback.extract_tb(error.__traceback__)
-        if not one.filename.startswith((*_OURS, "<"))
-    ]
-    lines = (f"{one.filename}:{one.lineno} in {one.name}: {one.line}" for one in frames)
-    return "\n".join(list(lines)[-TRACE_LINES:])
 
 
 def publish_left(frame: Frame, step: Step, outcome: Any) -> None:

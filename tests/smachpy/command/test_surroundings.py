@@ -182,7 +182,7 @@ def test_a_mission_that_waits_for_somebody_outside(tmp_path, capsys):
     path.write_text(STUCK)
     assert main(["run", str(path), "--time", "virtual"]) == 2
     error = capsys.readouterr().err
-    assert "--time virtual: virtual clock: every participant waits" in error
+    assert "--time virtual: virtual clock: every thread waits" in error
     assert "Try --time real." in error
 
 
