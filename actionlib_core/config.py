@@ -21,7 +21,7 @@ from actionlib_core.exceptions import ConfigError, NameSetupError
 from actionlib_core.names import clean_namespace
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 ENVIRONMENT_VARIABLE = "SMACHPY_CONFIG"
 DOMAIN_VARIABLE = "SMACHPY_DOMAIN"
@@ -111,11 +111,7 @@ class Mapped:
         ]
         # A name with a slash in front would never be found: full names have none.
         problems += _check_names("name", (self.name,))
-        for word in ("name", *named):
-            try:
-                clean_namespace(getattr(self, word))
-            except NameSetupError as error:
-                problems.append(f"{word}: {error}")
+        problems += _check_namespaces(self, "name", *named)
         if not (named or self.type or self.fields):
             problems.append("action: missing: got nothing; expected a name or a type.")
         if problems:
@@ -173,12 +169,8 @@ class Ros2:
             *_check_choice("distro", self.distro, get_args(Distro)),
             *_check_choice("mode", self.mode, ("client", "peer")),
             *_check_names("names", self.names),
+            *_check_namespaces(self, "namespace", "robot"),
         ]
-        for name in ("namespace", "robot"):
-            try:
-                clean_namespace(getattr(self, name))
-            except NameSetupError as error:
-                problems.append(f"{name}: {error}")
         if not 0 <= self.probe < math.inf:
             problems.append(f"probe: got {self.probe!r}; expected 0 or more [s].")
         if problems:
@@ -235,7 +227,8 @@ class Config:
         Raises:
             ConfigError: some are wrong; the text lists all of them.
         """
-        problems = [line for check in _CHECKS for line in check(self).splitlines()]
+        problems = [problem for check in _CHECKS for problem in check(self)]
+        problems += _check_namespaces(self, "namespace")
         if problems:
             raise ConfigError("configuration", *problems)
 
@@ -299,118 +292,101 @@ def _check_names(where: str, names: tuple[str, ...]) -> list[str]:
     return [f"{where}: got {name!r}; expected a full name without outer slashes." for name in bad]
 
 
-def _check_mode(config: Config) -> str:
-    if config.mode not in get_args(Mode):
-        return f"mode: unknown: got {config.mode!r}; expected one of {sorted(get_args(Mode))}."
+def _check_namespaces(record: object, *fields: str) -> Iterator[str]:
+    for name in fields:
+        try:
+            clean_namespace(getattr(record, name))
+        except NameSetupError as error:
+            yield f"{name}: {error}"
+
+
+def _check_mode(config: Config) -> Iterator[str]:
+    yield from _check_choice("mode", config.mode, get_args(Mode))
     if config.mode == "client" and not config.connect:
-        return "connect: empty: got []; expected the router's endpoint, as mode is 'client'."
+        yield "connect: empty: got []; expected the router's endpoint, as mode is 'client'."
     if config.mode == "client" and config.listen:
-        return (
+        yield (
             f"listen: a client cannot listen: got {list(config.listen)}; expected none. "
             "Try mode 'peer'."
         )
-    return ""
 
 
-def _check_endpoints(config: Config) -> str:
-    lists = (("connect", config.connect), ("listen", config.listen))
-    problems = [
-        _check_endpoint(name, end) if end else [f"{name}: got ''; expected an endpoint."]
-        for name, ends in lists
-        for end in ends
-    ]
-    return "\n".join(line for lines in problems for line in lines)
+def _check_endpoints(config: Config) -> Iterator[str]:
+    for name, ends in (("connect", config.connect), ("listen", config.listen)):
+        for end in ends:
+            if end:
+                yield from _check_endpoint(name, end)
+            else:
+                yield f"{name}: got ''; expected an endpoint."
 
 
-def _check_numbers(config: Config) -> str:
-    wrong_domain = _check_domain(config.domain)
-    if wrong_domain:
-        return wrong_domain[0]
+def _check_numbers(config: Config) -> Iterator[str]:
+    yield from _check_domain(config.domain)
     for name, low in (("lease", 0.1), ("connect_timeout", 0.0), ("settle", 0.0)):
         value = getattr(config, name)
         if not low <= value < math.inf:
             what = "too small" if value < low else "no length of time"
-            return f"{name}: {what}: got {value!r}; expected at least {low} [s]."
-    return ""
+            yield f"{name}: {what}: got {value!r}; expected at least {low} [s]."
 
 
-def _check_namespace(config: Config) -> str:
-    try:
-        clean_namespace(config.namespace)
-    except NameSetupError as error:
-        return f"namespace: {error}"
-    return ""
-
-
-def _check_tls(config: Config) -> str:
+def _check_tls(config: Config) -> Iterator[str]:
     tls = config.tls
     if bool(tls.certificate) != bool(tls.key):
         missing = "key" if tls.certificate else "certificate"
-        return f"tls.{missing}: missing: got ''; expected a file, as the other half is given."
-    encrypted = [e for e in (*config.connect, *config.listen) if e.startswith(("tls/", "quic/"))]
+        yield f"tls.{missing}: missing: got ''; expected a file, as the other half is given."
+    routers = (network.router for network in config.ros2)
+    ends = (*config.connect, *config.listen, *routers)
+    encrypted = [end for end in ends if end.startswith(("tls/", "quic/"))]
     if encrypted and not tls.ca:
-        return f"tls.ca: missing: got ''; expected a file, as {encrypted[0]!r} is encrypted."
-    return ""
+        yield f"tls.ca: missing: got ''; expected a file, as {encrypted[0]!r} is encrypted."
 
 
-def _check_files(config: Config) -> str:
+def _check_files(config: Config) -> Iterator[str]:
     files = {f"tls.{name}": getattr(config.tls, name) for name in ("ca", "certificate", "key")}
     files["users_file"] = config.users_file
     files["password_file"] = config.password_file
-    missing = {name: path for name, path in files.items() if path and not Path(path).is_file()}
-    return "\n".join(
-        f"{name}: no such file: got {path!r}; expected a file that exists."
-        for name, path in missing.items()
-    )
+    for name, path in files.items():
+        if path and not Path(path).is_file():
+            yield f"{name}: no such file: got {path!r}; expected a file that exists."
 
 
-def _check_login(config: Config) -> str:
+def _check_login(config: Config) -> Iterator[str]:
     if (config.password or config.password_file) and not config.user:
-        return "user: missing: got ''; expected a name, as a password is given."
+        yield "user: missing: got ''; expected a name, as a password is given."
     if config.password and config.password_file:
-        return "password_file: given beside password; expected one of them."
-    return ""
+        yield "password_file: given beside password; expected one of them."
 
 
-def _check_access(config: Config) -> str:
+def _check_access(config: Config) -> Iterator[str]:
     for index, rule in enumerate(config.access):
         where = f"access[{index}]"
         if not rule.names:
-            return f"{where}.names: empty: got []; expected at least one name, '**' for all."
+            yield f"{where}.names: empty: got []; expected at least one name, '**' for all."
         if rule.permission not in {"allow", "deny"}:
-            return f"{where}.permission: got {rule.permission!r}; expected 'allow' or 'deny'."
+            yield f"{where}.permission: got {rule.permission!r}; expected 'allow' or 'deny'."
         if rule.users and rule.certificates:
-            return f"{where}: for users and for certificates; expected one. Try two rules."
-        bad = _check_names(f"{where}.names", rule.names)
-        if bad:
-            return bad[0]
-    return ""
+            yield f"{where}: for users and for certificates; expected one. Try two rules."
+        yield from _check_names(f"{where}.names", rule.names)
 
 
-def _check_ros2(config: Config) -> str:
+def _check_ros2(config: Config) -> Iterator[str]:
     # With several networks, a name must be on one of them at most.
     alike = [network for network in config.ros2 if not (network.robot or network.names)]
     if len(config.ros2) > 1 and len(alike) > 1:
-        return (
+        yield (
             f"ros2: got {len(alike)} networks that do not say which names are theirs; expected one "
             "at most. Try 'robot: robot1' or 'names: [robot1/**]'."
         )
     robots = [robot for network in config.ros2 if (robot := clean_namespace(network.robot))]
-    for robot in robots:
+    for robot in dict.fromkeys(robots):
         if robots.count(robot) > 1:
-            return f"ros2: robot: got {robot!r} {robots.count(robot)} times; expected it once."
-    if config.ros2 and not config.tls.ca:
-        encrypted = [n.router for n in config.ros2 if n.router.startswith(("tls/", "quic/"))]
-        if encrypted:
-            return f"tls.ca: missing: got ''; expected a file, as {encrypted[0]!r} is encrypted."
-    return ""
+            yield f"ros2: robot: got {robot!r} {robots.count(robot)} times; expected it once."
 
 
-_CHECKS: tuple[Callable[[Config], str], ...] = (
+_CHECKS: tuple[Callable[[Config], Iterator[str]], ...] = (
     _check_mode,
     _check_endpoints,
     _check_numbers,
-    _check_namespace,
     _check_tls,
     _check_files,
     _check_login,

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 MOST_PARTS: Final = 100_000
 """Most values in a text with aliases, of which a few lines can produce billions."""
@@ -27,26 +30,39 @@ class YamlTextError(ValueError):
         super().__init__(f"line {line}: {self.reason}" if line else self.reason)
 
 
-def load_yaml(text: str, kind: Literal["safe", "rt"] = "safe") -> object:
+def load_yaml(text: str) -> object:
     """Return the data in a YAML text.
 
     Args:
         text: One document.
-        kind: "safe": plain data; "rt": ruamel.yaml's containers, which know their lines.
 
     Raises:
         YamlTextError: it is not YAML, a value does not fit its tag (`!!int x`), or it is nested too
             deeply or has too many values.
     """
+    return load_with_lines(text)[0]
+
+
+def load_with_lines(text: str) -> tuple[object, dict[str, int]]:
+    """Return the data in a YAML text, and the line of each value by its path ("robots[0].x").
+
+    Raises:
+        YamlTextError: as for `load_yaml`.
+    """
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError
 
     _check_depth(text)
+    yaml = YAML(typ="safe", pure=True)
     try:
-        data: object = YAML(typ=kind, pure=True).load(text)
+        root = yaml.compose(text)
+        if root is None:
+            return None, {}
+        data: object = yaml.constructor.construct_document(root)
         # Only a text with anchors and aliases can have more values than its length allows.
         if "*" in text and "&" in text:
             _check_size(data)
+        return data, dict(_lines(yaml.constructor, root, ""))
     except YamlTextError:
         raise
     except MarkedYAMLError as error:
@@ -57,7 +73,6 @@ def load_yaml(text: str, kind: Literal["safe", "rt"] = "safe") -> object:
         raise YamlTextError("it is nested too deeply") from error
     except Exception as error:  # ruamel.yaml: any exception, for a value that does not fit its tag
         raise YamlTextError(str(error) or type(error).__name__) from error
-    return data
 
 
 def _check_depth(text: str) -> None:
@@ -79,3 +94,17 @@ def _check_size(data: object) -> None:
             left += [*part.keys(), *part.values()]
         elif isinstance(part, list | tuple | set):
             left += part
+
+
+def _lines(constructor: Any, node: Any, path: str) -> Iterator[tuple[str, int]]:
+    """Yield the path and line of each value below a node of ruamel.yaml."""
+    if node.id == "mapping":
+        for key_node, value in node.value:
+            key = constructor.construct_object(key_node, deep=True)
+            inside = f"{path}.{key}" if path else str(key)
+            yield inside, key_node.start_mark.line + 1
+            yield from _lines(constructor, value, inside)
+    elif node.id == "sequence":
+        for i, entry in enumerate(node.value):
+            yield f"{path}[{i}]", entry.start_mark.line + 1
+            yield from _lines(constructor, entry, f"{path}[{i}]")

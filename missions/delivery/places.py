@@ -10,7 +10,7 @@ from smachpy.states.waypoints import PlaceFile, Waypoint, network_name
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from smachpy.sim.checked_yaml import Section
+    from actionlib_core.checked_file import Section
 
 
 @dataclass(frozen=True, slots=True)

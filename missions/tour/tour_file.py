@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from actionlib_core.checked_file import Limits
 from smachpy import register_type
-from smachpy.sim.checked_yaml import Limits
 from smachpy.states.waypoints import PlaceFile, Waypoint, network_name
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from smachpy.sim.checked_yaml import Section
+    from actionlib_core.checked_file import Section
     from smachpy.sim.occupancy import OccupancyMap
 
 TASKS: Final = ("photo", "turn", "wait_for_service")
@@ -89,10 +89,8 @@ def _stop(file: PlaceFile, row: Section, default_name: str) -> Stop:
 def _task(row: Section) -> Task | None:
     angle = row.number("angle", 90.0, _TURN, "deg")
     service = network_name(row, "service")
-    # A task that could not be read has its own problem: do not add one about its angle or service.
-    found = row.problem_count
     kind = row.text("task", TASKS[0], TASKS)
-    if row.problem_count > found:
+    if not row.is_good("task"):  # then nothing is known of its angle or service
         return None
     if "angle" in row and kind != "turn":
         row.problem("angle", "nothing, as the task is not 'turn'")

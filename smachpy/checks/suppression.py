@@ -8,16 +8,20 @@ import inspect
 import linecache
 import re
 import tomllib
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from actionlib_core.checked_file import REQUIRED, CheckedFile
 from smachpy.checks.model import RULES
 from smachpy.exceptions import SmachError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from actionlib_core.checked_file import Parsed, Section
+    from actionlib_core.checked_file import Problem as WrongField
     from smachpy.checks.model import Problem
     from smachpy.machines.state import State
 
@@ -119,45 +123,56 @@ def read_settings(start: Path) -> Settings:
     """Return the settings of the nearest pyproject.toml at or above `start`.
 
     Raises:
-        IgnoreError: they are invalid.
+        IgnoreError: they are invalid; all problems at once, with their lines.
     """
     for folder in (start, *start.resolve().parents):
-        file = folder / "pyproject.toml"
-        if file.is_file():
-            table = tomllib.loads(file.read_text(encoding="utf-8"))
-            where = f"{file}: [tool.smachpy.check]"
-            return _settings(where, table.get("tool", {}).get("smachpy", {}).get("check", {}))
+        path = folder / "pyproject.toml"
+        if path.is_file():
+            file = CheckedFile(path, _error, _parse_toml)
+            settings = _settings(file.top.section("tool").section("smachpy").section("check"))
+            file.check()
+            return settings
     return Settings()
 
 
-def _settings(where: str, table: dict[str, Any]) -> Settings:
-    unknown = sorted(set(table) - {"ignore", "enable", "properties"})
-    if unknown:
-        raise IgnoreError(f"{where}: got {unknown}; expected 'ignore', 'enable' and 'properties'.")
-    enable = table.get("enable", [])
-    if not isinstance(enable, list):
-        raise IgnoreError(f"{where}: enable: got {enable!r}; expected a list of rules.")
-    for rule in enable:
-        check_rule(f"{where}: enable", rule)
+def _error(problems: Sequence[WrongField]) -> IgnoreError:
+    return IgnoreError("\n".join(map(str, problems)))
+
+
+def _parse_toml(file: CheckedFile, text: str) -> Parsed:
+    """Return the data in a TOML text, and the lines of its tables and of their keys.
+
+    Python's parser does not tell lines. Values inside others have the line of the outer one.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        file.report("", f"not TOML: {error}.", 0)
+        return None, {}
+    lines, table, counts = {}, "", Counter[str]()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := re.match(r"\s*(\[\[?)([\w.-]+)\]", line):
+            table = header[2]
+            if header[1] == "[[":
+                table = f"{header[2]}[{counts[header[2]]}]"
+                counts[header[2]] += 1
+            lines[table] = number
+        elif key := re.match(r"\s*([\w.-]+)\s*=", line):
+            lines[f"{table}.{key[1]}"] = number
+    return data, lines
+
+
+def _settings(section: Section) -> Settings:
     ignores = []
-    for i, entry in enumerate(table.get("ignore", [])):
-        if not isinstance(entry, dict) or set(entry) - {"rule", "path", "reason"}:
-            raise IgnoreError(
-                f"{where}: ignore[{i}]: got {entry!r}; expected a table with 'rule', 'reason' and "
-                "maybe 'path'."
-            )
-        _check(f"{where}: ignore[{i}]", str(entry.get("rule", "")), str(entry.get("reason", "")))
-        ignores.append(Ignore(entry["rule"], entry["reason"], entry.get("path", "*")))
-    given = table.get("properties", {})
-    where = f"{where}: properties"
-    if not isinstance(given, dict):
-        raise IgnoreError(f"{where}: got {given!r}; expected a table of machines' names.")
-    for name, texts in given.items():
-        if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
-            hint = f" Try [{texts!r}]." if isinstance(texts, str) else ""
-            raise IgnoreError(f"{where}: {name}: got {texts!r}; expected a list of texts.{hint}")
-    properties = tuple((name, tuple(texts)) for name, texts in given.items())
-    return Settings(tuple(ignores), tuple(enable), properties)
+    for row in section.rows("ignore", ()):
+        rule, reason = row.text("rule", REQUIRED, tuple(RULES)), row.text("reason", REQUIRED)
+        ignores.append(Ignore(rule, reason, row.text("path", "*")))
+        row.close()
+    enable = section.texts("enable", (), tuple(RULES))
+    properties = section.section("properties")
+    texts = tuple((name, properties.texts(name, ())) for name in properties)
+    section.close()
+    return Settings(tuple(ignores), enable, texts)
 
 
 def check_rule(where: str, rule: object) -> None:

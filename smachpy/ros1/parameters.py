@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import copy
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.checked_file import CheckedFile
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.suggest import did_you_mean
-from actionlib_core.yaml_text import load_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-    from pathlib import Path
+    from collections.abc import Collection, Iterator, Sequence
 
+    from actionlib_core.checked_file import Problem
     from actionlib_core.wire.ros1.bridge import Ros1Bridge
 
 
@@ -28,9 +29,9 @@ class ParameterFileError(ActionlibError):
         path: The file.
     """
 
-    def __init__(self, path: Path, problem: str) -> None:
-        self.path = path
-        super().__init__(f"parameters {str(path)!r}: {problem}")
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.path = Path(problems[0].file)
+        super().__init__("\n".join(f"parameters {problem}" for problem in problems))
 
 
 class Parameters:
@@ -158,21 +159,14 @@ class Parameters:
         return found
 
 
-def read_file(path: Path) -> dict[Any, Any]:
+def read_file(path: Path) -> dict[str, Any]:
     """Return the values of a YAML file of parameters.
 
     Raises:
         ParameterFileError: the file cannot be read, or is not a dict.
     """
-    try:
-        values = load_yaml(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise ParameterFileError(path, f"{error}") from error
-    if values is None:
-        return {}
-    if not isinstance(values, dict):
-        raise ParameterFileError(path, f"got {values!r:.60}; expected a dict of parameters.")
-    return values
+    top = CheckedFile(path, ParameterFileError, may_be_empty=True).top
+    return {name: top.value(name) for name in top}
 
 
 def _clean(name: str) -> str:

@@ -9,39 +9,25 @@ The YAML file has one section per class and one line per field:
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, TypeVar
 
-from smachpy.sim.checked_yaml import REQUIRED, Document, Limits
+from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits
+from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.geometry import ORIGIN, Pose2D, wrap_angle
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
-    from smachpy.sim.checked_yaml import Section
+    from actionlib_core.checked_file import Section
 
 S = TypeVar("S")
 
 
-def _quantity(
-    default: float,
-    unit: str,
-    doc: str,
-    *,
-    low: float | None = None,
-    above: float | None = None,
-    high: float | None = None,
-) -> float:
-    limits = Limits(low=low, above=above, high=high)
-    metadata = {"unit": unit, "doc": doc, "limits": limits}
-    result: float = field(default=default, metadata=metadata)
-    return result
-
-
-def _count(default: int, doc: str, *, low: int, high: int) -> int:
-    limits = Limits(low=low, high=high)
-    result: int = field(default=default, metadata={"unit": "", "doc": doc, "limits": limits})
+def _quantity(default: S, unit: str, doc: str, **limits: float) -> S:
+    metadata = {"unit": unit, "doc": doc, "limits": Limits(**limits)}
+    result: S = field(default=default, metadata=metadata)
     return result
 
 
@@ -111,7 +97,7 @@ class ControlConfig:
 class RecoveryConfig:
     """What it tries when no way is left."""
 
-    attempts: int = _count(3, "Recoveries before the goal is aborted.", low=0, high=100)
+    attempts: int = _quantity(3, "", "Recoveries before the goal is aborted.", low=0, high=100)
     back_up: float = _quantity(0.3, "m", "How far it backs up.", low=0, high=5)
     patience: float = _quantity(1.0, "s", "Pause before it looks again.", low=0, high=600)
     traffic_patience: float = _quantity(
@@ -126,7 +112,7 @@ class ScanConfig:
     rate: float = _quantity(
         5.0, "Hz", "Scans per second, while there are subscribers.", above=0, high=50
     )
-    rays: int = _count(271, "Rays of a scan.", low=2, high=10_000)
+    rays: int = _quantity(271, "", "Rays of a scan.", low=2, high=10_000)
     field: float = _quantity(
         4.712389, "rad", "Angle from the first ray to the last.", above=0, high=6.2832
     )
@@ -175,8 +161,8 @@ def load_config(path: Path) -> SimConfig:
     Raises:
         InputFileError: the file has problems; all are listed.
     """
-    document = Document(path)
-    top = document.top
+    file = CheckedFile(path, InputFileError)
+    top = file.top
     config = SimConfig(
         robot=_read(top.section("robot"), RobotConfig),
         planner=_read(top.section("planner"), PlannerConfig),
@@ -189,7 +175,7 @@ def load_config(path: Path) -> SimConfig:
     )
     top.allow("start", "dock")
     top.close()
-    document.check()
+    file.check()
     return config
 
 
@@ -202,18 +188,25 @@ def read_pose(section: Section) -> Pose2D:
     return Pose2D(x, y, wrap_angle(yaw))
 
 
+def read_file(
+    section: Section, key: str, load: Callable[[Path], S], default: Path | None = None
+) -> S | None:
+    """Return what is in the file that the field `key` names, or else in `default`.
+
+    None without either, or if the file has problems: they are added to those of the section's file.
+    """
+    section.allow(key)
+    path = section.file.folder / section.text(key, REQUIRED) if key in section else default
+    if path is not None and section.is_good(key):
+        try:
+            return load(path)
+        except InputFileError as error:
+            section.file.problems += error.problems
+    return None
+
+
 def _read(section: Section, kind: type[S]) -> S:
     """Read one parameter class from its section."""
-    values: dict[str, object] = {}
-    hints = get_type_hints(kind)
-    for item in dataclasses.fields(kind):  # type: ignore[arg-type]
-        if hints[item.name] is bool:
-            values[item.name] = section.flag(item.name, item.default)
-        elif hints[item.name] is int:
-            limits = item.metadata["limits"]
-            values[item.name] = section.integer(item.name, item.default, limits)
-        else:
-            limits, unit = item.metadata["limits"], item.metadata["unit"]
-            values[item.name] = section.number(item.name, item.default, limits, unit)
+    values = section.values(kind)
     section.close()
     return kind(**values)

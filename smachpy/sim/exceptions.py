@@ -14,7 +14,7 @@ from smachpy.exceptions import MissionError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from smachpy.sim.checked_yaml import Problem
+    from actionlib_core.checked_file import Problem
 
 
 class InputFileError(MissionError):

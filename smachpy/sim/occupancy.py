@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from smachpy.sim.checked_yaml import REQUIRED, Document, Limits, Problem
+from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits
 from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.geometry import Pose2D
 
@@ -90,8 +90,8 @@ def load_map(path: Path) -> OccupancyMap:
     Raises:
         InputFileError: a file has problems; each is listed with its line and field.
     """
-    document = Document(path)
-    top = document.top
+    file = CheckedFile(path, InputFileError)
+    top = file.top
     image = top.text("image", REQUIRED)
     resolution = top.number("resolution", REQUIRED, Limits(above=0, high=100), "m/cell")
     origin = Pose2D(*top.numbers("origin", REQUIRED, ("x [m]", "y [m]", "yaw [rad]")))
@@ -100,10 +100,14 @@ def load_map(path: Path) -> OccupancyMap:
     free = top.number("free_thresh", REQUIRED, Limits(low=0, high=1))
     mode = top.text("mode", "trinary", ("trinary", "scale", "raw"))
     top.close()
-    if not document.problems and free >= occupied:
+    if top.is_good("free_thresh", "occupied_thresh") and free >= occupied:
         top.problem("free_thresh", f"less than occupied_thresh ({occupied:g})")
-    document.check()
-    pixels, alpha = _read_image(document.name, path.parent / image, top.line("image"), mode)
+    if top.is_good("image", "mode"):
+        try:
+            pixels, alpha = _read_image(path.parent / image, mode)
+        except _ImageError as error:
+            top.report("image", str(error))
+    file.check()
     if negate:
         pixels = 255.0 - pixels
     if mode == "raw":
@@ -130,14 +134,16 @@ def _raw(pixels: NDArray[np.float64]) -> NDArray[np.int8]:
     return np.where(pixels <= OCCUPIED, pixels, UNKNOWN).astype(np.int8)
 
 
-def _read_image(
-    file: str, path: Path, line: int, mode: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+class _ImageError(Exception):
+    """The image of a map cannot be used."""
+
+
+def _read_image(path: Path, mode: str) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Return shades 0..255 (rows from the top, columns) and opacity 0..1 if the image has it."""
     from PIL import Image, UnidentifiedImageError
 
-    def broken(got: str, expected: str) -> InputFileError:
-        return InputFileError([Problem(file, line, "image", got, expected)])
+    def broken(got: str, expected: str) -> _ImageError:
+        return _ImageError(f"got {got}; expected {expected}.")
 
     try:
         with Image.open(path, formats=("PPM", "PNG")) as picture:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
+from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.names import check_base_name
-from smachpy.sim.checked_yaml import REQUIRED, Document, Limits
-from smachpy.sim.config import SimConfig, load_config
-from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.config import SimConfig, load_config, read_file
+from smachpy.sim.exceptions import InputFileError, NavigationError
 from smachpy.sim.floor import Floor, Obstacle
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
@@ -18,11 +18,13 @@ from smachpy.sim.occupancy import load_map
 from smachpy.sim.world import Dock, Robot, World
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from smachpy.sim.checked_yaml import Section
+    from actionlib_core.checked_file import Section
     from smachpy.sim.occupancy import OccupancyMap
+
+T = TypeVar("T")
 
 _SPEED: Final = Limits(above=0, high=10)
 _RADIUS: Final = Limits(above=0, high=5)
@@ -121,26 +123,15 @@ def load_world(path: Path) -> WorldSpec:
     Raises:
         InputFileError: a file has problems; each is listed with its line and field.
     """
-    document = Document(path)
-    top = document.top
-    grid = load_map(path.parent / top.text("map", REQUIRED) if "map" in top else OFFICE_MAP)
-    config = _config(top, "robot", path.parent, OFFICE_ROBOT)
-    names = _Names()
-    robots = tuple(
-        _robot(row, f"robot_{i}", config, grid, path.parent, names)
-        for i, row in enumerate(_rows(top, "robots"))
-    )
-    movers = tuple(
-        _mover(row, f"obstacle_{i}", grid, names) for i, row in enumerate(_rows(top, "moving"))
-    )
-    doors = tuple(_door(row, f"door_{i}", grid, names) for i, row in enumerate(_rows(top, "doors")))
-    docks = tuple(
-        _dock(row, f"dock_{i}", config, grid, names) for i, row in enumerate(_rows(top, "docks"))
-    )
-    top.allow("map", "robot", "robots", "moving", "doors", "docks")
-    top.close()
-    document.check()
-    return WorldSpec(path.name, grid, robots, movers, doors, docks)
+    reader = _Reader(CheckedFile(path, InputFileError))
+    robots = reader.read_each("robots", reader.robot, "robot_{}")
+    movers = reader.read_each("moving", reader.mover, "obstacle_{}")
+    doors = reader.read_each("doors", reader.door, "door_{}")
+    docks = reader.read_each("docks", reader.dock, "dock_{}")
+    reader.file.top.close()
+    reader.file.check()
+    assert reader.grid is not None  # otherwise there is a problem
+    return WorldSpec(path.name, reader.grid, robots, movers, doors, docks)
 
 
 def place_robots(
@@ -186,105 +177,91 @@ def _spiral(middle: Pose2D, step: float, reach: float) -> Iterator[Pose2D]:
                     yield Pose2D(middle.x + i * step, middle.y + j * step, middle.yaw)
 
 
-class _Names:
-    """Finds invalid names, and names that are used twice."""
+class _Reader:
+    """Reads the parts of a world; without a map or parameters of a robot, as far as possible."""
 
-    def __init__(self) -> None:
-        self._lines: dict[tuple[str, str], int] = {}
+    def __init__(self, file: CheckedFile) -> None:
+        self.file = file
+        self.grid = read_file(file.top, "map", load_map, OFFICE_MAP)
+        self._config = read_file(file.top, "robot", load_config, OFFICE_ROBOT)
+        self._names: dict[tuple[str, str], int] = {}  # kind and name -> line
 
-    def read(self, section: Section, kind: str, default: str) -> str:
-        """Return the name in a section."""
-        name = section.text("name", default)
+    def read_each(
+        self, key: str, read: Callable[[Section, str], T], default_name: str
+    ) -> tuple[T, ...]:
+        top = self.file.top
+        top.allow(key)
+        rows = top.rows(key) if key in top else ()
+        return tuple(read(row, default_name.format(i)) for i, row in enumerate(rows))
+
+    def robot(self, row: Section, default: str) -> RobotSpec:
+        name = self._name(row, "robot", default)
+        row.allow("config", "charge")  # that are not always read
+        config = read_file(row, "config", load_config) if "config" in row else self._config
+        pose = self._standing(row, config)
+        config = replace(config or SimConfig(), start=pose)
+        if "charge" in row:
+            charge = row.number("charge", REQUIRED, _CHARGE)
+            config = replace(config, battery=replace(config.battery, charge=charge))
+        row.close()
+        return RobotSpec(name, pose, config)
+
+    def mover(self, row: Section, default: str) -> MoverSpec:
+        name = self._name(row, "moving obstacle", default)
+        radius = row.number("radius", 0.3, _RADIUS, "m")
+        speed = row.number("speed", 0.8, _SPEED, "m/s")
+        loop = row.flag("loop", default=False)
+        places = []
+        for place in row.rows("places"):
+            places.append(self._place_on_map(place, "x", "y"))
+            place.close()
+        row.close()
+        return MoverSpec(name, tuple(places), radius, speed, loop)
+
+    def door(self, row: Section, default: str) -> DoorSpec:
+        name = self._name(row, "door", default)
+        ends = (*self._place_on_map(row, "x0", "y0"), *self._place_on_map(row, "x1", "y1"))
+        seconds = row.number("seconds", 3.0, _SECONDS, "s")
+        is_open = row.flag("open", default=False)
+        row.close()
+        if row.is_good("x0", "y0", "x1", "y1") and math.dist(ends[:2], ends[2:]) < _SHORTEST_DOOR:
+            row.problem("x1", f"an end at least {_SHORTEST_DOOR} m from (x0, y0)")
+        return DoorSpec(name, ends, seconds, is_open)
+
+    def dock(self, row: Section, default: str) -> Dock:
+        name = self._name(row, "dock", default)
+        pose = self._standing(row, self._config)
+        row.close()
+        return Dock(name, pose)
+
+    def _name(self, row: Section, kind: str, default: str) -> str:
+        """Read a name, which nothing else of this kind has."""
+        name = row.text("name", default)
         try:
             check_base_name(name, f"{kind} name")
         except InvalidNameError as error:
-            section.problem("name", f"a {kind} name of one word", f"{error.reason}.")
-        line = section.line("name")
-        if (kind, name) in self._lines:
-            other = self._lines[kind, name]
-            section.problem("name", f"another name than the {kind} in line {other}")
-        self._lines[kind, name] = line
+            row.problem("name", f"a {kind} name of one word", f"{error.reason}.")
+        if (kind, name) in self._names:
+            other = self._names[kind, name]
+            row.problem("name", f"another name than the {kind} in line {other}")
+        self._names[kind, name] = row.line("name")
         return name
 
+    def _standing(self, row: Section, config: SimConfig | None) -> Pose2D:
+        """Read a pose at which the robot can stand; the section stays open."""
+        x = row.number("x", REQUIRED, unit="m")
+        y = row.number("y", REQUIRED, unit="m")
+        yaw = row.number("yaw", 0.0, unit="rad")
+        if row.is_good("x", "y") and self.grid is not None and config is not None:
+            try:
+                Floor(self.grid, config.robot.radius, config.planner).check_place(x, y)
+            except NavigationError as error:
+                reason = str(error).removeprefix("goal ")
+                row.problem("x", "a place where the robot can stand", f"{reason}.")
+        return Pose2D(x, y, yaw)
 
-def _rows(top: Section, key: str) -> Sequence[Section]:
-    return top.rows(key) if key in top else ()
-
-
-def _config(section: Section, key: str, folder: Path, default: Path | SimConfig) -> SimConfig:
-    if key in section:
-        return load_config(folder / section.text(key, REQUIRED))
-    return default if isinstance(default, SimConfig) else load_config(default)
-
-
-def _robot(
-    row: Section,
-    default: str,
-    config: SimConfig,
-    grid: OccupancyMap,
-    folder: Path,
-    names: _Names,
-) -> RobotSpec:
-    name = names.read(row, "robot", default)
-    config = _config(row, "config", folder, config)
-    if "charge" in row:
-        charge = row.number("charge", REQUIRED, _CHARGE)
-        config = replace(config, battery=replace(config.battery, charge=charge))
-    pose = _standing(row, config, grid)
-    row.allow("config", "charge")
-    row.close()
-    return RobotSpec(name, pose, replace(config, start=pose))
-
-
-def _standing(row: Section, config: SimConfig, grid: OccupancyMap) -> Pose2D:
-    """Read a pose at which the robot can stand; the section stays open."""
-    x = row.number("x", REQUIRED, unit="m")
-    y = row.number("y", REQUIRED, unit="m")
-    yaw = row.number("yaw", 0.0, unit="rad")
-    if "x" in row and "y" in row:
-        try:
-            Floor(grid, config.robot.radius, config.planner).check_place(x, y)
-        except NavigationError as error:
-            reason = str(error).removeprefix("goal ")
-            row.problem("x", "a place where the robot can stand", f"{reason}.")
-    return Pose2D(x, y, yaw)
-
-
-def _mover(row: Section, default: str, grid: OccupancyMap, names: _Names) -> MoverSpec:
-    name = names.read(row, "moving obstacle", default)
-    radius = row.number("radius", 0.3, _RADIUS, "m")
-    speed = row.number("speed", 0.8, _SPEED, "m/s")
-    loop = row.flag("loop", default=False)
-    places = []
-    for place in row.rows("places"):
-        x = place.number("x", REQUIRED, unit="m")
-        y = place.number("y", REQUIRED, unit="m")
-        place.close()
-        if grid.cell(x, y) is None:
-            place.problem("x", "a place on the map", f"({x:.2f}, {y:.2f}) is outside.")
-        places.append((x, y))
-    row.close()
-    return MoverSpec(name, tuple(places), radius, speed, loop)
-
-
-def _door(row: Section, default: str, grid: OccupancyMap, names: _Names) -> DoorSpec:
-    name = names.read(row, "door", default)
-    keys = ("x0", "y0", "x1", "y1")
-    x0, y0, x1, y1 = (row.number(key, REQUIRED, unit="m") for key in keys)
-    seconds = row.number("seconds", 3.0, _SECONDS, "s")
-    is_open = row.flag("open", default=False)
-    row.close()
-    if all(key in row for key in keys):
-        if math.hypot(x1 - x0, y1 - y0) < _SHORTEST_DOOR:
-            row.problem("x1", f"an end at least {_SHORTEST_DOOR} m from (x0, y0)")
-        for key, x, y in (("x0", x0, y0), ("x1", x1, y1)):
-            if grid.cell(x, y) is None:
-                row.problem(key, "a place on the map", f"({x:.2f}, {y:.2f}) is outside.")
-    return DoorSpec(name, (x0, y0, x1, y1), seconds, is_open)
-
-
-def _dock(row: Section, default: str, config: SimConfig, grid: OccupancyMap, names: _Names) -> Dock:
-    name = names.read(row, "dock", default)
-    pose = _standing(row, config, grid)
-    row.close()
-    return Dock(name, pose)
+    def _place_on_map(self, row: Section, x_key: str, y_key: str) -> tuple[float, float]:
+        x, y = (row.number(key, REQUIRED, unit="m") for key in (x_key, y_key))
+        if row.is_good(x_key, y_key) and self.grid is not None and self.grid.cell(x, y) is None:
+            row.problem(x_key, "a place on the map", f"({x:.2f}, {y:.2f}) is outside.")
+        return x, y

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits, parse_yaml
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.names import check_name
-from smachpy.sim.checked_yaml import REQUIRED, Document, Limits
-from smachpy.sim.config import SimConfig, load_config
-from smachpy.sim.exceptions import NavigationError
+from smachpy.sim.config import SimConfig, load_config, read_file
+from smachpy.sim.exceptions import InputFileError, NavigationError
 from smachpy.sim.geometry import Pose2D, wrap_angle
 from smachpy.userdata.kept_types import register_type
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from smachpy.sim.checked_yaml import Section
+    from actionlib_core.checked_file import Section
     from smachpy.sim.floor import Floor
 
 _SHARE: Final = Limits(low=0.0, high=1.0)
@@ -54,7 +55,7 @@ class Route:
     charge_until: float
 
 
-class PlaceFile(Document):
+class PlaceFile(CheckedFile):
     """A YAML or CSV file with places; base of the readers of such files.
 
     With the field `map` (and `robot`, for its radius) every place is checked against that map.
@@ -80,29 +81,31 @@ class PlaceFile(Document):
         csv_rows: str = "",
         csv_texts: Sequence[str] = (),
     ) -> None:
-        super().__init__(path, csv_rows, csv_texts)
+        parse = parse_yaml
+        if csv_rows and path.suffix.lower() == ".csv":
+            from smachpy.sim.checked_csv import parse_csv
+
+            parse = partial(parse_csv, key=csv_rows, texts=csv_texts)
+        super().__init__(path, InputFileError, parse)
         self.floor: Floor | None = None
-        robot = SimConfig()
-        if "robot" in self.top:
-            robot = load_config(path.parent / self.top.text("robot", REQUIRED))
-        if "map" in self.top:
-            map_file = path.parent / self.top.text("map", REQUIRED)
-        if map_file is not None:
+        self.top.allow("map", "robot")
+        robot = read_file(self.top, "robot", load_config) if "robot" in self.top else SimConfig()
+        if "map" in self.top or map_file is not None:
             from smachpy.sim.floor import Floor
             from smachpy.sim.occupancy import load_map
 
-            self.floor = Floor(load_map(map_file), robot.robot.radius, robot.planner)
+            grid = read_file(self.top, "map", load_map, map_file)
+            if grid is not None and robot is not None:
+                self.floor = Floor(grid, robot.robot.radius, robot.planner)
 
     def place(self, section: Section, default_name: str) -> Waypoint:
         """Read a name and a pose, and close the section."""
         name = section.text("name", default_name)
-        found = section.problem_count
         x = section.number("x", REQUIRED, unit="m")
         y = section.number("y", REQUIRED, unit="m")
-        known = section.problem_count == found
         yaw = section.number("yaw", 0.0, unit="rad")
         section.close()
-        if self.floor is not None and known:
+        if self.floor is not None and section.is_good("x", "y"):
             try:
                 self.floor.check_place(x, y)
             except NavigationError as error:
@@ -130,7 +133,8 @@ class PlaceFile(Document):
         """Read the battery charges at which to begin and to end charging; 0 to 1."""
         low = self.top.number("low_battery", 0.3, _SHARE)
         until = self.top.number("charge_until", 0.9, _SHARE)
-        if "charge_until" in self.top and until <= low:
+        is_good = "charge_until" in self.top and self.top.is_good("low_battery", "charge_until")
+        if is_good and until <= low:
             self.top.problem("charge_until", f"more than low_battery ({low:g})")
         return low, until
 
@@ -146,15 +150,15 @@ class PlaceFile(Document):
 
 def network_name(row: Section, key: str) -> str:
     """Read a name of the network; "" if it is missing."""
+    row.allow(key)
     if key not in row:
-        row.text(key, "-")
         return ""
     name = row.text(key, REQUIRED)
     try:
         return check_name(name, key)
     except InvalidNameError as error:
         row.problem(key, "a name of the network", f"{error.reason}.")
-        return "-"
+        return name
 
 
 def load_route(path: str | Path) -> Route:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 
 import pytest
 
@@ -14,9 +15,21 @@ from actionlib_core.exceptions import ConfigError, FieldError
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.tools import yaml_msgs_str
 from actionlib_core.yaml_text import YamlTextError, load_yaml
+from missions.delivery.places import load_places
+from missions.fleet.site import load_site
+from missions.tour.tour_file import load_tour
 from smachpy import CBState, StateMachine
+from smachpy.checks import IgnoreError
+from smachpy.checks.suppression import read_settings
 from smachpy.events.recording import Recorder, RecordingError, read_recording
+from smachpy.pnp.mapping import read_mapping
+from smachpy.pnp.problems import PlanError
+from smachpy.sim.config import load_config as load_robot
 from smachpy.sim.exceptions import InputFileError
+from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.sim.occupancy import load_map
+from smachpy.sim.world_file import load_world
+from smachpy.states import load_route
 
 DEEP = "[" * 3000
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -39,16 +52,217 @@ TEXTS = {
     "digits": f"x: {'9' * 5000}\n",
     "control": "x: \x07\n",
 }
-FINE = {"unknown"}  # plain data with a tag that nobody knows
 
 
-@pytest.mark.parametrize("kind", ["safe", "rt"])
-@pytest.mark.parametrize("text", sorted(TEXTS.keys() - FINE))
-def test_a_yaml_text_is_refused_with_one_line(text, kind):
-    if (text, kind) == ("own part", "rt"):
-        return  # it is left out there
+ERRORS = (ConfigError, IgnoreError, InputFileError, PlanError)
+
+# For each kind of file one with several mistakes; behind #! are the wrong fields of the line.
+READERS = {
+    "configuration.yaml": (
+        load_config,
+        """                           #! user
+mode: clinet                          #! mode
+conect: [tcp/a:1]                     #! conect
+listen: [localhost]                   #! listen
+namespace: a b                        #! namespace
+lease: soon                           #! lease
+settle: -1                            #! settle
+password: secret
+tls:                                  #! tls.key
+  certificate: no.pem                 #! tls.certificate
+  verify_name: maybe                  #! tls.verify_name
+access:
+- users: [alice]                      #! access[0].names
+- names: [/a]                         #! access[1].names
+  permission: perhaps                 #! access[1].permission
+ros2:
+- router: localhost                   #! ros2[0].router
+  distro: foxi                        #! ros2[0].distro
+  namespace: 9 lives                  #! ros2[0].namespace
+  names: [/x, 3]                      #! ros2[0].names[1]
+  mode: router                        #! ros2[0].mode
+  probe: .nan                         #! ros2[0].probe
+  map:
+    a: {acton: b}                     #! ros2[0].map.a.acton
+    b: {action: a, topic: b}          #! ros2[0].map.b.topic
+    c: {topic: 'x y'}                 #! ros2[0].map.c.topic
+    d: 3                              #! ros2[0].map.d
+    e: {fields: {a: 1}}               #! ros2[0].map.e.fields.a
+    f: {}                             #! ros2[0].map.f.action
+- {robot: b, domain: -1, names: [/x]} #! ros2[1].domain ros2[1].names
+wire: ros1                            #! wire
+""",
+    ),
+    "robot.yaml": (
+        load_robot,
+        """
+robot: {radius: 0, sight: far}        #! robot.radius robot.sight
+planner:
+  unknown_is_free: 3                  #! planner.unknown_is_free
+recovery:
+  attempts: 1.5                       #! recovery.attempts
+scan: 7                               #! scan
+batery: {}                            #! batery
+start:                                #! start.y
+  x: 1
+dock: {x: 1, y: here}                 #! dock.y
+""",
+    ),
+    "map.yaml": (
+        load_map,
+        """
+image: nowhere.pgm                    #! image
+resolution: 0                         #! resolution
+origin: [1, 2]                        #! origin
+negate: 3                             #! negate
+occupied_thresh: 0.2
+free_thresh: 0.9                      #! free_thresh
+maps: trinary                         #! maps
+""",
+    ),
+    "world.yaml": (
+        load_world,
+        """
+robots:
+- {x: 4, y: 7.7, config: 7}           #! robots[0].config
+- {y: far}                            #! robots[1].x robots[1].y
+- {x: 99, y: 1}                       #! robots[2].x
+- x: 4
+  y: 7.7
+  name: my robot                      #! robots[3].name
+  charge: 3                           #! robots[3].charge
+moving:
+- speed: 0                            #! moving[0].speed
+  places:
+  - {x: 99, y: 2}                     #! moving[0].places[0].x
+  - 7                                 #! moving[0].places[1]
+doors:
+- {x0: 1, y0: 2, x1: 1, y1: 2}        #! doors[0].x1
+- {x0: 1, y0: 2, x1: 2, y1: y}        #! doors[1].y1
+docks: []                             #! docks
+door: 3                               #! door
+""",
+    ),
+    "world_without_map.yaml": (
+        load_world,
+        """
+map: [office]                         #! map
+robot: 5                              #! robot
+robots:
+- {x: 99, y: 1, yaw: left}            #! robots[0].yaw
+doors:
+- {x0: 1, y0: 2, x1: 99}              #! doors[0].y1
+""",
+    ),
+    "route.yaml": (
+        load_route,
+        f"""
+map: {OFFICE_MAP}
+robot: {OFFICE_ROBOT}
+dock: {{x: 9.8}}                      #! dock.y
+waypoints:
+- {{x: 0.5, y: 5.0}}                  #! waypoints[0].x
+- kitchen                             #! waypoints[1]
+- {{x: 2.0, y: 3.0, yaww: 1}}         #! waypoints[2].yaww
+- {{name: off, x: 50, y: 5.0}}        #! waypoints[3].x
+- {{name: tight, x: 0.75, y: 5.0}}    #! waypoints[4].x
+low_battery: 2                        #! low_battery
+charge_until: full                    #! charge_until
+""",
+    ),
+    "tour.yaml": (
+        load_tour,
+        """
+waypoints:
+- {name: 7, x: here, y: 2}            #! waypoints[0].name waypoints[0].x
+- {x: 1, y: 2, dwell: -1, angle: 400} #! waypoints[1].dwell waypoints[1].angle
+- {x: 1, y: 2, service: a b}          #! waypoints[2].service
+- {x: 1, y: 2, task: turrn}           #! waypoints[3].task
+maps: office.yaml                     #! maps
+""",
+    ),
+    "tour.csv": (
+        load_tour,
+        """name,x,y,dwell,task,clour
+a,here,2,,,red                        #! waypoints[0].x waypoints[0].clour
+b,1,,-1,turrn                         #! waypoints[1].y waypoints[1].dwell waypoints[1].task
+""",
+    ),
+    "places.yaml": (
+        load_places,
+        """
+home: 3                               #! home
+places:
+- {name: a, x: 1, y: 2}
+- name: a                             #! places[1].name
+  x: 1
+  y: 2
+  door: a b                           #! places[1].door
+  wait: {x: 1}                        #! places[1].wait.y
+- {x: 1, y: 2, wait: 3}               #! places[2].name places[2].wait
+""",
+    ),
+    "site.yaml": (
+        load_site,
+        """
+docks: []                             #! docks
+homes:                                #! homes
+places:
+- {name: a, x: 1, y: 2}
+- {name: a, x: b, y: 2}               #! places[1].name places[1].x
+map: 7                                #! map
+""",
+    ),
+    "pyproject.toml": (
+        lambda path: read_settings(path.parent),
+        """
+[project]
+enable = []
+[tool.smachpy.check]
+enable = ["no-timeout", "x"]          #! tool.smachpy.check.enable[1]
+ignored = []                          #! tool.smachpy.check.ignored
+[[tool.smachpy.check.ignore]]
+rule = "no-timeout"
+reason = "it takes long"
+[[tool.smachpy.check.ignore]]         #! tool.smachpy.check.ignore[1].reason
+rule = "no-timeouts"                  #! tool.smachpy.check.ignore[1].rule
+paths = "/A"                          #! tool.smachpy.check.ignore[1].paths
+[tool.smachpy.check.properties]
+A = ["never(B)"]
+B = "never(C)"                        #! tool.smachpy.check.properties.B
+""",
+    ),
+    "actions.yaml": (
+        read_mapping,
+        """
+actions:
+  a: {run: no colon}                  #! actions.a.run
+  b: {run: "nowhere_x:f", every: 1}   #! actions.b.run actions.b.every
+  c: {}                               #! actions.c
+  d: 3                                #! actions.d
+  e:
+    action: move_base
+    type: move_base_msgs/Move         #! actions.e.type
+    case: {}                          #! actions.e.case
+    timeout: -1                       #! actions.e.timeout
+conditions:
+  f: {}                               #! conditions.f
+  g: {userdata: "f(x)"}               #! conditions.g.userdata
+  h: {topic: t, when: "data >"}       #! conditions.h.when conditions.h.type
+  i: {run: "os:getcwd", every: x}     #! conditions.i.every
+strict: maybe                         #! strict
+events: never                         #! events
+server: {timeout: 0, every: x}        #! server.timeout server.every
+condition: {}                         #! condition
+""",
+    ),
+}
+
+
+@pytest.mark.parametrize("text", sorted(TEXTS))
+def test_a_yaml_text_is_refused_with_one_line(text):
     with pytest.raises(YamlTextError) as caught:
-        load_yaml(TEXTS[text], kind)
+        load_yaml(TEXTS[text])
     assert "\n" not in str(caught.value)
     assert caught.value.reason
 
@@ -58,23 +272,31 @@ def test_a_yaml_text_is_refused_with_one_line(text, kind):
 def test_every_reader_of_yaml_refuses_it(text, tmp_path):
     path = tmp_path / "file.yaml"
     path.write_text(TEXTS[text])
-    with pytest.raises(ConfigError):
-        load_config(path)
     with pytest.raises(FieldError):
         String.from_yaml(TEXTS[text])
     with pytest.raises(FieldError):
         yaml_msgs_str(String, TEXTS[text])
-    from missions.delivery.places import load_places
-    from missions.fleet.site import load_site
-    from missions.tour.tour_file import load_tour
-    from smachpy.sim.config import load_config as load_robot
-    from smachpy.sim.occupancy import load_map
-    from smachpy.sim.world_file import load_world
-    from smachpy.states import load_route
-
-    for read in (load_tour, load_route, load_places, load_site, load_robot, load_map, load_world):
-        with pytest.raises(InputFileError):
+    for read in (read for name, (read, _) in READERS.items() if name.endswith(".yaml")):
+        with pytest.raises(ERRORS):
             read(path)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_all_mistakes_of_a_file_come_at_once_with_their_lines(name, tmp_path):
+    read, text = READERS[name]
+    path = tmp_path / name
+    path.write_text(re.sub(" *#!.*", "", text))
+    with pytest.raises(ERRORS) as caught:
+        read(path)
+    expected = [
+        (number, field)
+        for number, line in enumerate(text.splitlines(), 1)
+        for field in line.partition("#!")[2].split()
+    ]
+    told = re.findall(r"^.*?(?:line |:)(\d+): (\S+): ", str(caught.value), re.MULTILINE)
+    found = [(int(line), field) for line, field in told]
+    assert sorted(found) == sorted(expected)
+    assert [line for line, _ in found] == [line for line, _ in expected]  # in this order
 
 
 @pytest.mark.parametrize("value", ["1" + "0" * 400, ".nan", ".inf", "1e999", "٣"])
@@ -83,8 +305,6 @@ def test_a_number_that_no_float_holds_is_refused(value, tmp_path):
     path.write_text(f"lease: {value}\n", encoding="utf-8")
     with pytest.raises(ConfigError, match="lease"):
         load_config(path)
-    from missions.tour.tour_file import load_tour
-
     path.write_text(f"waypoints: [{{name: a, x: {value}, y: 1}}]\n", encoding="utf-8")
     with pytest.raises(InputFileError, match="expected a number"):
         load_tour(path)

@@ -46,19 +46,6 @@ def test_a_file_says_what_is_where(tmp_path) -> None:
     assert [entry.name_there for entry in network.map] == ["navigate_to_pose", "arm/go"]
 
 
-def test_a_wrong_file_names_everything_at_once(tmp_path) -> None:
-    path = tmp_path / "robot.yaml"
-    path.write_text(
-        "ros2:\n  map:\n    a: {acton: x}\n    b: {action: a, topic: b}\n    c: 3\n"
-        "    d: {fields: {a: 1}}\n    e: {}\n    f: {action: 'x y'}\n"
-    )
-    with pytest.raises(ConfigError) as caught:
-        load_config(path)
-    assert [problem.partition(":")[0] for problem in caught.value.problems] == [
-        f"line {line}" for line in range(3, 9)
-    ]
-
-
 def test_which_names_are_on_ros2() -> None:
     clock = RealClock()
     networks = (

@@ -73,14 +73,14 @@ def test_a_rule_that_is_off_is_switched_on_here_or_in_pyproject(tmp_path, monkey
     [
         ('ignore = [{rule = "unreachable-state"}]', "reason"),
         ('ignore = [{rule = "unreachable-stat", reason = "x"}]', "unreachable-state"),
-        ("ignore = [1]", "table"),
-        ("ignored = []", "'ignored'"),
-        ('enable = "no-timeout"', "enable: got 'no-timeout'; expected a list of rules"),
+        ("ignore = [1]", "ignore[0]: got 1; expected a mapping"),
+        ("ignored = []", "ignored: got an unknown field"),
+        ('enable = "no-timeout"', "enable: got 'no-timeout'; expected a list of texts. Try ['no"),
         ('enable = ["no-timeouts"]', "Did you mean 'no-timeout'?"),
-        ("enable = [[]]", "enable: rule: got []"),
-        ('properties = "never(B)"', "properties: got 'never(B)'; expected a table"),
+        ("enable = [[]]", "enable[0]: got []"),
+        ('properties = "never(B)"', "properties: got 'never(B)'; expected a mapping"),
         ('properties = {M = "never(B)"}', "M: got 'never(B)'; expected a list of texts. Try ['ne"),
-        ("properties = {M = [1]}", "M: got [1]; expected a list of texts"),
+        ("properties = {M = [1]}", "M[0]: got 1; expected a text"),
     ],
 )
 def test_a_pyproject_that_makes_no_sense(folder, capsys, text, said):

@@ -5,7 +5,6 @@ import dataclasses
 import pytest
 
 from smachpy.sim.config import SimConfig, load_config
-from smachpy.sim.exceptions import InputFileError
 from smachpy.sim.geometry import Pose2D
 from smachpy.sim.maps import OFFICE_ROBOT
 
@@ -19,28 +18,6 @@ def test_what_is_left_out_has_its_default(tmp_path):
     assert config.planner == SimConfig().planner
     assert config.start == pytest.approx(Pose2D(1, 2, 7 - 6.283185307))
     assert config.dock is None
-
-
-def test_all_problems_come_at_once_with_unit_and_limits(tmp_path):
-    path = tmp_path / "r.yaml"
-    path.write_text(
-        "robot: {radius: 0, max_speed: fast}\nplanner: {unknown_is_free: 3}\n"
-        "recovery: {attempts: 1.5}\nstart: {x: 1}\nbatery: {}\ncontrol: 7\n"
-    )
-    with pytest.raises(InputFileError) as error:
-        load_config(path)
-    fields = {p.field for p in error.value.problems}
-    assert fields == {
-        "robot.radius",
-        "robot.max_speed",
-        "planner.unknown_is_free",
-        "recovery.attempts",
-        "start.y",
-        "batery",
-        "control",
-    }
-    assert "robot.radius: got 0; expected a number [m] > 0, at most 5." in str(error.value)
-    assert "Did you mean 'battery'?" in str(error.value)
 
 
 def test_the_office_robot_is_valid_and_starts_at_its_dock():
