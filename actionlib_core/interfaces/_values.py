@@ -232,7 +232,8 @@ class _Check:
             return self.message(cls, value, path)  # may be before 1970, which our `Time` is not
         if self._from_plain:
             value = _plain_time(value)
-        return to_ros2_time(cls, value)
+        # Checked as any message: our `Time` holds seconds that ROS 2's cannot.
+        return self.message(cls, to_ros2_time(cls, value), path)
 
 
 def _kind(value: object) -> str:

@@ -337,6 +337,10 @@ def test_stamps_take_times_and_seconds() -> None:
     assert Header.from_dict(before_1970.to_dict()) == before_1970
     with pytest.raises(FieldError, match="sec: expected int32"):
         Header.from_dict({"stamp": {"sec": 2**31}})
+    for late in (2**31, Time(2**31), -(2**31) - 1):
+        header.stamp = late
+        with pytest.raises(FieldError, match=r"\$\.stamp"):
+            header.to_cdr()
     from actionlib_core.interfaces.nav2_msgs.action import Wait
 
     assert Wait.Goal(time=Duration(-0.5)).time == Duration2(-1, 500_000_000)
