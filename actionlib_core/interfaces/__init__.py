@@ -166,14 +166,15 @@ def ros2_action(action: type[Ros2Action], distro: str | None = None) -> ActionPa
 
 
 def rihs01(message: type[Message] | str) -> str:
-    """Return the ROS 2 type hash ("RIHS01_...") of a message class or of its ROS name.
+    """Return the ROS 2 type hash ("RIHS01_...") of a message class, or of ROS 1's by its ROS name.
 
     Raises:
         InterfaceError: Unknown, or ROS 2 cannot have such a type.
     """
     from actionlib_core.interfaces import _typesys
 
-    return _typesys.rihs01(get_message(message) if isinstance(message, str) else message)
+    cls = get_message(message) if isinstance(message, str) else message
+    return cls._rihs01 if issubclass(cls, Ros2Message) else _typesys.rihs01(cls)
 
 
 def to_cdr(message: Message) -> bytes:
@@ -185,7 +186,7 @@ def to_cdr(message: Message) -> bytes:
     """
     from actionlib_core.interfaces import _typesys
 
-    return _typesys.to_cdr(message)
+    return message.to_cdr() if isinstance(message, Ros2Message) else _typesys.to_cdr(message)
 
 
 def from_cdr(cls: type[AnyMessage], data: bytes) -> AnyMessage:
@@ -197,4 +198,6 @@ def from_cdr(cls: type[AnyMessage], data: bytes) -> AnyMessage:
     """
     from actionlib_core.interfaces import _typesys
 
+    if issubclass(cls, Ros2Message):
+        return cls.from_cdr(data)
     return cast("AnyMessage", _typesys.from_cdr(cls, data))

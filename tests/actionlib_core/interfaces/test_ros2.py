@@ -279,6 +279,15 @@ string c 'a "b"'"""
     assert (cls().a, cls().b, cls().c) == ('say "#"', ['x, "y"', "it's"], 'a "b"')
 
 
+def test_functions_for_classes_of_ros_1_take_those_of_ros_2_too() -> None:
+    from actionlib_core.interfaces.nav2_msgs.action import Spin
+
+    goal = Spin.Goal(target_yaw=1.5)
+    assert interfaces.rihs01(Spin.Goal) == Spin.Goal._rihs01
+    assert interfaces.to_cdr(goal) == goal.to_cdr()
+    assert interfaces.from_cdr(Spin.Goal, goal.to_cdr()) == goal
+
+
 def test_a_comma_in_a_later_value_of_an_array_is_no_separator() -> None:
     registry = Ros2Registry("jazzy", ours=True)
     cls: Any = registry.define("msg", "p/msg/Commas", "string[] a ['x', \"y, z\" , '', 'w']")
