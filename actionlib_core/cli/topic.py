@@ -30,6 +30,7 @@ from actionlib_core.cli._network import (
     typed_class,
     types_of,
 )
+from actionlib_core.cli._ros2 import is_ros2
 from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
@@ -142,7 +143,8 @@ def _info(args: argparse.Namespace) -> int:
         group = [end for end in ends if end.kind is kind]
         print(f"{title} count: {len(group)}")
         for end in group if args.verbose else ():
-            print(f"  Node: /{end.node}  type: {end.type}  md5: {end.md5}")
+            checksum = "type hash" if is_ros2(end.type) else "md5"
+            print(f"  Node: /{end.node}  type: {end.type}  {checksum}: {end.md5}")
     return 0
 
 

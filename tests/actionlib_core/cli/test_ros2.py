@@ -74,7 +74,9 @@ def test_what_is_there(robot):
         "/odom [nav_msgs/msg/Odometry]",
     ]
     assert robot("service", "list", "-t") == "/reset [std_srvs/srv/Empty]\n"
-    assert "/driver" in robot("topic", "info", "odom", "-v")
+    assert "/driver  type: nav_msgs/msg/Odometry  type hash: RIHS01_0" in robot(
+        "topic", "info", "odom", "-v"
+    )
     assert robot("list", namespace="arm") == "/fib\n"
     assert robot("list", robot="robot1") == "/robot1/arm/fib\n"
     for end in ends:
