@@ -298,6 +298,21 @@ class Ros2Registry(Registry):
             status=topic("action_msgs/msg/GoalStatusArray"),
         )
 
+    def defines(self, full: str) -> bool:
+        """Return whether a type is defined, by its name in keys and tokens; any text is accepted.
+
+        It is much faster than to catch the error about an unknown type, which suggests others.
+        """
+        match = _NAME.match(full)
+        if match is None or match[2] is None:
+            return False
+        package, kind, short = match[1], cast("Kind", match[2]), match[3]
+        # Parts of services and actions have the name of these in front: `X_SendGoal_Request`.
+        return any(
+            self.sources.find(kind, package, name) is not None
+            for name in (short, short.partition("_")[0])
+        )
+
     def hash(self, full: str) -> str:
         """Return the type hash of "pkg/kind/Name", also of a type that has no class.
 

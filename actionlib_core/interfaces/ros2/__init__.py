@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces._ros2 import (
     DISTROS,
     NO_HASH,
@@ -45,6 +46,7 @@ __all__ = [
     "get_message",
     "get_service",
     "hash_of",
+    "is_defined",
     "set_default_distro",
 ]
 
@@ -92,13 +94,17 @@ def distros_of(name: str, type_hash: str) -> list[str]:
             "std_srvs/srv/SetBool", "nav_msgs/msg/Odometry".
         type_hash: "RIHS01_...".
     """
-    from actionlib_core.exceptions import InterfaceError
-
     found = []
     for distro in DISTROS:
+        registry = ros2_registry(distro)
         try:
-            if ros2_registry(distro).hash(name) == type_hash:
+            if registry.defines(name) and registry.hash(name) == type_hash:
                 found.append(distro)
-        except InterfaceError:
+        except InterfaceError:  # a definition of the user's is wrong
             continue
     return found
+
+
+def is_defined(name: str, distro: str | None = None) -> bool:
+    """Return whether a distribution defines a type, by its name in keys and tokens."""
+    return ros2_registry(distro).defines(name)

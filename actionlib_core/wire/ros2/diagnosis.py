@@ -9,7 +9,7 @@ from collections import Counter
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from actionlib_core.exceptions import InterfaceError, TypeMismatchError
+from actionlib_core.exceptions import TypeMismatchError
 from actionlib_core.interfaces import ros2
 from actionlib_core.suggest import did_you_mean
 from actionlib_core.wire.ros2.names import (
@@ -165,7 +165,7 @@ def diagnose_types(tokens: Iterable[Token], distro: str) -> list[Finding]:
         found = ros2.distros_of(name, type_hash)
         fitting.update(found)
         if distro not in found:
-            (wrong if _is_defined(name, distro) else unknown).append(name)
+            (wrong if ros2.is_defined(name, distro) else unknown).append(name)
     findings = []
     if wrong:
         best = max(ros2.DISTROS, key=lambda name: fitting[name])
@@ -300,14 +300,6 @@ def diagnose_clock(offsets: Mapping[str, tuple[float, float]]) -> Finding:
         "Stamps of goals are too old or in the future for the robot, which may wait for transforms "
         "or refuse. Set both clocks by one time service, chrony for example.",
     )
-
-
-def _is_defined(name: str, distro: str) -> bool:
-    try:
-        ros2.hash_of(name, distro)
-    except InterfaceError:
-        return False
-    return True
 
 
 def _named(names: Iterable[str]) -> str:

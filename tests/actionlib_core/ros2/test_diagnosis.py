@@ -89,6 +89,14 @@ def test_any_text_may_stand_for_a_type(name):
     assert name in unknown.text
 
 
+def test_no_similar_names_are_looked_for_which_takes_long_with_many_types(monkeypatch):
+    monkeypatch.setattr("actionlib_core.interfaces._ros2.did_you_mean", pytest.fail)
+    names = ("own_msgs/msg/Own", "nav2_msgs/srv/Own", "nav2_msgs/action/Own_SendGoal")
+    tokens = [end(Kind.SERVICE, "own", name, "RIHS01_" + "2" * 64) for name in names]
+    _, unknown = diagnose_types([*action(), *tokens], "jazzy")
+    assert unknown.text.startswith("3 are not defined here")
+
+
 def test_servers_that_are_not_whole_or_two():
     assert levels(diagnose_actions(action())) == [Level.OK]
     assert levels(diagnose_actions(action()[:4])) == [Level.PROBLEM]
