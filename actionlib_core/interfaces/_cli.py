@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import _stubs
+from actionlib_core.interfaces._definition import AS_ROS2
 from actionlib_core.interfaces._registry import parse_name, registry
 from actionlib_core.interfaces._ros2 import is_only_ros2, ros2_registry
 from actionlib_core.interfaces._sources import ACTION_PARTS, BUNDLED, KINDS, SERVICE_PARTS
@@ -113,17 +114,30 @@ def write_stubs(folder: str | os.PathLike[str], packages: Sequence[str] = ()) ->
 def _kinds_of(name: str) -> tuple[Registry, list[Kind]]:
     """Return the registry of a name, ROS 1's or else ROS 2's, and the kinds that define it.
 
-    Parts of services and actions count as messages of ROS 1.
+    Parts of services and actions count as messages of ROS 1. A file of the user's may be in either
+    dialect, so it belongs to the first registry that can read it.
+
+    Raises:
+        InterfaceError: Unknown, or neither can read it; the error is that of its dialect.
     """
     package, given, short = parse_name(name)
     kinds = [kind for kind in KINDS if given in {None, kind}]
     sources = [registry, ros2_registry()]
     if is_only_ros2(package):
         sources.reverse()
+    errors: list[InterfaceError] = []
     for source in sources:
         found = [kind for kind in kinds if source.sources.find(kind, package, short) is not None]
-        if found:
-            return source, found
+        try:
+            for kind in found:
+                _definitions(source, kind, package, short)
+        except InterfaceError as error:
+            errors.append(error)
+        else:
+            if found:
+                return source, found
+    if errors:
+        raise errors[-1 if AS_ROS2 in str(errors[0]) else 0]
     registry.message(name)  # raises if it is unknown
     return registry, ["msg"]
 

@@ -43,7 +43,7 @@ BUILTINS = tuple(n for n in (*INTEGERS, *FLOATS, "bool", "string", *TIMES) if n 
 """ROS 1's built-in types."""
 OCTETS = ("uint8", "char", "octet")
 """Types whose arrays are `bytes`."""
-_AS_ROS2 = "Try importing it from `actionlib_core.interfaces.ros2`"
+AS_ROS2 = "Try importing it from `actionlib_core.interfaces.ros2`"
 _ROS2_SPELT = {"char": "uint8", "byte": "octet"}
 """ROS 2's names of one byte: `char` is another name of `uint8`, `byte` is unsigned."""
 _ROS2_BUILTINS = (*(name for name in BUILTINS if name not in {*TIMES, "char"}), "octet")
@@ -61,6 +61,7 @@ _LONGEST_SHOWN = 40
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _TYPE = re.compile(r"([A-Za-z0-9_/]+?)(\[(\d*)\])?\Z")
+_ROS2_NAME = re.compile(r"[a-z]\w*/(msg|srv|action)/\w+(\[\d*\])?\Z", re.ASCII)
 _TYPE_PATH = re.compile(r"([a-zA-Z][A-Za-z0-9_]*/)?[A-Za-z][A-Za-z0-9_]*\Z")
 
 
@@ -288,8 +289,10 @@ class _Reader:
         if "<=" in text:
             what = (
                 f"bounded type {text!r} is ROS 2's; expected ROS 1's `string`, `type[]`, "
-                f"`type[N]`. {_AS_ROS2}"
+                f"`type[N]`. {AS_ROS2}"
             )
+        elif _ROS2_NAME.match(text):
+            what = f"type {text!r} is written as in ROS 2; expected `package/Name`. {AS_ROS2}"
         elif "[" in text or "]" in text:
             what = f"malformed array {text!r}; expected `type[]` or `type[N]`"
         else:
@@ -301,7 +304,7 @@ class _Reader:
         words = name.split()
         if len(words) > 1 and _NAME.match(words[0]):
             what = f"unexpected {words[1]!r} behind the field name; expected `type name`"
-            hint = f". Default values are ROS 2's; a constant is `type NAME=value`. {_AS_ROS2}"
+            hint = f". Default values are ROS 2's; a constant is `type NAME=value`. {AS_ROS2}"
             self._problem(at, column + name.index(words[1], len(words[0])), what + hint)
             return
         if self._check_name(at, column, name, "field"):

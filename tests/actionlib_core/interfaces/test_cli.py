@@ -100,3 +100,24 @@ def test_show_what_only_ros2_has() -> None:
     ]
     with pytest.raises(InterfaceError, match="nav2_msgs/NavigateToPosse"):
         _cli.show("nav2_msgs/NavigateToPosse")
+
+
+def test_show_files_of_the_user_in_either_dialect(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {
+        "msg/Lift.msg": "string<=9 name 'a'\n",
+        "action/Up.action": "cli_msgs/msg/Lift lift\n---\n---\nfloat32[<=2] left\n",
+        "msg/Old.msg": "time at\n",
+        "msg/Bad.msg": "string<=9 name\nLiftt lift\n",
+    }
+    for name, text in files.items():
+        path = tmp_path / "cli_msgs" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    monkeypatch.setenv("SMACHPY_INTERFACE_PATH", str(tmp_path))
+    assert _cli.show("cli_msgs/Up").startswith("cli_msgs/msg/Lift lift\n\tstring<=9 name 'a'\n---")
+    assert _cli.show("cli_msgs/msg/Old") == "time at"
+    assert _cli.describe("cli_msgs/Lift")["cli_msgs/msg/Lift"][0]["md5"].startswith("RIHS01_")
+    with pytest.raises(InterfaceError, match=r"Bad\.msg:2: unknown type: got 'cli_msgs/msg/Liftt'"):
+        _cli.show("cli_msgs/Bad")
