@@ -57,6 +57,18 @@ def test_private_parameters_stand_where_rosrun_has_them(smachpy, tmp_path):
     assert "3 [1, 2] ['mine']" in output
 
 
+def test_private_names_are_remapped(smachpy, tmp_path):
+    script = tmp_path / "private.py"
+    script.write_text(
+        "import rospy\nrospy.init_node('private')\n"
+        "print(rospy.resolve_name('~image'), rospy.resolve_name('~other'))\n"
+    )
+    words = ("--time", "virtual", "~image:=/camera/image")
+    code, output = smachpy("run", "--ros1", script, *words)
+    assert code == 0, output
+    assert "/camera/image /private/other" in output
+
+
 def test_what_is_missing_has_stand_ins_in_a_run_too(smachpy, tmp_path):
     script = tmp_path / "explored.py"
     script.write_text(

@@ -48,7 +48,9 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
     name = name.rstrip("/") if len(name) > 1 else name
     if name in {"/", "~"}:
         return "/" if name == "/" else get_name()
-    if caller_id is None and not (name[0] == "~" and session().name):
+    now = session()
+    # The node of a program that is only built has another name than the program gives it.
+    if caller_id is None and (name[0] != "~" or now.named_node or not now.name):
         return f"/{get_node().resolve(name)}"
     node = (caller_id or get_name()).strip("/")
     return f"/{_resolve(name, namespace=node.rpartition('/')[0], node=node)}"
