@@ -81,13 +81,7 @@ class Node:
     ) -> None:
         self.clock = clock if clock is not None else current_clock()
         self.arguments = arguments if arguments is not None else parse_arguments(())
-        self.name = check_base_name(self.arguments.node_name(name))
-        given = self.arguments.namespace(name)
-        self.namespace = clean_namespace(namespace if given is None else given)
-        self.full_name = f"{self.namespace}/{self.name}" if self.namespace else self.name
-        self._remappings = self.arguments.remappings(
-            name, namespace=self.namespace, node=self.full_name
-        )
+        self._set_name(name, namespace)
         if transport is None and not isinstance(self.clock, RealClock):
             raise NodeError(_NO_ZENOH.format(what=f"node {self.full_name}"))
         self.owns_transport = transport is None
@@ -105,6 +99,29 @@ class Node:
         self._asks: dict[int, Callable[[], object]] = {}
         self._closed = False
         self._leave_by: float | None = None
+
+    def _set_name(self, name: str, namespace: str) -> None:
+        self.name = check_base_name(self.arguments.node_name(name))
+        given = self.arguments.namespace(name)
+        self.namespace = clean_namespace(namespace if given is None else given)
+        self.full_name = f"{self.namespace}/{self.name}" if self.namespace else self.name
+        self._remappings = self.arguments.remappings(
+            name, namespace=self.namespace, node=self.full_name
+        )
+
+    def rename(self, name: str) -> None:
+        """Give the node a name when the program says it only after something has used the network.
+
+        What was made before stays announced under the old name; private names and remappings follow
+        the new one from now on.
+
+        Args:
+            name: As for a new node; a name on the command line still wins.
+
+        Raises:
+            InvalidNameError: the name breaks the ROS rules.
+        """
+        self._set_name(name, self.namespace)
 
     def __repr__(self) -> str:
         state = " closed" if self._closed else ""

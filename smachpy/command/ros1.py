@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, current_clock
-from actionlib_core.node import Node, get_node, init, use_node
+from actionlib_core.node import Node, get_node, use_node
 from actionlib_core.output import printable, tell
 from smachpy import describe
 from smachpy.command.out_folder import OutFolder
@@ -127,12 +127,12 @@ def _run(script: Path, argv: list[str], options: RunOptions) -> int | None:
 
 
 def _node_maker(options: RunOptions, stack: contextlib.ExitStack) -> Callable[[str], Node]:
+    from smachpy.ros1.program import ScriptNode
+    from smachpy.ros1.session import make_default
+
     def make(name: str) -> Node:
         if not options.pace.virtual:
-            from actionlib_core.node import has_node
-
-            return get_node() if has_node() else init(name, argv=())
-        from smachpy.ros1.program import ScriptNode
+            return make_default(name, ())
 
         before = get_node()
         node = ScriptNode(

@@ -19,7 +19,7 @@ from actionlib_core.node import get_node, init
 from smachpy.ros1.parameters import Parameters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from actionlib_core.node import Node
 
@@ -87,7 +87,7 @@ class Session:
         self.loaded = False
         self.rosout: Any = None
         self.on_action: Callable[[str], object] = lambda _name: None
-        self._make_node = make_node or _make_default
+        self._make_node = make_node or make_default
         self._handling = contextlib.ExitStack()
 
     def begin_node(self, name: str) -> Node:
@@ -162,11 +162,22 @@ class Session:
             self.stubbed.append(what)
 
 
-def _make_default(name: str) -> Node:
+def make_default(name: str, argv: Sequence[str] | None = None) -> Node:
+    """Return the default node under the name in `init_node`.
+
+    Scripts make publishers and clients before `init_node`, and the command's remappings need a node
+    as well, so that it may exist already.
+
+    Args:
+        name: The name.
+        argv: Arguments with remapping for a new node; None: those of the program.
+    """
     try:
-        return init(name)
-    except NodeError:  # something used the network before `init_node`: the node has another name
-        return get_node()
+        return init(name, argv)
+    except NodeError:
+        node = get_node()
+        node.rename(name)
+        return node
 
 
 _sessions: list[Session] = []

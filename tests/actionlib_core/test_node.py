@@ -41,6 +41,19 @@ def test_arguments_rename_node_and_names(network, clock):
     assert node.resolve("cancel") == "robot_2/cancel"
 
 
+def test_a_node_that_is_renamed_keeps_what_is_announced(network, clock):
+    arguments = parse_arguments(["goal:=~goal"])
+    node = Node("python_42", transport=network.session(), namespace="lab", arguments=arguments)
+    node.announce(Kind.SERVICE, "early", "p/T", "1")
+    node.rename("nav")
+    node.announce(Kind.SERVICE, "late", "p/T", "1")
+    assert (node.full_name, node.resolve("goal")) == ("lab/nav", "lab/nav/goal")
+    ends = list_endpoints(network.session())
+    assert {(e.name, e.node) for e in ends} == {("early", "lab/python_42"), ("late", "lab/nav")}
+    with pytest.raises(InvalidNameError, match="node name"):
+        node.rename("a b")
+
+
 def test_announced_ends_are_seen_until_closed(network, clock):
     node = Node("nav", transport=network.session())
     first = node.announce(Kind.SERVICE, "grip", "p/T", "1")

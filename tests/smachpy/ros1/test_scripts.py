@@ -57,6 +57,27 @@ def test_private_parameters_stand_where_rosrun_has_them(smachpy, tmp_path):
     assert "3 [1, 2] ['mine']" in output
 
 
+@pytest.mark.slow  # real time: joins a network
+@pytest.mark.parametrize("time", ["real", "virtual"])
+@pytest.mark.parametrize("before", ["", "rospy.Publisher('/early', String, queue_size=1)\n"])
+@pytest.mark.parametrize("words", [(), ("a:=b",)])
+def test_init_node_names_the_node_however_early_the_network_is_used(
+    smachpy, tmp_path, time, before, words
+):
+    script = tmp_path / "late.py"
+    script.write_text(
+        f"import rospy\nfrom std_msgs.msg import String\n{before}"
+        "rospy.init_node('my_node')\n"
+        "private = rospy.Publisher('~out', String, queue_size=1)\n"
+        "print(rospy.get_name(), private.name, rospy.get_param('~speed', 'the default'))\n"
+    )
+    params = tmp_path / "params.yaml"
+    params.write_text("my_node: {speed: 3}\n")
+    code, output = smachpy("run", "--ros1", script, "--time", time, "--params", params, *words)
+    assert code == 0, output
+    assert "/my_node /my_node/out 3" in output
+
+
 def test_private_names_are_remapped(smachpy, tmp_path):
     script = tmp_path / "private.py"
     script.write_text(
