@@ -128,6 +128,26 @@ def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(ser
     wait_for(page, "smachpy.store.overview.value")
 
 
+def linked(count):
+    """States of which each leads to each."""
+    outcomes = [f"to {n}" for n in range(count)]
+    sm = StateMachine(outcomes=["done"], name="LINKED")
+    with sm:
+        for n in range(count):
+            state = CBState(lambda _: "done", outcomes=outcomes)
+            StateMachine.add(f"S{n}", state, {f"to {m}": f"S{m}" for m in range(count)})
+    return sm
+
+
+@pytest.mark.parametrize(("count", "tiles"), [(8, False), (12, True), (40, True)])
+def test_states_that_all_lead_to_each_other_are_drawn_in_time(served, look, count, tiles):
+    served.add("linked", sm=linked(count))
+    page = look(served.start())
+    assert page.locator("g.leaf").count() == count
+    assert page.evaluate("() => smachpy.store.overview.value") is tiles
+    assert (page.locator("path.edge").count() >= count * count) is not tiles
+
+
 @pytest.mark.parametrize("count", [8, 100, 1000])
 def test_each_branch_of_a_concurrence_has_its_bar_however_many_they_are(served, look, count):
     fleet = Concurrence(outcomes=["done"], default_outcome="done", name="FLEET")

@@ -38,6 +38,8 @@ const GRID_FROM = 4; // children of a concurrence from which a grid is tried
 const FOLD_FROM = 7; // children of another container from which folding is tried
 const FOLD_COST = 1.3; // factor on the cost of a folded shape, because its lines are longer
 const OVERVIEW_FROM = 150; // visible states from which they are drawn as tiles
+const DENSE = { links: 48, perState: 4 }; // arrows of a container from which straight ones take too long to find
+const TANGLED = { links: 100, perState: 6 }; // arrows of a container from which states are drawn as tiles
 const TILE_GAP = 6;
 const HEAD = 24; // height of the name of a tile
 const HEAD_GROWS = 1.7; // factor for the name of each further level out
@@ -157,7 +159,7 @@ export class Layout {
    */
   async run(root, open, onProgress) {
     const all = countOf(root, open);
-    if (all > OVERVIEW_FROM) return overview(root, open, this.aspect);
+    if (all > OVERVIEW_FROM || isTangled(root, open)) return overview(root, open, this.aspect);
     if (this.cache.size > MOST_CACHED) this.forget();
     /** @type {StateNode[][]} */
     const levels = []; // innermost containers first
@@ -277,6 +279,17 @@ export class Layout {
     for (const child of result.boxes) if (child.inner) this.#settle(child.inner);
   }
 }
+
+/**
+ * Whether a container has more arrows than that, altogether and for each state.
+ * @param {StateNode} node @param {{ links: number, perState: number }} limit
+ */
+const hasOver = ({ links, children }, limit) =>
+  links.length > limit.links && links.length > limit.perState * children.length;
+
+/** Whether the arrows of a visible container are too many to follow. @param {StateNode} node @param {Set<string>} open @returns {boolean} */
+const isTangled = (node, open) =>
+  isOpen(node, open) && (hasOver(node, TANGLED) || node.children.some((child) => isTangled(child, open)));
 
 /** The number of visible states. @param {StateNode} node @param {Set<string>} open @returns {number} */
 const countOf = (node, open) =>
@@ -467,7 +480,8 @@ class Plan {
         "elk.hierarchyHandling": "SEPARATE_CHILDREN",
         "elk.padding": `[top=14,left=14,bottom=${bottom},right=${right}]`,
         "elk.layered.spacing.nodeNodeBetweenLayers": dir === "DOWN" ? "18" : "26",
-        "elk.layered.nodePlacement.strategy": "NETWORK_SIMPLEX",
+        // The simplex method makes more arrows straight, but takes minutes for a dozen states that all lead to each other.
+        "elk.layered.nodePlacement.strategy": hasOver(node, DENSE) ? "BRANDES_KOEPF" : "NETWORK_SIMPLEX",
         "elk.layered.nodePlacement.favorStraightEdges": "true",
         "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
         // A plan lists all places before all transitions: in that order half of its arcs would point back.
