@@ -1,6 +1,6 @@
 """Configuration of a program's network: by a file, the environment or an argument.
 
-Without a configuration, programs on the same machine find each other, and no other machine has
+Without a configuration, programs on the same computer find each other, and no other computer has
 access. A configuration can add a router to connect to, TLS, user and password, access rules, and
 the namespace of a robot.
 
@@ -141,8 +141,8 @@ class Ros2:
             corresponding types of ROS 2 are then used. `**` alone means every name whose type ROS 2
             has, except std_msgs and std_srvs, which programs also use among themselves.
         map: Names here that have another name or type there; they need not be in `names`.
-        mode: "client" reaches nodes only through the router, as is necessary from another machine;
-            "peer" communicates with them directly and faster, on the robot's own machine.
+        mode: "client" reaches nodes only through the router, as is necessary from another computer;
+            "peer" communicates with them directly and faster, on the robot's own computer.
         probe: Interval in which a server with running goals is probed [s], since ROS 2 may need a
             minute to notice a dead link; 0: never.
     """

@@ -20,7 +20,7 @@ DISCOVERY_GROUP = "224.0.0.224"  # Zenoh's default
 FIRST_PORT = 7446  # of discovery in domain 0; Zenoh's default
 SCOUT_S = 8.0  # Zenoh's longest interval between two searches for peers
 RETRY_S = 1.0  # interval of attempts to connect to an endpoint
-LOOPBACK = "tcp/127.0.0.1:0"  # a free port, not reachable from other machines
+LOOPBACK = "tcp/127.0.0.1:0"  # a free port, not reachable from other computers
 _MESSAGES = [
     "put",
     "delete",
