@@ -407,7 +407,10 @@ class GoalTimeoutError(GoalFailedError, TimeoutError):
         timeout: The allowed time [s].
     """
 
-    def __init__(self, name: str, goal_id: str, status: str, timeout: float) -> None:
+    def __init__(
+        self, name: str, goal_id: str, status: str, timeout: float, *, accepted: bool = True
+    ) -> None:
         self.timeout = timeout
-        text = f"not over within {timeout:g} s, so it was cancelled"
+        what = "not over" if accepted else "no server accepted it"
+        text = f"{what} within {timeout:g} s, so it was cancelled"
         super().__init__(name, goal_id, status, text, None)

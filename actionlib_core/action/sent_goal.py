@@ -199,7 +199,8 @@ class SentGoal(Generic[R, F]):
 
     def _late(self, timeout: float | None) -> GoalTimeoutError:
         limit = min(t for t in (timeout, self._timeout) if t is not None)
-        return GoalTimeoutError(self._name, self.id, self.status.name, limit)
+        status = self.status.name
+        return GoalTimeoutError(self._name, self.id, status, limit, accepted=self.accepted)
 
     def _outcome(self) -> R:
         goal = self._handle.goal

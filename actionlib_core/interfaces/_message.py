@@ -319,7 +319,9 @@ def _make_init(definition: Definition, resolve: Callable[[str], type[Message]]) 
     lines.append("    if _extra: _take_extra(self, _extra)")
     # Safe, as the text contains only names that the parser has checked.
     exec(compile("\n".join(lines), f"<__init__ of {definition.name}>", "exec"), scope)  # noqa: S102
-    return scope["__init__"]
+    made = scope["__init__"]
+    made.__qualname__ = f"{definition.name.rpartition('/')[2]}.__init__"  # for Python's errors
+    return made
 
 
 def _take_extra(message: Message, extra: dict[str, Any]) -> None:

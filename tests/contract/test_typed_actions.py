@@ -89,6 +89,13 @@ def test_leaving_the_block_cancels(client):
     assert (caught.value.status, caught.value.text) == ("PREEMPTED", "stopped")
 
 
+def test_a_timeout_without_a_server_says_that_there_was_none(world):
+    client = ActionClient("count", msg.TestAction, node=world.node("client"))
+    with client.send(msg.TestGoal(1), timeout=0.3) as handle:
+        with pytest.raises(GoalTimeoutError, match=r"no server accepted it within 0\.3 s"):
+            handle.result()
+
+
 def test_timeout_cancels_and_raises(client):
     with client.send(msg.TestGoal(1000), timeout=0.3) as handle:
         with pytest.raises(GoalTimeoutError, match=r"not over within 0\.3 s") as caught:

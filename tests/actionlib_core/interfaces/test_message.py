@@ -51,7 +51,7 @@ def test_construction() -> None:
     assert PoseStamped().header is not PoseStamped().header
     assert PoseWithCovariance().covariance == [0.0] * 36
     assert Image().data == b""
-    with pytest.raises(TypeError):
+    with pytest.raises(TypeError, match=r"^Point\.__init__\(\) takes"):
         Point(1, 2, 3, 4)  # type: ignore[call-arg]
     with pytest.raises(FieldError, match=r"unknown field 'psoe'.*Did you mean 'pose'"):
         PoseStamped(psoe=Pose())  # type: ignore[call-arg]
