@@ -208,3 +208,11 @@ def test_the_index_leads_to_every_page():
     index = ROOT / "docs" / "README.md"
     linked = {(index.parent / link).resolve() for link in links_of(index)}
     assert set((ROOT / "docs").rglob("*.md")) - {index} <= linked
+
+
+def test_the_files_that_the_architecture_names_are_there():
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    named = set(re.findall(r"`(\w+/[\w/]+\.py)`", text))
+    roots = (ROOT, ROOT / "actionlib_core")
+    assert len(named) > 10
+    assert not [name for name in named if not any((root / name).exists() for root in roots)]
