@@ -28,6 +28,15 @@ if TYPE_CHECKING:
 did_you_mean = suggest.did_you_mean
 
 
+def error_text(error: BaseException) -> str:
+    """Return the type and the text of an exception, also if its own `__str__` raises."""
+    kind = type(error).__name__
+    try:
+        return f"{kind}: {error}"
+    except Exception as failure:  # noqa: BLE001  the user's code: show its failure instead
+        return f"{kind}: <its str raised {type(failure).__name__}>"
+
+
 class SmachError(Exception):
     """Root of all errors that smachpy raises on purpose.
 

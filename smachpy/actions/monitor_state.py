@@ -10,6 +10,7 @@ from smachpy import log
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.events import CallbackFailed
+from smachpy.exceptions import error_text
 from smachpy.machines.problems import Problems, name_of
 from smachpy.machines.state import State
 from smachpy.run.frame import current_scope
@@ -127,7 +128,7 @@ class MonitorState(State):
         try:
             return bool(self.__cond_cb(ud, message))
         except Exception as error:  # noqa: BLE001  as in SMACH: a check that raises has failed
-            text = f"{type(error).__name__}: {error}"
+            text = error_text(error)
             scope = current_scope()
             where = f"MonitorState {self.__topic!r}" if scope is None else scope.path
             log.log_exception(f"{where}: condition {name_of(self.__cond_cb)} raised {text}", error)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.suggest import did_you_mean
 from smachpy.command.extras import advice, clash, hidden_by
-from smachpy.exceptions import SmachError
+from smachpy.exceptions import SmachError, error_text
 from smachpy.machines.container import Container
 from smachpy.mission_info import is_mission, mission
 from smachpy.run.stack_text import trace_of
@@ -335,5 +335,5 @@ def raised_text(error: BaseException, said: str = "") -> str:
         error: The exception.
         said: Text instead of its type and message.
     """
-    lines = (said or f"{type(error).__name__}: {error}", *trace_of(error).splitlines())
+    lines = (said or error_text(error), *trace_of(error).splitlines())
     return "\n    ".join(lines)

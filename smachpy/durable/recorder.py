@@ -14,7 +14,7 @@ from smachpy import log
 from smachpy.durable.codec import decode, encode
 from smachpy.durable.position import OF_PROCESS
 from smachpy.durable.store import FencedError, StoreError
-from smachpy.exceptions import InvalidUserCodeError, MissionError
+from smachpy.exceptions import InvalidUserCodeError, MissionError, error_text
 from smachpy.machines.container import Container, control_of
 from smachpy.machines.problems import name_of
 from smachpy.machines.state import get_options
@@ -421,7 +421,7 @@ class Recorder:
         except Exception as error:
             where = frame.here()
             raise InvalidUserCodeError(
-                f"{where}: hook {name_of(hook)} raised {type(error).__name__}: {error}", path=where
+                f"{where}: hook {name_of(hook)} raised {error_text(error)}", path=where
             ) from error
 
     def leave(self, frame: Frame, step: Step, outcome: Any) -> None:

@@ -29,6 +29,7 @@ from smachpy.events import (
     UserdataWritten,
     to_record,
 )
+from smachpy.exceptions import error_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -204,7 +205,9 @@ class EventBuffer:
             try:
                 self._on_news()
             except Exception as error:  # noqa: BLE001  the user's: logged, the machine goes on
-                log.log_exception(f"buffer of {self.path}: on_news raised {error!r}", error)
+                log.log_exception(
+                    f"buffer of {self.path}: on_news raised {error_text(error)}", error
+                )
 
     def begin(self, path: str, clock: Clock) -> None:
         """Note the machine's path and clock at the start of a run."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from smachpy import log
 from smachpy.events import Paused, Resumed
-from smachpy.exceptions import SmachError, did_you_mean
+from smachpy.exceptions import SmachError, did_you_mean, error_text
 from smachpy.run.child import EPOCH, ContainerData
 from smachpy.run.grace import ask_child, asking, on_preempt, request_soon
 from smachpy.run.visit import Override
@@ -263,7 +263,7 @@ class Control:
             try:
                 listener()
             except Exception as error:  # noqa: BLE001  the user's: logged, the machine goes on
-                log.log_exception(f"{self._path()}: on_change raised {error!r}", error)
+                log.log_exception(f"{self._path()}: on_change raised {error_text(error)}", error)
 
     def _wake(self, most: int | None = None) -> None:
         """Wake the states that wait, or the first `most` of them, to check how they go on."""

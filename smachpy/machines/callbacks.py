@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from smachpy import log
 from smachpy.events.buffer import LONGEST, EventBuffer
-from smachpy.machines.problems import Problems
+from smachpy.exceptions import error_text
+from smachpy.machines.problems import Problems, name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import EPOCH
 
@@ -91,7 +92,9 @@ class Callbacks:
                 if frame is not None:
                     frame.callback_failed(callback, error)
                 else:
-                    log.log_exception(f"callback {callback!r} raised {error!r}", error)
+                    log.log_exception(
+                        f"callback {name_of(callback)} raised {error_text(error)}", error
+                    )
 
     def subscribe(self, listener: Callable[[Event], object]) -> Callable[[], None]:
         """Call `listener` with every event of this container and of all below it.

@@ -10,6 +10,7 @@ from smachpy.exceptions import (
     InvalidStateError,
     InvalidUserCodeError,
     SmachError,
+    error_text,
 )
 from smachpy.introspection import RuleRecord, TransitionRecord
 from smachpy.machines.construction import construction_method
@@ -342,7 +343,7 @@ class Iterator(Container):
                 yield item
         except Exception as error:
             raise InvalidUserCodeError(
-                f"{frame.path}: items: {type(error).__name__}: {error}; expected an iterable.",
+                f"{frame.path}: items: {error_text(error)}; expected an iterable.",
                 path=frame.path,
             ) from error
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.exceptions import InvalidStateError, did_you_mean
+from smachpy.exceptions import InvalidStateError, did_you_mean, error_text
 from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
 from smachpy.run.frame import clock_of_run
@@ -344,7 +344,7 @@ class Binder:
         except InvalidStateError as error:
             return Unbound(call), error.message
         except Exception as error:  # noqa: BLE001  the user's constructor; reported with the others
-            text = f"{name}: making its state raised {type(error).__name__}: {error}"
+            text = f"{name}: making its state raised {error_text(error)}"
             return Unbound(call), text
 
     def _made(self, call: Call, given: Any) -> State:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 from actionlib_core.clock import current_clock
 from smachpy import log
-from smachpy.exceptions import InvalidUserCodeError
+from smachpy.exceptions import InvalidUserCodeError, error_text
 from smachpy.machines.problems import Problems
 
 if TYPE_CHECKING:
@@ -374,7 +374,7 @@ class Knowledge:
             try:
                 return self._ask(name, *found)
             except Exception as error:
-                text = f"{path}: condition {name!r} raised {type(error).__name__}: {error}"
+                text = f"{path}: condition {name!r} raised {error_text(error)}"
                 raise InvalidUserCodeError(text, path=path) from error
         # Built in, unless a condition of this name is registered.
         if name.startswith(("equal_", "equals_")):

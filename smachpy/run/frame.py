@@ -15,6 +15,7 @@ from actionlib_core.clock._serial import report_thread_exception
 from smachpy import log
 from smachpy.context import current_frame
 from smachpy.events import CallbackFailed, Preempted
+from smachpy.exceptions import error_text
 from smachpy.machines.problems import name_of
 from smachpy.run.child import EPOCH
 
@@ -391,7 +392,8 @@ class Frame:
                 listener(event)
             except Exception as error:  # noqa: BLE001  the user's listener: reported in the log
                 where = f"{self.path or self.here()}: listener {name_of(listener)}"
-                log.log_exception(f"{where} raised {error!r} on {event!r}", error)
+                on = type(event).__name__
+                log.log_exception(f"{where} raised {error_text(error)} on {on}", error)
 
     def find_subscribers(self) -> Subscribers:
         """Look up the subscribers of this frame, and keep them until somebody comes or goes."""
@@ -457,14 +459,14 @@ class Frame:
     def note_failure(self, path: str, callback: object, error: BaseException) -> None:
         """Queue, for the listeners and the log, that a callback of the state at `path` raised."""
         name = name_of(callback)
-        text = f"{type(error).__name__}: {error}"
+        text = error_text(error)
         self.note(path, CallbackFailed, name, text)
         self.run.note_log(f"{path}: {name} raised {text}")
 
     def callback_failed(self, callback: object, error: BaseException) -> None:
         """Report to the log and the listeners that a callback of the container raised."""
         name = name_of(callback)
-        text = f"{type(error).__name__}: {error}"
+        text = error_text(error)
         log.log_exception(f"{self.path}: callback {name} raised {text}", error)
         self.emit_own(CallbackFailed, name, text)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from actionlib_core import shutdown
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
-from smachpy.exceptions import InvalidUserCodeError
+from smachpy.exceptions import InvalidUserCodeError, error_text
 from smachpy.machines.problems import missing_init, name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import EPOCH
@@ -394,8 +394,7 @@ def _attempts(
 
 
 def _tell_retried(frame: Frame, attempt: int, wait: float, result: Any) -> None:
-    is_error = isinstance(result, Exception)
-    reason = f"{type(result).__name__}: {result}" if is_error else str(result)
+    reason = error_text(result) if isinstance(result, Exception) else str(result)
     if frame.run.journal is not None:
         frame.run.journal.retried(frame, attempt, wait, reason)
     frame.emit(Retried, attempt, reason)
@@ -524,7 +523,7 @@ def publish_raised(frame: Frame, error: BaseException) -> None:
     if isinstance(error, Interruption):
         frame.emit(Left, "preempted")
     else:
-        frame.emit(Failed, f"{type(error).__name__}: {error}", trace_of(error))
+        frame.emit(Failed, error_text(error), trace_of(error))
 
 
 def publish_left(frame: Frame, step: Step, outcome: Any) -> None:
@@ -561,5 +560,5 @@ def user_error(path: str, state: Child, error: BaseException) -> InvalidUserCode
 
 def raised(path: str, what: str, error: BaseException, hint: str = "") -> InvalidUserCodeError:
     """Return the error to raise, `from error`, when `what`, the user's code, has raised."""
-    text = f"{path}: {what} raised {type(error).__name__}: {error}{hint}"
+    text = f"{path}: {what} raised {error_text(error)}{hint}"
     return InvalidUserCodeError(text, path=path)

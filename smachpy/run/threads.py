@@ -15,7 +15,7 @@ from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, current_clock
 from smachpy.context import THREAD
 from smachpy.events import Finished, Recovered, Started
-from smachpy.exceptions import InvalidStateError, InvalidUserCodeError
+from smachpy.exceptions import InvalidStateError, InvalidUserCodeError, error_text
 from smachpy.log import MESSAGES
 from smachpy.run.frame import Frame, Run
 from smachpy.run.grace import (
@@ -338,7 +338,8 @@ class Group:
             errors.append(branch.error)
         first = failed[0]
         raised = ", ".join(
-            f"{branch.here()}: {type(branch.error).__name__}: {branch.error}" for branch in failed
+            f"{branch.here()}: {error_text(error)}"
+            for branch, error in zip(failed, errors, strict=True)
         )
         if failure is not None:
             errors.append(failure)

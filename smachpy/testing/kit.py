@@ -13,7 +13,7 @@ from actionlib_core.clock import Deadlock, TimeLimit, use_clock
 from actionlib_core.node import use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy.exceptions import SmachError
+from smachpy.exceptions import SmachError, error_text
 from smachpy.introspection import describe
 from smachpy.machines.container import Container
 from smachpy.run.grace import asking
@@ -226,7 +226,7 @@ class MissionKit:
     def _take_errors(self) -> tuple[list[str], list[BaseException]]:
         """Return and clear the errors of the test's own functions and scripted servers."""
         failures, self.clock.failures = self.clock.failures, []
-        errors = [f"{name}: {type(error).__name__}: {error}" for name, error in failures]
+        errors = [f"{name}: {error_text(error)}" for name, error in failures]
         causes = [error for _, error in failures]
         for server in self._servers:
             more, raised = server.take_errors()

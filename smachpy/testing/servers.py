@@ -12,6 +12,7 @@ from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
+from smachpy.exceptions import error_text
 from smachpy.machines.problems import name_of
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ class ScriptedEnd:
     def note_raised(self, function: object, error: BaseException) -> str:
         """Record an exception of a function of the test, and return it as text."""
         name = name_of(function)
-        text = f"{self.name}: {name} of the test raised {type(error).__name__}: {error}"
+        text = f"{self.name}: {name} of the test raised {error_text(error)}"
         self.errors.append(text)
         self.causes.append(error)
         return text
