@@ -39,8 +39,11 @@ class MissionTestCase(unittest.TestCase):
         if result is None:
             result = self.defaultTestResult()
         skips = 0
+        runner = getattr(self, "_asyncioRunner", None)
         for number, seed in enumerate(seeds, 1):
             self._seed = seed
+            # `IsolatedAsyncioTestCase.run` makes one, and fails if there is one of an earlier run.
+            self._asyncioRunner = runner
             part = _Part(result, is_last=number == len(seeds), all_skip=skips == number - 1)
             super().run(cast("unittest.TestResult", part))
             skips += part.skipped

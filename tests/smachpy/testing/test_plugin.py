@@ -230,6 +230,35 @@ def test_the_options_hold_without_the_fixtures_too(pytester):
     plain.stdout.fnmatch_lines(["*case None*"])
 
 
+ASYNC = """
+import unittest
+from smachpy.testing import MissionTestCase
+from test_machine import machine
+
+class Test(MissionTestCase, unittest.IsolatedAsyncioTestCase):
+    async def test(self):
+        print("first", self.mission.seed)
+        self.assertEqual(self.mission(machine()).duration, 20)
+
+    def test_plain(self):
+        self.mission(machine())
+
+class TestOther(unittest.IsolatedAsyncioTestCase, MissionTestCase):
+    async def test(self):
+        print("last", self.mission.seed)
+        self.assertEqual(self.mission(machine()).duration, 20)
+"""
+
+
+def test_async_tests_of_unittest_run_with_all_seeds(pytester):
+    pytester.makepyfile(test_machine=TESTS.partition("def test_done")[0], test_async=ASYNC)
+    result = pytester.runpytest_inprocess(*OPTIONS, "--mission-seeds=3", "-s")
+    result.assert_outcomes(passed=3)
+    out = result.stdout.str()
+    assert re.findall(r"first (\d+)", out) == ["0", "1", "2"]
+    assert re.findall(r"last (\d+)", out) == ["0", "1", "2"]
+
+
 NO_FAILURES = """
 import unittest
 import pytest
