@@ -348,7 +348,7 @@ class Runner:
         for userdata, values in self._userdata:
             for key in userdata.keys():  # noqa: SIM118
                 del userdata[key]
-            userdata.update(copy.deepcopy(values))
+            userdata.update(_copied(values))
 
     def run(
         self,
@@ -390,7 +390,7 @@ class Runner:
             if options["real_actions"]:
                 explorer.serve_actions()
             try:
-                userdata = copy.deepcopy(options["userdata"])
+                userdata = _copied(options["userdata"])
                 if self.journal is None:
                     self._execute(kit, userdata)
                 else:
@@ -455,6 +455,24 @@ def _silence() -> Iterator[None]:
         yield
     finally:
         logging.disable(before)
+
+
+def _copied(values: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return copies of values; what cannot be copied, such as a lock or a socket, is shared.
+
+    The copies are made with one `memo`, so that values with a part in common have one again.
+    """
+    copies, memo = {}, dict[int, Any]()
+    for key, value in (values or {}).items():
+        # Of a value that cannot be copied, `deepcopy` leaves unfinished parts in the memo.
+        made = memo.copy()
+        try:
+            copies[key] = copy.deepcopy(value, made)
+        except Exception:  # noqa: BLE001  of any kind: the value's own code decides
+            copies[key] = value
+        else:
+            memo = made
+    return copies
 
 
 def _containers(container: Container) -> Iterator[Container]:

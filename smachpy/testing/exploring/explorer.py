@@ -625,9 +625,17 @@ def _can_be_made(kind: type[BaseException]) -> bool:
 def _userdata(container: Container) -> Hashable:
     """Return the userdata of a container and all inner ones, in a form that can be compared."""
     data = container.userdata
-    own = tuple((key, repr(writable(data[key]))) for key in sorted(data.keys()))
+    own = tuple((key, _text(writable(data[key]))) for key in sorted(data.keys()))
     children = container.get_children().values()
     return (own, *[_userdata(child) for child in children if isinstance(child, Container)])
+
+
+def _text(value: object) -> str:
+    """Return the `repr` of a value; one without counts as different from all others."""
+    try:
+        return repr(value)
+    except Exception:  # noqa: BLE001  the value's own code
+        return object.__repr__(value)
 
 
 def _kept_by(record: StateRecord, names: Iterable[str]) -> set[str]:

@@ -6,6 +6,7 @@ import gc
 import itertools
 import subprocess
 import sys
+import threading
 import time
 import weakref
 
@@ -1107,3 +1108,42 @@ def test_a_server_that_ignores_the_cancel_of_a_preempt_for_too_long():
     assert found.counterexample.choices == (
         "server move_base: works as a preempt comes, and ignores the cancel",
     )
+
+
+class Unreadable:
+    def __repr__(self):
+        raise RuntimeError
+
+
+@pytest.mark.parametrize("by", ["machine", "argument"])
+def test_values_that_cannot_be_copied_are_shared_by_all_runs(by):
+    """The exploration ended with "cannot pickle '_thread.lock' object"."""
+    sizes = []
+
+    def append(userdata):
+        userdata.visits.append(1)
+        sizes.append(len(userdata.visits))
+        assert userdata.same is userdata.visits
+        return "done"
+
+    def make():
+        machine = StateMachine(["done", "failed", "preempted"], name="M")
+        if by == "machine":
+            machine.userdata.update(values)
+        with machine:
+            machine.add(
+                "A",
+                CBState(append, outcomes=["done"], io_keys=["visits", "same", "camera"]),
+                {"done": "B"},
+            )
+            machine.add("B", Leaf("done", "failed", "preempted"))
+        return machine
+
+    visits = []
+    camera = {"visits": visits, "lock": threading.Lock(), "text": Unreadable()}
+    values = {"camera": camera, "visits": visits, "same": visits}
+    found = explore(make, keep=["A"], userdata=values if by == "argument" else {})
+    found.assert_ok()
+    assert found.exhaustive
+    assert set(sizes) == {1}
+    assert visits == []
