@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from actionlib_core import shutdown
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
-from smachpy.exceptions import InvalidUserCodeError, error_text
+from smachpy.exceptions import InvalidStateError, InvalidUserCodeError, error_text
 from smachpy.machines.problems import missing_init, name_of
 from smachpy.run.callback import call_bounded
 from smachpy.run.child import EPOCH
@@ -266,10 +266,9 @@ def _run_async(
     state: Any, execute: Callable[[Any], Coroutine[Any, Any, Any]]
 ) -> Callable[[Any], Any]:
     """Return a function that runs the state's coroutine. A preempt cancels it."""
+    import asyncio  # here: it takes 60 ms, and most machines never need it
 
     async def main(userdata: Any) -> Any:
-        import asyncio
-
         loop = asyncio.get_running_loop()
         task = asyncio.ensure_future(execute(userdata))
         # The request comes in another thread; `Task.cancel` is not thread-safe.
@@ -287,7 +286,22 @@ def _run_async(
         finally:
             forget()
 
-    return lambda userdata: clock_of_run().run_async(main(userdata))
+    def run(userdata: Any) -> Any:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:  # none, as it should be: asyncio runs one loop per thread
+            pass
+        else:
+            frame: Frame | None = current_frame()
+            where = type(state).__name__ if frame is None else frame.here()
+            raise InvalidStateError(
+                f"{where}: execute: got an async state in a thread with a running event loop, as "
+                "in a notebook or a coroutine; expected a thread without one. Try `outcome = await "
+                "asyncio.to_thread(machine.execute)`."
+            )
+        return clock_of_run().run_async(main(userdata))
+
+    return run
 
 
 def _bounded(container: Any, execute: Callable[[Any], Any]) -> Callable[[Any], Any]:

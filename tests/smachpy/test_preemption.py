@@ -17,7 +17,7 @@ import pytest
 
 import smachpy
 from actionlib_core import shutdown
-from actionlib_core.clock import VirtualClock, current_clock, use_clock
+from actionlib_core.clock import RealClock, VirtualClock, current_clock, use_clock
 from smachpy.events import Abandoned, Entered, Left, Preempted, PreemptRequested
 
 
@@ -676,6 +676,27 @@ def test_async_leaf_is_cancelled(clock):
     clock.call_later(2.0, sm.request_preempt)
     assert sm.execute() == "preempted"
     assert cleaned == [2.0]
+    assert_clean(sm)
+
+
+def test_async_leaf_in_a_thread_with_a_loop_is_refused_with_the_way_out(recwarn):
+    """It was "FunctionState raised RuntimeError", with warnings of coroutines never awaited."""
+
+    @smachpy.state(outcomes=["ok"])
+    async def drives(userdata):
+        await asyncio.sleep(0)
+        return "ok"
+
+    sm = chain(drives)
+
+    async def program():
+        with pytest.raises(smachpy.InvalidStateError, match=r"Try `outcome = await asyncio.to_th"):
+            sm.execute()
+        return await asyncio.to_thread(sm.execute)
+
+    with use_clock(RealClock()):
+        assert asyncio.run(program()) == "done"
+    assert not recwarn
     assert_clean(sm)
 
 
