@@ -184,7 +184,10 @@ class State:
         # Set on the instance: the hot path reads it, and a class attribute is found much slower.
         # For the same reason no `vars(self)` here: it would make CPython store the attributes in a
         # dict instead of inline.
-        self._preempt_requested = False
+        try:
+            self._preempt_requested = False
+        except AttributeError as error:
+            raise _read_only(self) from error
         if not self._smachpy_is_made:
             self._smachpy = type(self)._smachpy.kind()
             self._smachpy_is_made = True
@@ -387,6 +390,16 @@ class State:
         data = self._smachpy
         data.options = changed(data.options, options, problems)
         data.outcomes = tuple(dict.fromkeys((*data.outcomes, *data.options.made_outcomes())))
+
+
+def _read_only(state: State) -> InvalidStateError:
+    """Return the error for a state, such as a frozen dataclass, that refuses new attributes."""
+    name = type(state).__name__
+    problem = (
+        "state: got a class whose attributes cannot be set; expected one whose attributes can, as "
+        "a preempt is noted in one. Try the dataclass without frozen=True."
+    )
+    return InvalidStateError(f"{name}: {problem}", [problem])
 
 
 def set_options(state: State, **options: Unpack[StateOptions]) -> None:

@@ -272,6 +272,20 @@ def test_a_dataclass_may_be_a_state():
     assert smachpy.get_options(sm["S0"]).timeout is None
 
 
+@dataclasses.dataclass(frozen=True)
+class Frozen(smachpy.State):
+    speed: float = 1.0
+
+    def __post_init__(self):
+        super().__init__(outcomes=["done"])
+
+
+def test_a_frozen_dataclass_is_refused_with_the_way_out():
+    """It raised "cannot assign to field '_preempt_requested'"."""
+    with pytest.raises(smachpy.InvalidStateError, match="without frozen=True"):
+        Frozen()
+
+
 class Early(smachpy.State):
     def __init__(self):
         self.speed = 1.0
