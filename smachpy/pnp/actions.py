@@ -122,11 +122,17 @@ class Goal:
 
 
 class Unbound(State):
-    """Stands for an action for which nothing is registered; a plan with one does not run."""
+    """Stands for an action without a state; a plan with one does not run.
 
-    def __init__(self, call: Call) -> None:
+    Attributes:
+        call: The action.
+        is_unknown: Nothing is registered for it; else the state could not be made.
+    """
+
+    def __init__(self, call: Call, *, is_unknown: bool = False) -> None:
         super().__init__(OUTCOMES)
         self.call = call
+        self.is_unknown = is_unknown
 
     def execute(self, ud: Any) -> str:
         """Refuse to run.
@@ -339,7 +345,7 @@ class Binder:
             if given is None and self._server is not None:
                 return self._server.state(call), ""
             if given is None:
-                return Unbound(call), _unknown(call, known)
+                return Unbound(call, is_unknown=True), _unknown(call, known)
             return self._made(call, given), ""
         except InvalidStateError as error:
             return Unbound(call), error.message

@@ -15,7 +15,7 @@ from smachpy.machines.state import DataOf, Shown
 from smachpy.pnp.actions import Binder, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
 from smachpy.pnp.firing import Table
-from smachpy.pnp.knowledge import BUILT_IN, EVENT_LIFE_S, Knowledge
+from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge, is_built_in
 from smachpy.pnp.net import Net
 from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
@@ -306,32 +306,35 @@ class PetriNetPlan(Container):
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems that keep the plan from running: wrong labels, unknown actions."""
         errors = [p for p in self._smachpy.net_plan.problems if p.severity == "error"]
-        # A plan that was loaded without any actions gets one problem, not one for each action.
-        unbound = self.__unbound()
-        if len(unbound) > 1 and not self._smachpy.has_actions:
-            unbound = [self.__no_actions()]
-        wrong = [f"{where}: {problem}" for problem in (*errors, *unbound)]
+        wrong = [f"{where}: {problem}" for problem in (*errors, *self.__unbound(most=1))]
         return (*wrong, *self.__shared_states(where))
 
-    def __unbound(self) -> list[PlanProblem]:
-        """Return the problems of actions that have no state, and no test double either."""
-        data = self._smachpy
-        return [p for label, p in data.unbound.items() if isinstance(data.children[label], Unbound)]
+    def __unbound(self, most: int) -> list[PlanProblem]:
+        """Return the problems of actions that have no state, and no test double either.
 
-    def __no_actions(self) -> PlanProblem:
-        """Return the single problem of a plan for which no actions were registered at all."""
-        plan = self._smachpy.net_plan
-        names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
+        A plan that was loaded without any actions gets one problem for all actions that are not
+        registered, if these are more than `most`.
+        """
+        data = self._smachpy
+        missing = [
+            (state, problem)
+            for label, problem in data.unbound.items()
+            if isinstance(state := data.children[label], Unbound)
+        ]
+        unknown = [state.call for state, _ in missing if state.is_unknown]
+        if data.has_actions or len(unknown) <= most:
+            return [problem for _, problem in missing]
+        names = sorted({call.action or call.name for call in unknown})
         text = f"has no actions registered; expected one for each of {', '.join(names)}."
         hint = "Try a file actions.yaml beside it, or actions={...}."
-        return problem_of(plan.net, "unbound", "note", text, hint=hint)
+        # A name that fits no built-in action, such as wait_here, may be one of the user's.
+        wrong = [replace(p, severity="note") for state, p in missing if not state.is_unknown]
+        return [*wrong, problem_of(data.net_plan.net, "unbound", "note", text, hint=hint)]
 
     def binding_problems(self) -> tuple[PlanProblem, ...]:
         """Return the problems of actions and conditions for which nothing is registered."""
         plan, knowledge = self._smachpy.net_plan, self._smachpy.knowledge
-        found = self.__unbound()
-        if found and not self._smachpy.has_actions:
-            found = [self.__no_actions()]
+        found = self.__unbound(most=0)
         table = _Compiled(self).table
         # Name -> its first transition: in reverse, so that earlier transitions replace later ones.
         asked = {
@@ -339,7 +342,10 @@ class PetriNetPlan(Container):
             for number, guard in reversed(tuple(enumerate(table.guards)))
             if guard is not None
             for name in guard.atoms()
-            if name not in table.outcome_tests and not knowledge.asks_server(name)
+            if name not in table.outcome_tests
+            and knowledge.source_of(name) is None
+            and not knowledge.asks_server(name)
+            and not is_built_in(name)
         }
         if not knowledge.sources:
             names = sorted(asked)
@@ -348,15 +354,12 @@ class PetriNetPlan(Container):
                 found.append(problem_of(plan.net, "unknown-condition", "note", text))
             return tuple(found)
         for name, number in asked.items():
-            if knowledge.source_of(name) is None and not name.startswith(BUILT_IN):
-                text = (
-                    f"asks for {name!r}, which is not registered; expected one of "
-                    f"{sorted(knowledge.sources)}, or an event that the program posts."
-                    f"{did_you_mean(name, knowledge.sources)}"
-                )
-                found.append(
-                    problem_of(plan.net, "unknown-condition", "note", text, transition=number)
-                )
+            text = (
+                f"asks for {name!r}, which is not registered; expected one of "
+                f"{sorted(knowledge.sources)}, or an event that the program posts."
+                f"{did_you_mean(name, knowledge.sources)}"
+            )
+            found.append(problem_of(plan.net, "unknown-condition", "note", text, transition=number))
         return tuple(found)
 
     def __shared_states(self, where: str) -> Iterator[str]:

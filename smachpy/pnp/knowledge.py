@@ -31,8 +31,11 @@ if TYPE_CHECKING:
 EVENT_LIFE_S: Final = 2.0  # an unread event is dropped then
 Events: TypeAlias = Literal["once", "lasting"]
 _MOST_EVENTS: Final = 1000  # unread; a topic may post faster than the plan reads
-BUILT_IN: Final = ("timeout_", "equal_", "equals_", "true", "action_failed")
-"""Beginnings of built-in names."""
+
+
+def is_built_in(name: str) -> bool:
+    """Return whether a name in a guard has a value without anything being registered for it."""
+    return name in {"true", "action_failed"} or name.startswith(("timeout_", "equal_", "equals_"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,11 +346,7 @@ class Knowledge:
 
     def asks_server(self, name: str) -> bool:
         """Return whether a robot evaluates a name, unless it was posted or set here."""
-        return (
-            self._server is not None
-            and not name.startswith(BUILT_IN)
-            and self.source_of(name) is None
-        )
+        return self._server is not None and not is_built_in(name) and self.source_of(name) is None
 
     def is_code(self, name: str) -> bool:
         """Return whether the value of a name comes from the user's code or a robot."""

@@ -138,6 +138,36 @@ def test_an_unknown_action_is_told_with_its_line(folder, capsys):
     assert main(["run", "fetch.pnml"]) == 2
 
 
+@pytest.mark.parametrize(
+    ("action", "guard", "code", "found"),
+    [
+        ("wait_1", "true", 0, ""),
+        ("wait_1", "not timeout_wait_1", 0, ""),
+        ("wait_1", "equal_@x_1", 0, ""),
+        ("wait_1", "trueheading", 0, "has to post: trueheading. [net-condition]"),
+        ("wait_soon", "c", 1, "wait_soon: got 'soon'; expected seconds, as in wait_5"),
+        ("goto_wait", "c", 0, "expected one for each of goto."),
+    ],
+)
+def test_names_that_are_built_in(folder, capsys, action, guard, code, found):
+    """The program was to post `true`, and an action for `wait` was to be registered."""
+    net = net_of(f"init* -> {action}.exec : start\n{action}.exec -> goal : end [{guard}]", "built")
+    write_pnml(net, "built.pnml")
+    Path("actions.yaml").unlink()
+    assert main(["check", "built.pnml"]) == code
+    out = capsys.readouterr().out
+    assert found in out
+    assert found or "note" not in out
+
+
+def test_an_action_that_might_be_built_in_is_a_note_while_nothing_is_registered(folder, capsys):
+    text = "init* -> {0}.exec : start\n{0}.exec -> m : end\nm -> {1}.exec : start\n{1}.exec -> goal : end"
+    write_pnml(net_of(text.format("goto_a", "wait_here"), "built"), "built.pnml")
+    Path("actions.yaml").unlink()
+    assert main(["check", "built.pnml"]) == 0
+    assert "note: /built: place 'p3' (wait_here.exec): wait_here: got" in capsys.readouterr().out
+
+
 def test_sub_plans(folder):
     ran = []
     write_pnml(

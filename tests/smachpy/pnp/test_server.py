@@ -92,6 +92,16 @@ def test_an_event_of_the_robot_lets_the_plan_look_at_once_and_interrupts() -> No
         assert robot.told == ["goto_kitchen start", "goto_kitchen interrupt"]
 
 
+def test_a_condition_whose_name_begins_like_a_built_in_one_is_asked_for() -> None:
+    """It was false, without a question to the robot."""
+    with Robot() as robot:
+        robot.holds.add("true_north")
+        text = SENSING.replace("obstacle", "true_north") + "blocked -> goal : out"
+        assert PetriNetPlan(net_of(text), server=PNPServer()).execute() == "goal"
+        assert robot.asked[0] == "true_north"
+        assert robot.told == ["goto_kitchen start", "goto_kitchen interrupt"]
+
+
 def test_a_condition_without_an_event_is_asked_for_again() -> None:
     with Robot() as robot:
         plan = PetriNetPlan(net_of(SENSING + "blocked -> goal : out"), server=PNPServer(every=0.5))
