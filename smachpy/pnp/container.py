@@ -458,6 +458,9 @@ class PetriNetPlan(Container):
     def set_condition(self, name: str, value: bool | None) -> None:
         """Set a condition; None deletes it. It has no effect if one of this name is registered.
 
+        Raises:
+            InvalidStateError: `name` is empty or no text, or `value` is a text.
+
         Threads: any; does not wait.
         """
         self._smachpy.knowledge.set(name, value)

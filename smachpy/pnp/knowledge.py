@@ -226,6 +226,9 @@ class Knowledge:
         problems.raise_all()
         # The opposite of an event is a value, which holds: it does not end after `life`.
         name = event[1:] if event.startswith("!") else event.removeprefix("not_")
+        if not name:
+            problems.add(f"event: got {event!r}; expected a name in it.")
+            problems.raise_all()
         if name != event:
             self.set(name, value=False)
             return
@@ -246,8 +249,17 @@ class Knowledge:
             )
         self.changed()
 
-    def set(self, name: str, value: bool | None) -> None:
-        """Set a condition, unless one is registered; None deletes it."""
+    def set(self, name: str, value: object) -> None:
+        """Set a condition, unless one is registered; None deletes it.
+
+        Raises:
+            InvalidStateError: `name` is empty or no text, or `value` is a text.
+        """
+        problems = Problems("set_condition")
+        name = problems.word("name", name)
+        if isinstance(value, (str, bytes)):  # would be true, also "False" and "0"
+            problems.add(f"value: got {value!r}; expected True, False or None.")
+        problems.raise_all()
         with self._lock:
             # Unread events of this name are older than this value.
             self._posted = deque(

@@ -220,6 +220,17 @@ def test_all_goal_places_must_hold_exactly_their_tokens():
         assert clock.now() == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("name", "value"), [("", True), (None, True), ("c", "False"), ("c", b"0")])
+def test_set_condition_refuses_texts_for_truth_and_names_that_are_none(name, value):
+    """A text was true, whatever it says."""
+    plan = plan_of("init* -> goal : t [c]")
+    with pytest.raises(InvalidStateError, match=r"set_condition: (name|value): got"):
+        plan.set_condition(name, value)
+    for event in ("", "!", "not_"):
+        with pytest.raises(InvalidStateError, match="post: event: got"):
+            plan.post(event)
+
+
 def test_a_timeout_condition():
     text = """
     init* -> A_x.exec : A_x.start
