@@ -16,6 +16,7 @@ from smachpy.durable.processes import this_runner
 from smachpy.durable.recorder import Recorder
 from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, StoreError, open_store
 from smachpy.exceptions import MissionError
+from smachpy.machines.problems import Problems
 from smachpy.run.grace import asking, request_soon
 
 if TYPE_CHECKING:
@@ -121,6 +122,7 @@ def run_durable(
             that gets the differences as texts and returns such a mapping, or None to refuse.
 
     Raises:
+        InvalidStateError: `mission` is empty or no text.
         MissionInUseError: a living process runs it.
         MachineChangedError: the machine differs from the journal's, and `migrate` does not map it.
         OutageError: the journal is older than `max_outage`.
@@ -130,6 +132,10 @@ def run_durable(
 
     Blocks: as `execute` does.
     """
+    problems = Problems("run_durable")
+    if mission is not None:
+        problems.word("mission", mission)
+    problems.raise_all()
     with contextlib.ExitStack() as stack:
         if isinstance(journal, (str, os.PathLike)):
             store = open_store(journal)

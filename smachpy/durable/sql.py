@@ -402,7 +402,11 @@ class SqlStore(ABC):
         """As `Store.close`."""
 
     def _do(self, cursor: Cursor, sql: str, *values: object) -> None:
-        cursor.execute(sql.replace("?", self.dialect.placeholder), values)
+        try:
+            cursor.execute(sql.replace("?", self.dialect.placeholder), values)
+        except UnicodeEncodeError as error:  # bytes of a command line that are no UTF-8
+            problem = f"got {error.object!r}; expected text that can be written in UTF-8."
+            raise StoreError(self.where, problem, reason="failed") from error
 
     def _do_many(self, cursor: Cursor, sql: str, rows: Iterable[Sequence[Any]]) -> None:
         cursor.executemany(sql.replace("?", self.dialect.placeholder), rows)

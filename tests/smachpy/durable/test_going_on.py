@@ -595,3 +595,11 @@ def test_what_once_raises_is_not_kept_and_bad_arguments_are_refused(store: Killi
 def test_a_program_runs_one_mission_after_the_other(tmp_path: Path) -> None:
     for _ in range(2):
         assert smachpy.run_durable(machine_of(Doing(fine)), tmp_path / "j.db") == "ok"
+
+
+@pytest.mark.parametrize("mission", ["", 3, b"m"])
+def test_the_id_of_a_mission_is_a_text(tmp_path: Path, mission: Any) -> None:
+    """A number was kept as a text, so that the mission could not be resumed."""
+    with pytest.raises(InvalidStateError, match="run_durable: mission: got"):
+        smachpy.run_durable(machine_of(Doing(fine)), tmp_path / "j.db", mission=mission)
+    assert not (tmp_path / "j.db").exists()

@@ -108,6 +108,23 @@ def test_an_id_is_taken_once(store):
     assert store.mission("m1") == ROW
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda store: store.mission("m\udcff"),
+        lambda store: store.create(replace(ROW, id="m\udcff")),
+        lambda store: store.create(replace(ROW, target="/home/m\udcff.py")),
+    ],
+    ids=["mission", "create", "target"],
+)
+def test_text_that_utf_8_cannot_write_is_refused(store, call):
+    """A name with other bytes on the command line ended in a traceback."""
+    store.create(replace(ROW, id="m2"))
+    with pytest.raises(StoreError, match=r"got '.*m\\udcff.*'; expected text that can be written"):
+        call(store)
+    assert [row.id for row in store.missions()] == ["m2"]
+
+
 def test_entries_are_there_for_who_opens_the_store_next(store, store_place):
     store.create(ROW)
     lease = store.claim("m1", this_runner(), seconds=LONG_S)
