@@ -294,8 +294,7 @@ def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Ta
     if not names:
         machines = [n for n, thing in vars(module).items() if isinstance(thing, Container)]
         if len(machines) != 1:
-            made = {n: thing for n, thing in vars(module).items() if _usable(n, thing)}
-            here = [n for n in made if n in machines or made[n].__module__ == module.__name__]
+            here = _own_names(module)
             raise TargetError(
                 text,
                 f"which machine is meant? got {here or 'no machine and no function'}; expected one "
@@ -305,8 +304,9 @@ def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Ta
     thing: Any = module
     for word in names[0].split("."):
         if not hasattr(thing, word):
-            public = [n for n, value in vars(module).items() if _usable(n, value)]
-            raise TargetError(text, f"nothing is called {names[0]!r}; {_suggest(word, public)}")
+            raise TargetError(
+                text, f"nothing is called {names[0]!r}; {_suggest(word, _own_names(module))}"
+            )
         thing = getattr(thing, word)
     if not (isinstance(thing, Container) or callable(thing)):
         raise TargetError(
@@ -315,8 +315,18 @@ def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Ta
     return _target(name, f"{module.__name__}:{names[0]}", thing)
 
 
-def _usable(name: str, value: object) -> bool:
-    return not name.startswith("_") and (isinstance(value, Container) or inspect.isfunction(value))
+def _own_names(module: ModuleType) -> list[str]:
+    """Return the names of a module's machines and functions, without those of other packages."""
+    package = module.__name__.partition(".")[0]
+    return [
+        name
+        for name, thing in vars(module).items()
+        if not name.startswith("_")
+        and (
+            isinstance(thing, Container)
+            or (inspect.isfunction(thing) and thing.__module__.partition(".")[0] == package)
+        )
+    ]
 
 
 def _target(name: str, source: str, thing: Any) -> Target:

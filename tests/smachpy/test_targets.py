@@ -117,6 +117,24 @@ def test_a_wrong_name_says_what_is_wrong(file, text, words):
     assert caught.value.target == text
 
 
+def test_a_wrong_name_lists_no_names_that_were_imported_from_elsewhere(file):
+    """`from smachpy import *` filled the list with smachpy's own functions."""
+    file.write_text("from smachpy import *\n" + FILE)
+    with pytest.raises(TargetError, match=r"expected one of \['mission', 'other'\]"):
+        load_target("drive_about.py:nope")
+
+
+def test_a_wrong_name_in_a_package_lists_what_the_package_has_from_its_modules(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "tours").mkdir()
+    (tmp_path / "tours" / "__init__.py").write_text("from tours.long import mission\n")
+    (tmp_path / "tours" / "long.py").write_text(FILE)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TargetError, match=r"expected one of .*mission.*Did you mean 'mission'"):
+        load_target("tours:misson")
+
+
 def test_a_factory_that_gives_no_machine_is_an_error(file):
     with pytest.raises(TargetError, match="returned 3; expected a state machine"):
         load_target("drive_about.py:other").build()
