@@ -118,6 +118,7 @@ class MissionKit:
         self._replacements: list[Replacement] = []
         self._servers: list[ScriptedEnd] = []
         self._stack = contextlib.ExitStack()
+        self._is_open = False
         self._process: Process | None = None
 
     def __enter__(self) -> Self:
@@ -125,6 +126,7 @@ class MissionKit:
         self._stack.enter_context(use_clock(self.clock))
         self._stack.enter_context(use_node(self.node))
         self._stack.enter_context(use_shutdown(self.shutdown))
+        self._is_open = True
         return self
 
     def __exit__(
@@ -134,6 +136,7 @@ class MissionKit:
         traceback: TracebackType | None,
     ) -> None:
         errors, causes = self._take_errors()
+        self._is_open = False
         self._places.restore()
         try:
             for server in reversed(self._servers):
@@ -172,6 +175,7 @@ class MissionKit:
 
         Raises:
             TypeError: it is not a container.
+            RuntimeError: the kit is not open: its `with` block or its test has ended.
             Deadlock: everything waits for something that cannot happen.
             TimeLimitError: it did not end in time, or took too many steps.
             SmachError: a state raised, or the machine is inconsistent; as for `execute`.
@@ -184,6 +188,11 @@ class MissionKit:
         """
         __tracebackhide__ = True
         check_machine(machine, "mission")
+        if not self._is_open:  # the run would be in real time, on the network
+            raise RuntimeError(
+                "mission: got a kit that is not open; expected a call in `with mission_kit() as "
+                "mission:`, or in the test that has the fixture."
+            )
         for name, make, made in self._replacements:
             made.append(self._places.put(machine, name, make))
         self._replacements.clear()

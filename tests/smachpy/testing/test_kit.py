@@ -56,6 +56,14 @@ def two_waits():
     return sm
 
 
+def test_a_kit_whose_block_has_ended_runs_nothing():
+    """It ran in real time."""
+    with mission_kit() as mission:
+        mission(two_waits())
+    with pytest.raises(RuntimeError, match="not open; expected a call in `with mission_kit"):
+        mission(two_waits())
+
+
 def test_a_run_says_what_happened(mission):
     run = mission(two_waits())
     assert run.outcome == "done"
