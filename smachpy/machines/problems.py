@@ -7,7 +7,7 @@ import functools
 import inspect
 import math
 import numbers
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from actionlib_core.exceptions import InvalidNameError
@@ -144,7 +144,8 @@ class Problems:
         """Check a list of any values."""
         if isinstance(given, Iterable) and not isinstance(given, (str, bytes)):
             return tuple(given)
-        self.add(f"{argument}: got {given!r}; expected a list. Try [{given!r}].")
+        shown = name_of(given) if callable(given) else repr(given)
+        self.add(f"{argument}: got {shown}; expected a list. Try [{shown}].")
         return ()
 
     def function(
@@ -167,7 +168,8 @@ class Problems:
             count: The number of positional arguments of the call; None to skip the check.
             kwargs: The keyword arguments of the call.
             optional: It may be None.
-            plain: Refuse an `async` function, because nobody would await it.
+            plain: Refuse an `async` function and a generator, because nothing would run its body: a
+                call returns an object, which counts as true.
         """
         if given is None and optional:
             return None
@@ -175,13 +177,21 @@ class Problems:
         if not callable(given):
             hint = " Try the function itself, without ()." if inspect.iscoroutine(given) else ""
             self.add(f"{argument}: got {given!r}; {expected}.{hint}")
-        elif plain and inspect.iscoroutinefunction(given):
+        elif plain and _is(given, inspect.iscoroutinefunction, inspect.isasyncgenfunction):
             self.add(f"{argument}: got the async {_shown(given)}; {expected}, not an async one.")
+        elif plain and _is(given, inspect.isgeneratorfunction):
+            self.add(f"{argument}: got the generator {_shown(given)}; {expected}, without `yield`.")
         elif count is not None and not takes(given, count, kwargs):
             problem = f"{argument}: got {_shown(given)}; {expected}."
             if not accepts(problem):
                 self.add(problem)
         return given
+
+
+def _is(function: Any, *tests: Callable[[Any], bool]) -> bool:
+    """Return whether a test holds for `function`, or for the method of an object that is called."""
+    method = getattr(type(function), "__call__", None)  # noqa: B004  the function itself is needed
+    return any(test(function) or test(method) for test in tests)
 
 
 def unknown_name(what: str, got: object, known: Iterable[str]) -> str:

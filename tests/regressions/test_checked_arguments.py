@@ -141,6 +141,45 @@ def test_an_async_hook_that_nobody_would_await_is_refused():
     assert "async" in problem
 
 
+async def awaited(*_):
+    return False
+
+
+def iterated(*_):
+    yield False
+
+
+async def both(*_):
+    yield False
+
+
+class Awaited:
+    async def __call__(self, *_):
+        return False
+
+
+class Iterated:
+    def __call__(self, *_):
+        yield False
+
+
+@pytest.mark.parametrize("function", [awaited, iterated, both, Awaited(), Iterated()])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda f: state(on_enter=f),
+        monitor,
+        condition,
+        lambda f: smachpy.Concurrence(["ok"], "ok", child_termination_cb=f),
+        lambda f: smachpy.StateMachine(["ok"]).register_start_cb(f),
+    ],
+)
+def test_functions_whose_body_nothing_would_run_are_refused(make, function):
+    """The condition of a generator was always true: the call returns an object."""
+    (problem,) = problems_of(lambda: make(function))
+    assert "not an async one" in problem or "without `yield`" in problem
+
+
 def test_functions_of_all_kinds_may_be_hooks():
     class Hooks:
         def enter(self, userdata):
