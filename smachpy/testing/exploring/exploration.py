@@ -17,7 +17,8 @@ from actionlib_core.clock import RealClock, VirtualClock
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
 from smachpy.machines.container import Container
-from smachpy.machines.problems import unknown_arguments
+from smachpy.machines.names import name_of
+from smachpy.machines.problems import Problems, unknown_arguments
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions
@@ -162,12 +163,13 @@ def explore(
 
     Raises:
         TypeError: `machine` is neither a container nor a function, or there is no such option.
+        InvalidStateError: an invariant is no plain function of the run.
         ValueError: there is no such fault.
         UnknownStateError: `keep` or `writes` names a state that does not exist; or a name in
             `writes` is ambiguous.
     """
     check_machine(machine, "explore", functions=True)
-    own = tuple(invariants)
+    own = _invariants(invariants)
     on_run = on_run or session.current().on_run
     budget = _Budget(max_runs, max_time)
     search = Search(max_depth)
@@ -235,6 +237,15 @@ def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOption
     if error is not None:
         raise error
     return run
+
+
+def _invariants(given: Iterable[Callable[[Run], object]]) -> tuple[Callable[[Run], object], ...]:
+    problems = Problems("explore")
+    checked = problems.values("invariants", given)
+    for number, one in enumerate(checked):
+        problems.function(f"invariants[{number}]", one, "invariant(run)", 1, optional=False)
+    problems.raise_all()
+    return checked
 
 
 class _Budget:
@@ -322,7 +333,14 @@ class Runner:
         if journal is None or not isinstance(self.source, Container):
             self._places.restore()  # the machine before
             source = self.source
-            machine = self._machine = source if isinstance(source, Container) else source()
+            made: object = source if isinstance(source, Container) else source()
+            if not isinstance(made, Container):
+                name = name_of(source)
+                hint = f" Try `return` at the end of {name}." if made is None else ""
+                raise TypeError(
+                    f"{self._call}: machine: {name}() returned {made!r}; expected a machine.{hint}"
+                )
+            machine = self._machine = made
             self._whole = describe(machine) if self.options["doubles"] else None
             for path, make, made in self.options["doubles"]:
                 made[:] = [self._places.put(machine, path, make)]

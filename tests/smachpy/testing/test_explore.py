@@ -18,6 +18,7 @@ from actionlib_core.interfaces.std_msgs.msg import Empty
 from smachpy import (
     CBState,
     Concurrence,
+    InvalidStateError,
     Iterator,
     MonitorState,
     SimpleActionState,
@@ -1147,3 +1148,35 @@ def test_values_that_cannot_be_copied_are_shared_by_all_runs(by):
     assert found.exhaustive
     assert set(sizes) == {1}
     assert visits == []
+
+
+async def waits(run):
+    raise AssertionError
+
+
+def yields(run):
+    yield
+    raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("invariants", "problem"),
+    [
+        ([waits], "not an async one"),
+        ([yields], "without `yield`"),
+        ([3], r"invariants\[0\]: got 3"),
+        ([lambda: None], r"expected something to call as invariant\(run\)"),
+        (yields, r"got yields; expected a list. Try \[yields\]"),
+    ],
+)
+def test_invariants_that_could_never_fail_are_refused(invariants, problem):
+    with pytest.raises(InvalidStateError, match=problem):
+        explore(sound(), invariants=invariants)
+
+
+def test_a_function_that_returns_no_machine_is_named():
+    def make():
+        sound()
+
+    with pytest.raises(TypeError, match=r"make\(\) returned None; expected .* Try `return`"):
+        explore(make)
