@@ -13,7 +13,7 @@ control is not used pays nothing for it.
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from smachpy import log
 from smachpy.events import Paused, Resumed
@@ -23,10 +23,11 @@ from smachpy.run.grace import ask_child, asking, on_preempt, request_soon
 from smachpy.run.visit import Override
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from actionlib_core.clock import Event
     from smachpy.machines.container import Container
+    from smachpy.machines.state import State
     from smachpy.run.child import Child
     from smachpy.run.frame import Frame, Run
     from smachpy.run.step import Step
@@ -44,12 +45,13 @@ class ControlError(SmachError):
         active: Paths of the states that run.
     """
 
-    def __init__(self, path: str, problem: str, active: tuple[str, ...]) -> None:
+    def __init__(
+        self, path: str, problem: str, active: tuple[str, ...], known: Iterable[str] = ()
+    ) -> None:
         self.path = path
         self.active = active
-        super().__init__(
-            f"{path}: {problem}; running: {sorted(active)}.{did_you_mean(path, active)}"
-        )
+        hint = did_you_mean(path, known or active)
+        super().__init__(f"{path}: {problem}; running: {sorted(active)}.{hint}")
 
 
 class Control:
@@ -94,7 +96,13 @@ class Control:
         Args:
             running: What happens to the running states and their goals: "keep" lets them end;
                 "cancel" preempts them, and they run again from their start after `resume`.
+
+        Raises:
+            ControlError: `running` is something else.
         """
+        if running not in {"keep", "cancel"}:
+            problem = f"pause: running: got {running!r}; expected 'keep' or 'cancel'"
+            raise ControlError(self._path(), problem, self.active())
         self._watch()
         self._pause()
         if running == "cancel":
@@ -132,7 +140,17 @@ class Control:
             return tuple(self._waiting)
 
     def add_breakpoint(self, path: str, outcome: str | None = None) -> None:
-        """Pause before the state at `path`, or, with `outcome`, after it has ended with that."""
+        """Pause before the state at `path`, or, with `outcome`, after it has ended with that.
+
+        Raises:
+            ControlError: the machine has no such state, or the state no such outcome.
+        """
+        known = dict(_paths(self._machine, self._path()))
+        if path not in known:
+            raise ControlError(path, "there is no such state", self.active(), known)
+        outcomes = known[path]._smachpy.outcomes
+        if outcome is not None and outcome not in outcomes:
+            raise _no_outcome(path, outcome, outcomes, self.active())
         self._watch()
         with self._lock:
             self._breakpoints.add((path, outcome))
@@ -174,11 +192,7 @@ class Control:
         frame, step = self._step_at(path)
         outcomes = step.state._smachpy.outcomes
         if outcome not in outcomes:
-            raise ControlError(
-                path,
-                f"no such outcome: got {outcome!r}; expected one of {sorted(outcomes)}",
-                self.active(),
-            )
+            raise _no_outcome(path, outcome, outcomes, self.active())
         with asking("operator", "", f"force {outcome!r} of {path}"):
             self._stop_at(frame, step, path, Override(outcome=outcome))
 
@@ -349,6 +363,23 @@ class Control:
         if not ask_child(frame, step, override):
             raise ControlError(path, "it has just ended", self.active())
         self._wake()  # the state may wait at the gate; each one checks whether it was called off
+
+
+def _no_outcome(
+    path: str, outcome: str, outcomes: Iterable[str], active: tuple[str, ...]
+) -> ControlError:
+    """Return the error for an outcome that the state at `path` does not have."""
+    problem = f"no such outcome: got {outcome!r}; expected one of {sorted(outcomes)}"
+    return ControlError(path, problem, active)
+
+
+def _paths(container: Any, above: str) -> Iterator[tuple[str, State]]:
+    """Yield (path, state) for every state in a container."""
+    for label, child in container.get_children().items():
+        path = f"{above}/{label}"
+        yield path, child
+        if child._smachpy_is_container:
+            yield from _paths(child, path)
 
 
 def _frame_of(state: Child) -> Frame | None:

@@ -118,6 +118,25 @@ def test_step_lets_one_state_run(clock):
     assert waits == [("/P/A",), ("/P/INNER",), ("/P/INNER/X",)]
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (lambda c: c.add_breakpoint("/P/INER/Y"), r"no such state; .* Did you mean '/P/INNER/Y'"),
+        (lambda c: c.add_breakpoint("/P"), "no such state"),
+        (lambda c: c.add_breakpoint("A"), "no such state"),
+        (lambda c: c.add_breakpoint("/P/A", "okay"), r"got 'okay'; expected one of \['failed'"),
+        (lambda c: c.pause(running="stop"), "got 'stop'; expected 'keep' or 'cancel'"),
+    ],
+)
+def test_a_command_that_could_have_no_effect_is_refused(clock, command, words):
+    """The machine never paused, or for ever."""
+    sm = mission()
+    with pytest.raises(ControlError, match=words):
+        command(sm.control)
+    assert sm.execute() == "ok"
+    assert not any(isinstance(event, Paused) for event in sm.events)
+
+
 def test_breakpoint_on_a_state_and_on_an_edge(clock):
     sm = mission()
     sm.control.add_breakpoint("/P/INNER/Y")
