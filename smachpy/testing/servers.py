@@ -13,7 +13,7 @@ from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
 from smachpy.exceptions import error_text
-from smachpy.machines.problems import name_of
+from smachpy.machines.problems import Problems, name_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable
@@ -30,6 +30,12 @@ MOST_ERRORS = 5  # errors of one server that a failure shows
 _UNASKED = (GoalStatus.PENDING, GoalStatus.ACTIVE)
 _WAITING = (GoalStatus.PENDING, GoalStatus.RECALLING)
 _UNENDED = (*_WAITING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
+
+
+def _check_function(where: str, argument: str, given: object, call: str) -> None:
+    problems = Problems(where)
+    problems.function(argument, given, call, 1, optional=False)
+    problems.raise_all()
 
 
 @dataclass(slots=True)
@@ -67,6 +73,12 @@ class Reply:
     error: str | None = None
     silent: bool = False
     function: Callable[[Any], Any] | None = None
+
+    def __post_init__(self) -> None:
+        problems = Problems("reply")
+        for name in ("duration", "accept_after", "die_after", "back_after"):
+            problems.seconds(name, getattr(self, name), optional=name != "duration")
+        problems.raise_all()
 
 
 class Test(Protocol):
@@ -325,6 +337,7 @@ class ScriptedActionServer(ScriptedEnd):
 
         An exception of the predicate fails the run, and the goal is aborted.
         """
+        _check_function(self.name, "predicate", predicate, "predicate(goal)")
         reply = self._make(result, status, duration, feedback, text)
         self.conditional.append((predicate, reply))
         return reply
@@ -334,6 +347,7 @@ class ScriptedActionServer(ScriptedEnd):
 
         An exception of the function fails the run, and the goal is aborted.
         """
+        _check_function(self.name, "custom_reply", function, "function(goal_handle)")
         self._queue(Reply(function=function))
 
     def default_result(
@@ -594,6 +608,7 @@ class ScriptedService(ScriptedEnd):
 
         An AssertionError in it also fails the run.
         """
+        _check_function(self.name, "custom_reply", function, "function(request)")
         return self._queue(Reply(function=function))
 
     def default_response(self, response: Any = None, duration: float = 0.0) -> Reply:

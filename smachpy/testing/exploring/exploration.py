@@ -17,8 +17,7 @@ from actionlib_core.clock import RealClock, VirtualClock
 from smachpy.exceptions import SmachError
 from smachpy.introspection import describe
 from smachpy.machines.container import Container
-from smachpy.machines.names import name_of
-from smachpy.machines.problems import Problems, unknown_arguments
+from smachpy.machines.problems import Problems, name_of, unknown_arguments
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions

@@ -13,6 +13,7 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
 from smachpy import (
     CBState,
+    InvalidStateError,
     InvalidUserCodeError,
     MonitorState,
     ServiceState,
@@ -28,6 +29,42 @@ def drive(**options):
     with sm:
         sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction, **options))
     return sm
+
+
+async def waits(_):
+    return False
+
+
+def yields(_):
+    yield
+
+
+SCRIPTS = [
+    (lambda server: server.custom_reply(waits), "not an async one"),
+    (lambda server: server.custom_reply(yields), "without `yield`"),
+    (lambda server: server.custom_reply(None), "got None"),
+    (lambda server: server.custom_reply(lambda: None), "call as function"),
+    (lambda server: server.reply(duration=-5), "duration: got -5"),
+    (lambda server: server.reply(duration=float("nan")), "duration: got nan"),
+    (lambda server: server.reply(duration="5"), "Try 5"),
+    (lambda server: server.die(after=-1), "die_after: got -1"),
+]
+CONDITION = (lambda server: server.reply_conditionally(waits), r"predicate\(goal\), not an async")
+
+
+@pytest.mark.parametrize(("script", "problem"), [*SCRIPTS, CONDITION])
+def test_a_script_that_could_not_work_is_refused(mission, script, problem):
+    """A function whose body nothing would run was called, and the goal left without an answer."""
+    server = mission.action_server("move_base", MoveBaseAction)
+    with pytest.raises(InvalidStateError, match=problem):
+        script(server)
+
+
+@pytest.mark.parametrize(("script", "problem"), SCRIPTS)
+def test_a_script_of_a_service_that_could_not_work_is_refused(mission, script, problem):
+    service = mission.service_server("dock", Trigger)
+    with pytest.raises(InvalidStateError, match=problem):
+        script(service)
 
 
 def drive_twice():
