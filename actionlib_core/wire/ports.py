@@ -107,6 +107,12 @@ def watch_for_server(
     return network.ros.watch(on_token, kind=RosKind.SERVICE, name=action_names(there).send_goal)
 
 
+def is_on_ros2(node: Node, name: str, type_name: str) -> bool:
+    """Return whether an action is on a ROS 2 network; as `watch_for_server`, without joining."""
+    types = _types_of(type_name)
+    return types is not None and _is_on_ros2(node, name, types)
+
+
 def _types_of(type_name: str) -> ActionTypes | None:
     """Return the message classes of an action; None when its definition is unknown."""
     from actionlib_core.interfaces import get_action, ros2

@@ -24,6 +24,21 @@ def add_option(group: Any) -> None:
     )
 
 
+def refuse_simulation(args: argparse.Namespace, option: str) -> None:
+    """Check that an option for a real robot was not combined with a simulated one.
+
+    Raises:
+        MissionError: it was combined with a simulated robot or virtual time.
+    """
+    for given, other in (
+        (args.start_robot, "--start-robot"),
+        (args.time.virtual, f"--time {args.time}"),
+        (args.world, "--world"),
+    ):
+        if given:
+            raise MissionError(f"{option}: got it beside {other}; expected one of them.")
+
+
 @contextlib.contextmanager
 def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
     """Connect the robot to the run's network within the `with` block.
@@ -35,13 +50,7 @@ def ros1_robot(args: argparse.Namespace) -> Iterator[Ros1Bridge]:
 
     Blocks: until the master has answered.
     """
-    for given, option in (
-        (args.start_robot, "--start-robot"),
-        (args.time.virtual, f"--time {args.time}"),
-        (args.world, "--world"),
-    ):
-        if given:
-            raise MissionError(f"--ros1-robot: got it beside {option}; expected one of them.")
+    refuse_simulation(args, "--ros1-robot")
     from actionlib_core import ros1
 
     options: dict[str, Any] = {"namespace": args.robot, "leave_out": _names_of_viewers()}

@@ -19,7 +19,7 @@ from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import options_of
 from smachpy.command.ros1_robot import add_option as add_ros1_robot
-from smachpy.command.ros1_robot import ros1_robot
+from smachpy.command.ros1_robot import refuse_simulation, ros1_robot
 from smachpy.exceptions import MissionError
 from smachpy.mission_info import mission_info
 from smachpy.sim.geometry import positive_seconds
@@ -177,6 +177,8 @@ def _list(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     events = sys.stdout if args.json else None
+    if args.ros2:
+        refuse_simulation(args, "--ros2")
     with contextlib.ExitStack() as stack:
         stack.enter_context(ros2_of_options(args))
         if args.json:  # standard output is for events only: a mission's prints go to standard error

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock, use_clock
+from actionlib_core.config import ROS2_VARIABLE
 from actionlib_core.exceptions import NodeError
 from actionlib_core.node import Node, get_node, init, use_node
 from actionlib_core.output import tell
 from actionlib_core.suggest import nearest
-from actionlib_core.wire.ports import watch_for_server
+from actionlib_core.wire.ports import is_on_ros2, watch_for_server
 from actionlib_core.wire.presence import Kind, list_endpoints
 from smachpy.exceptions import MissionError
 from smachpy.sim.robot_process import RobotProcess
@@ -255,6 +256,8 @@ class _Network:
         self._forget: Callable[[], None] = lambda: None
 
     def start(self, machine: Container, needed: Mapping[str, str]) -> None:
+        if self._options.start:
+            refuse_ros2(needed)
         self._wait = ServerWait(needed)
         self._forget = shutdown.on_shutdown(self._wait.wake)
         if not self._options.start:
@@ -271,6 +274,8 @@ class _Network:
         self._robot.__enter__()
 
     def put_robot(self, prefix: str, timeout: float) -> None:
+        drive = f"{prefix}/move_base" if prefix else "move_base"
+        refuse_ros2({drive: "move_base_msgs/MoveBaseAction"})
         self._wait = ServerWait({})
         self._forget = shutdown.on_shutdown(self._wait.wake)
         arguments = self._options.arguments()
@@ -333,6 +338,29 @@ def _robots_of(needed: Mapping[str, str]) -> tuple[str, int]:
             "or robot_0, robot_1, ... Try starting each: smachpy robot --namespace NAME"
         )
     return "", 1 + max(int(match[1]) for match in matches if match)
+
+
+def refuse_ros2(needed: Mapping[str, str]) -> None:
+    """Check that the actions of a mission are those of the robot that is started for it.
+
+    Raises:
+        MissionError: some are on a ROS 2 robot, which would drive in place of the simulated one.
+    """
+    node = get_node()
+    if not node.config.ros2:
+        return
+    there = [
+        f"'/{full}'"
+        for name, type_name in needed.items()
+        if is_on_ros2(node, full := node.resolve(name, "action name"), type_name)
+    ]
+    if there:
+        what, be = ("action", "is") if len(there) == 1 else ("actions", "are")
+        raise MissionError(
+            f"--start-robot: {what} {', '.join(there)} {be} on the ROS 2 robot that "
+            f"{ROS2_VARIABLE} or the configuration names; expected the simulated robot. Try "
+            f"without --start-robot, or without {ROS2_VARIABLE}."
+        )
 
 
 class ServerWait:

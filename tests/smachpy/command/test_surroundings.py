@@ -15,8 +15,15 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy.command import main
-from smachpy.command.surroundings import REAL_TIME, Pace, missing_on_robot, missing_text
+from smachpy.command.surroundings import (
+    REAL_TIME,
+    Pace,
+    missing_on_robot,
+    missing_text,
+    refuse_ros2,
+)
 from smachpy.events.recording import read_recording
+from smachpy.exceptions import MissionError
 
 NAP = """
 import signal
@@ -164,6 +171,7 @@ def test_a_signal_ends_it(nap, capsys, pace, number, code):
         (["fleet"], "mission 'fleet' needs real time: its robots are processes of their own"),
         (["patrol", "move_base:=mb"], "which the simulated robot does not serve under that name"),
         (["patrol", "--view", "--control"], "--control: got it beside --time virtual"),
+        (["patrol", "--ros2", "tcp/127.0.0.1:1"], "--ros2: got it beside --time virtual"),
         (["patrol", "--robot", "robot 7"], "invalid robot name: ' ' is not allowed"),
         (["patrol", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),
         (["patrol", "--map", "nowhere.yaml"], "nowhere.yaml: got"),
@@ -240,6 +248,24 @@ def test_what_has_no_server_is_named_in_full_with_those_that_may_be_meant(missin
     text = missing_text(missing, there, 2.0)
     assert [part for part in parts if part not in text] == []
     assert text.count("charge'") <= 4
+
+
+@pytest.mark.parametrize(("needed", "names", "there"), [
+    ({"move_base": "move_base_msgs/MoveBaseAction"}, ("**",), "action '/move_base' is on the ROS 2"),
+    ({"go": "nav2_msgs/action/NavigateToPose", "x": "actionlib/TestAction"}, (), "action '/go' is on"),
+    ({"move_base": "move_base_msgs/MoveBaseAction"}, ("red/**",), ""),
+    ({"unknown": "no_msgs/NoneAction"}, ("**",), ""),
+])  # fmt: skip
+def test_a_started_robot_beside_one_of_ros2_that_would_drive_instead(needed, names, there):
+    with VirtualClock() as clock, use_clock(clock):
+        config = Config(ros2=(Ros2(names=names),))
+        session = MemoryNetwork(clock).session()
+        with Node("mission", transport=session, clock=clock, config=config) as node, use_node(node):
+            if not there:
+                refuse_ros2(needed)
+                return
+            with pytest.raises(MissionError, match=there):
+                refuse_ros2(needed)
 
 
 def test_action_missing_on_a_ros2_robot_is_told_with_what_is_there():
