@@ -18,14 +18,23 @@ from typing import TYPE_CHECKING
 from actionlib_core.exceptions import InvalidNameError, NameSetupError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/~]")
+_mender: list[Callable[[str, str], str]] = []
 _EMPTY: Mapping[str, str] = MappingProxyType({})
 
 
+def set_mender(mender: Callable[[str, str], str] | None) -> None:
+    """Let `mender(name, kind)` replace names that the ROS rules forbid; None: refuse them.
+
+    The rules were only a warning in rospy, so programs for ROS 1 have such names.
+    """
+    _mender[:] = [] if mender is None else [mender]
+
+
 def check_name(name: str, kind: str = "name") -> str:
-    """Return `name` unchanged if the ROS rules allow it.
+    """Return `name` if the ROS rules allow it; see also `set_mender`.
 
     Args:
         name: Relative (`move_base`), absolute (`/robot_1/move_base`) or private (`~goal`).
@@ -34,11 +43,14 @@ def check_name(name: str, kind: str = "name") -> str:
     Raises:
         InvalidNameError: a rule is broken; the text marks the first offending character.
     """
-    problem = _find_problem(name)
+    made, problem = name, _find_problem(name)
+    if problem is not None and _mender:
+        made = _mender[0](name, kind)
+        problem = None if _find_problem(made) is None else problem
     if problem is not None:
         reason, index = problem
         raise InvalidNameError(name, kind, reason, index)
-    return name
+    return made
 
 
 def _find_problem(name: str) -> tuple[str, int] | None:
@@ -68,7 +80,7 @@ def _find_problem(name: str) -> tuple[str, int] | None:
 
 
 def check_base_name(name: str, kind: str = "node name") -> str:
-    """Return `name` unchanged if it is one word, without slash and tilde.
+    """Return `name` as `check_name` does, if it is one word, without slash and tilde.
 
     Raises:
         InvalidNameError: it is not.
@@ -88,8 +100,7 @@ def clean_namespace(namespace: str) -> str:
     """
     if namespace in {"", "/"}:
         return ""
-    trimmed = namespace.rstrip("/") or namespace
-    check_name(trimmed, "namespace")
+    trimmed = check_name(namespace.rstrip("/") or namespace, "namespace")
     if trimmed.startswith("~"):
         raise InvalidNameError(namespace, "namespace", "'~' is not allowed", 0)
     return trimmed.lstrip("/")
@@ -115,7 +126,7 @@ def resolve_name(
     Raises:
         InvalidNameError: the name breaks the rules.
     """
-    check_name(name, kind)
+    name = check_name(name, kind)
     if name[0] == "/":
         full = name[1:]
     elif name[0] == "~":

@@ -6,10 +6,13 @@ The code that finds such a slip calls `accepts`. It returns False, so that an er
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from actionlib_core.names import set_mender
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -39,7 +42,19 @@ def accepting() -> bool:
 def set_accepting(on: bool) -> None:
     """Accept slips from now on, or refuse them, and warn of each one again."""
     ACCEPTING[0] = on
+    set_mender(_mend_name if on else None)
     _warned.clear()
+
+
+def _mend_name(name: str, kind: str) -> str:
+    """Return a name that the network allows for one that rospy allowed."""
+    single = re.sub("//+", "/", name)
+    single = single.rstrip("/") or single
+    made = re.sub(r"(?!^)~|[^\w/~]", "_", single, flags=re.ASCII)
+    made = f"_{made}" if made[:1].isdigit() else made
+    # Slashes are no slip: rospy itself removed them.
+    problem = f"{kind}: got {name!r}; expected letters, digits, '_' or '/', as in {made!r}."
+    return made if made == single or accepts(problem) else name
 
 
 def accepts(problem: str) -> bool:

@@ -181,7 +181,7 @@ class _Runs:
     def need(self, action: str) -> None:
         """In virtual time, start the simulated robot whose action is called, unless it is there."""
         node = get_node()
-        name = node.resolve(action)  # as the command line renames it
+        name = node.resolve(action, "action name")  # as the command line renames it
         prefix, _, word = name.removeprefix(f"{node.namespace}/").rpartition("/")
         wanted = self._options.pace.virtual and word in ROBOT_ACTIONS
         if wanted and prefix not in self._robots:

@@ -29,6 +29,7 @@ from actionlib_core.interfaces.smach_msgs.msg import (
     SmachContainerStructure,
 )
 from actionlib_core.interfaces.std_msgs.msg import Header
+from actionlib_core.names import check_name
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.time import Time
@@ -154,8 +155,8 @@ class ContainerProxy:
         node: Node | None = None,
     ) -> None:
         del update_rate
-        self._server_name = server_name
         self._container = _checked("ContainerProxy", server_name, "container", container, path)
+        self._server_name = check_name(server_name)
         self.path = path
         self._node = node
         self._own_topics: _Topics | None = None
@@ -301,7 +302,7 @@ class ContainerProxy:
 def _checked(where: str, server_name: Any, argument: str, container: Any, path: Any) -> Container:
     """Check the arguments of a proxy or server, and return the container."""
     problems = Problems(f"{where} {server_name!r}")
-    problems.word("server_name", server_name)
+    problems.network_name("server_name", server_name)
     if not isinstance(container, Container):
         problems.add(f"{argument}: got {container!r}; expected a container.")
     problems.word("path", path)
@@ -355,9 +356,9 @@ class IntrospectionServer:
         earlier: Sequence[dict[str, Any]] = (),
     ) -> None:
         self._earlier = earlier
-        self._server_name = server_name
         self._robot = robot
         self._state = _checked("IntrospectionServer", server_name, "state", state, path)
+        self._server_name = check_name(server_name)
         self._path = path
         self._obey = obey
         self._controlled = control

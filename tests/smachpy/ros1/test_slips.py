@@ -166,3 +166,62 @@ def test_wrapper_outcomes_that_the_container_lacks(accepted):
 
     with MissionKit(), pytest.warns(slips.SlipWarning):
         smachpy.ActionServerWrapper("x", TestAction, machine(Plain()), ["done", "not_there"])
+
+
+def makers_of_names():
+    """Return functions that use a name of the network as programs for ROS 1 do."""
+    import actionlib
+    import rospy
+    import smach_ros
+    from actionlib.msg import TestAction
+    from std_msgs.msg import Empty
+    from std_srvs.srv import Trigger
+
+    def introspect(name):
+        smach_ros.IntrospectionServer(name, machine(Plain()), "/SM").start()
+
+    return [
+        lambda name: rospy.Publisher(name, Empty, queue_size=1),
+        lambda name: rospy.Subscriber(name, Empty),
+        lambda name: rospy.Service(name, Trigger, print),
+        lambda name: rospy.ServiceProxy(name, Trigger),
+        lambda name: actionlib.SimpleActionClient(name, TestAction),
+        lambda name: actionlib.SimpleActionServer(name, TestAction, print, False).start(),
+        lambda name: smach_ros.SimpleActionState(name, TestAction),
+        lambda name: smach_ros.MonitorState(name, Empty, print),
+        introspect,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "used"), [("//grip/", "grip"), ("my-grip", "my_grip"), ("2 gr~ips", "_2_gr_ips")]
+)
+def test_names_that_rospy_accepted(accepted, name, used):
+    from actionlib_core.node import get_node
+    from actionlib_core.wire.presence import list_endpoints
+    from smachpy.testing import MissionKit
+
+    with MissionKit(), warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for make in makers_of_names():
+            before = len(caught)
+            made = make(name)  # noqa: F841  keeps it alive
+            told = caught[before:]
+            # rospy removed slashes silently.
+            assert len(told) == (used not in name), [str(each.message) for each in told]
+        names = {end.name for end in list_endpoints(get_node().transport)}
+        assert {used, f"{used}/smach/container_status"} <= names
+        assert {name.partition("/")[0] for name in names} <= {used, "rosout"}
+
+
+def test_parameters_may_have_any_name(accepted):
+    import rospy
+
+    from smachpy.testing import MissionKit
+
+    with MissionKit():
+        assert rospy.get_param("~my-speed", 2) == 2
+        rospy.set_param("/robot-1/max speed", 3)
+        assert rospy.get_param("robot-1//max speed/") == 3
+        assert rospy.has_param("/robot-1")
+        assert rospy.resolve_name("a-b", "/lab/node") == "/lab/a-b"

@@ -17,7 +17,7 @@ from smachpy.ros1.names.rospy.core import myargv as myargv
 from smachpy.ros1.names.rospy.core import on_shutdown as on_shutdown
 from smachpy.ros1.names.rospy.core import spin as spin
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInterruptException, as_rospy
-from smachpy.ros1.names.rospy.names import canonical, get_name, get_namespace, resolve_name
+from smachpy.ros1.names.rospy.names import get_name, get_namespace, resolve_name
 from smachpy.ros1.session import session
 from smachpy.ros1.until_end import until_end
 
@@ -94,7 +94,6 @@ def wait_for_message(topic: str, topic_type: Any, timeout: Any = None) -> Any:
 
     Blocks: see `timeout`.
     """
-    topic = canonical(topic)
     now = session()
     now.check_time()
     if now.dry:
@@ -128,7 +127,6 @@ def wait_for_service(service: str, timeout: Any = None) -> None:
 
     Blocks: see `timeout`.
     """
-    service = canonical(service)
     now = session()
     now.check_time()
     if not now.dry:

@@ -18,6 +18,7 @@ from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, current_clock
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces.rosgraph_msgs.msg import Log
+from actionlib_core.names import check_name
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.time import Time
@@ -25,7 +26,6 @@ from actionlib_core.yaml_text import load_yaml
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
 from smachpy.ros1.session import session
 from smachpy.ros1.stubs import Anything
-from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -89,7 +89,10 @@ def init_node(
         name = str(name)
     if not name or not isinstance(name, str):
         raise ValueError(f"init_node: name: got {name!r}; expected a word.")
-    name = _legal(name)
+    try:
+        name = check_name(name, "node name")
+    except ActionlibError as error:
+        raise ROSInitException(str(error)) from error
     if log_level is not None:
         logger.setLevel(_LEVELS.get(log_level, log_level))
     now = session()
@@ -110,13 +113,6 @@ def init_node(
         now.rosout = Publisher("/rosout", Log, queue_size=_MOST_LOGS)
     if not disable_signals:
         now.handle_signals()
-
-
-def _legal(name: str) -> str:
-    """Return a name with `_` in place of characters about which ROS only warns: `my-node`."""
-    made = re.sub(r"[^\w/]", "_", name, flags=re.ASCII)
-    problem = f"init_node: name: got {name!r}; expected letters, digits and '_', as in {made!r}."
-    return made if made != name and accepts(problem) else name
 
 
 def _base(name: str) -> str:

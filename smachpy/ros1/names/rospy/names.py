@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from actionlib_core.names import resolve_name as _resolve
 from actionlib_core.node import get_node
 from smachpy.ros1.session import session
+from smachpy.ros1.stubs import Anything
 
 __all__ = [
     "get_caller_id",
@@ -42,23 +42,25 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
         name: A relative, absolute or private name; "": the namespace itself.
         caller_id: Full name of the node for private names; None: this node.
     """
+    if isinstance(name, Anything):
+        name = str(name)
     if not name:
         return get_namespace()
-    name = canonical(name)
-    name = name.rstrip("/") if len(name) > 1 else name
+    name = re.sub("//+", "/", name)
     if name in {"/", "~"}:
         return "/" if name == "/" else get_name()
-    now = session()
-    # The node of a program that is only built has another name than the program gives it.
-    if caller_id is None and (name[0] != "~" or now.named_node or not now.name):
-        return f"/{get_node().resolve(name)}"
-    node = (caller_id or get_name()).strip("/")
-    return f"/{_resolve(name, namespace=node.rpartition('/')[0], node=node)}"
+    name = name.rstrip("/")
+    node = caller_id or _own_name()
+    # The rules for characters are not applied: ROS's parameters may have any name.
+    if name[0] == "~":
+        full = f"{node}/{name[1:].lstrip('/')}"
+    else:
+        full = name if name[0] == "/" else f"{node.rpartition('/')[0]}/{name}"
+    return get_resolved_mappings().get(full, full)
 
 
-def canonical(name: str) -> str:
-    """Return a name with single slashes: rospy accepts doubled ones."""
-    return re.sub("//+", "/", name) if isinstance(name, str) else name  # it may be a stand-in
+def _own_name() -> str:
+    return get_name() if session().name else f"/{get_node().full_name}"
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
@@ -70,5 +72,6 @@ def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -
 def get_resolved_mappings() -> dict[str, str]:
     """Return the remappings of the command line, as full names."""
     node = get_node()
-    rules = node.arguments.remappings(node.name, namespace=node.namespace, node=node.full_name)
+    name, full = session().name or node.name, _own_name().strip("/")
+    rules = node.arguments.remappings(name, namespace=node.namespace, node=full)
     return {f"/{old}": f"/{new}" for old, new in rules.items()}

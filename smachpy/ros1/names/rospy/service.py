@@ -13,7 +13,6 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy as _ServiceProxy
 from smachpy.ros1.names.rospy.client import wait_for_service as wait_for_service
 from smachpy.ros1.names.rospy.exceptions import ServiceException as ServiceException
 from smachpy.ros1.names.rospy.exceptions import as_rospy
-from smachpy.ros1.names.rospy.names import canonical
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ class Service(_Service):
     ) -> None:
         del buff_size, error_handler
         with as_rospy():
-            super().__init__(canonical(name), service_class, handler)
+            super().__init__(name, service_class, handler)
 
     def spin(self) -> None:
         """Answer until the service is closed or the program is to end."""
@@ -58,7 +57,7 @@ class ServiceProxy(_ServiceProxy):
         headers: dict[str, str] | None = None,
     ) -> None:
         with as_rospy():
-            super().__init__(canonical(name), service_class, persistent, headers, timeout=None)
+            super().__init__(name, service_class, persistent, headers, timeout=None)
 
     def call(self, *args: Any, **kwds: Any) -> Any:
         """Send a request, given or made from the arguments, and return the response.

@@ -17,7 +17,6 @@ from actionlib_core.wire.encoding import parse_encoding
 from smachpy.ros1.names.rospy.core import is_initialized, logerr_once
 from smachpy.ros1.names.rospy.exceptions import ROSException, as_rospy
 from smachpy.ros1.names.rospy.msg import AnyMsg
-from smachpy.ros1.names.rospy.names import canonical
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ class Publisher(_Publisher):
         if data_class is AnyMsg or not name:
             raise ValueError(f"Publisher {name!r}: got {data_class!r}; expected a message class.")
         with as_rospy():
-            super().__init__(canonical(name), data_class, latch, queue_size)
+            super().__init__(name, data_class, latch, queue_size)
         self.impl = self
 
     def publish(self, *args: Any, **kwds: Any) -> None:
@@ -108,7 +107,7 @@ class Subscriber(_Subscriber[Any]):
     ) -> None:
         del buff_size, tcp_nodelay
         with as_rospy():
-            super().__init__(canonical(name), data_class, callback, callback_args, queue_size)
+            super().__init__(name, data_class, callback, callback_args, queue_size)
         self.impl = self
 
 
@@ -126,7 +125,7 @@ class _AnySubscriber(Subscriber):
     ) -> None:
         node = get_node()
         self.node = node
-        self.resolved_name = node.resolve(canonical(name), "topic name")
+        self.resolved_name = node.resolve(name, "topic name")
         self.type = "*"
         self.data_class = data_class
         self.callback = callback
