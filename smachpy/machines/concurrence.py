@@ -148,8 +148,9 @@ class Concurrence(Container):
             The state.
 
         Raises:
-            InvalidStateError: the label is taken, or `state` is not a state.
-            InvalidConstructionError: called on the class while no concurrence is open.
+            InvalidStateError: the label is taken, `state` is not a state, or an argument has a
+                wrong form.
+            InvalidConstructionError: called on the class while no concurrence is open, or it runs.
         """
         if self._smachpy.frame is not None:
             raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")

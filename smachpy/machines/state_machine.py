@@ -147,8 +147,10 @@ class StateMachine(Container):
             The state.
 
         Raises:
-            InvalidStateError: the label is taken, or `state` is not a state.
-            InvalidConstructionError: called on the class while no machine is open.
+            InvalidStateError: the label is taken, `state` is not a state, or an argument has a
+                wrong form.
+            InvalidConstructionError: called on the class while no machine is open, or the machine
+                runs.
         """
         return self._smachpy_add(label, state, transitions, remapping, constants)
 
