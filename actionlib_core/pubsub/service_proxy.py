@@ -344,7 +344,7 @@ class ServiceProxy(ServiceEnd):
 def wait_for_service(
     service: str, timeout: float | Duration | None = None, *, node: Node | None = None
 ) -> None:
-    """Wait until a service has a server, of any type.
+    """Wait until a service has a server, of any type, here or on ROS 2.
 
     Args:
         service: Service name, relative, absolute or private.
@@ -355,6 +355,7 @@ def wait_for_service(
         InvalidDurationError: `timeout` is not a duration.
         WaitTimeoutError: there was no server in time.
         NodeError: the node was closed, or shutdown was requested.
+        TransportError: a ROS 2 network in the configuration cannot be joined.
 
     Blocks: see `timeout`.
     """

@@ -6,8 +6,10 @@ know keys, encodings and tokens.
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from actionlib_core.exceptions import ConfigError
 from actionlib_core.transport import Quality
 from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
 from actionlib_core.wire.presence import (
@@ -128,7 +130,8 @@ def make_end_port(
         kind: Its role; SERVICE also for a caller of services.
         calls: It is such a caller.
         name: See above.
-        interface: Its message or service class; None for an end that only watches.
+        interface: Its message or service class; None for an end that only watches services, of any
+            type.
 
     Raises:
         ConfigError: the interface is a ROS 2 type and the name is on no configured ROS 2 network;
@@ -137,8 +140,10 @@ def make_end_port(
 
     Blocks: the first time on a ROS 2 network, until it is joined.
     """
+    if interface is None:
+        return _AnyEndPort(node, kind, name, None)
     wire = getattr(interface, "_wire", "ros1")
-    if interface is not None and (wire == "ros2" or node.config.ros2):
+    if wire == "ros2" or node.config.ros2:
         from actionlib_core.wire.ros2.mapping import find_network
 
         if find_network(node, name, interface) is not None:
@@ -154,6 +159,7 @@ class OwnEndPort:
     ages = True
 
     def __init__(self, node: Node, kind: Kind, name: str, interface: Any) -> None:
+        self._node = node
         self._transport: Transport = node.transport
         self._interface = interface
         type_name, md5 = ("", "") if interface is None else (interface._type, interface._md5sum)
@@ -224,3 +230,16 @@ class OwnEndPort:
     def read_response(self, reply: Reply) -> Any:
         check_encoding(reply.encoding, self._interface, name=self.own.name)
         return self._interface._response_class.from_bytes(reply.payload)
+
+
+class _AnyEndPort(OwnEndPort):
+    """An end that only watches the services of its name, of any type and on either wire."""
+
+    def watch(self, kinds: Collection[Kind], callback: OnEnd) -> Closable:
+        from actionlib_core.wire.ros2.end_port import watch_any_type
+
+        watches = contextlib.ExitStack()
+        with contextlib.suppress(ConfigError):  # on none of several networks of ROS 2
+            watches.callback(watch_any_type(self._node, self.own.name, callback).close)
+        watches.callback(super().watch(kinds, callback).close)
+        return watches

@@ -11,15 +11,15 @@ from actionlib_core.wire.end_port import Sender
 from actionlib_core.wire.presence import Endpoint
 from actionlib_core.wire.presence import Kind as EndKind
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
-from actionlib_core.wire.ros2.mapping import message_on_ros2, service_on_ros2
-from actionlib_core.wire.ros2.names import LATCHED, Kind
-from actionlib_core.wire.ros2.network import ros_network
+from actionlib_core.wire.ros2.mapping import message_on_ros2, name_on_ros2, service_on_ros2
+from actionlib_core.wire.ros2.names import LATCHED, Kind, parse_token, token_pattern
+from actionlib_core.wire.ros2.network import choose_network, name_there, network_of, ros_network
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from actionlib_core.node import Node
-    from actionlib_core.transport import Closable, Query, Reply, Sample
+    from actionlib_core.transport import Closable, Presence, Query, Reply, Sample
     from actionlib_core.wire.end_port import OnEnd
     from actionlib_core.wire.ros2.mapping import MessageOnRos2
     from actionlib_core.wire.ros2.names import Token
@@ -64,16 +64,7 @@ class RosEndPort:
             node.on_close(self._end.close)
 
     def _convert(self, token: Token) -> Endpoint:
-        """Return the endpoint that a token describes, as our own wire describes endpoints."""
-        return Endpoint(
-            _KINDS.get(token.kind, EndKind.SERVICE),
-            self._name,
-            token.type,
-            token.type_hash,
-            token.session,
-            token.full_node,
-            token.entity_id,
-        )
+        return _endpoint(token, self._name)
 
     def show(self) -> Closable:
         self._end.show()
@@ -152,6 +143,44 @@ class RosEndPort:
 
     def read_response(self, reply: Reply) -> Any:
         return _read(self._response, reply.payload)
+
+
+def _endpoint(token: Token, name: str) -> Endpoint:
+    """Return the endpoint that a token describes, as our own wire describes endpoints."""
+    return Endpoint(
+        _KINDS.get(token.kind, EndKind.SERVICE),
+        name,
+        token.type,
+        token.type_hash,
+        token.session,
+        token.full_node,
+        token.entity_id,
+    )
+
+
+def watch_any_type(node: Node, name: str, callback: OnEnd) -> Closable:
+    """Watch the services of a name on its ROS 2 network, whatever their type; as `EndPort.watch`.
+
+    Without a configured network, it is the one that the program has joined anyway, where this
+    program does not show itself as a node of ROS 2.
+
+    Raises:
+        ConfigError: the name is on none of several networks.
+        TransportError: the network cannot be joined.
+
+    Blocks: the first time, until it is joined.
+    """
+    settings = choose_network(node.config.ros2, name)
+    there = name_there(settings, name_on_ros2(settings, name))
+    transport = network_of(node, settings).transport if node.config.ros2 else node.transport
+
+    def on_presence(presence: Presence) -> None:
+        token = parse_token(presence.key)
+        if token is not None:
+            callback(presence.key, _endpoint(token, name), presence.alive)
+
+    pattern = token_pattern(settings.domain, Kind.SERVICE, name=there)
+    return transport.watch_alive(pattern, on_presence)
 
 
 def _read(on_ros2: MessageOnRos2, payload: bytes) -> Any:

@@ -161,7 +161,7 @@ def message_on_ros2(network: Ros2, name: str, cls: Any) -> MessageOnRos2:
     ways = _ways(cls, theirs, dict(mapped.fields) if mapped else {}, problems)
     if problems:
         raise ConfigError(f"ros2: {name}", *problems)
-    return MessageOnRos2(mapped.name_there if mapped else name, theirs, *ways)
+    return MessageOnRos2(name_on_ros2(network, name), theirs, *ways)
 
 
 def service_on_ros2(
@@ -176,7 +176,7 @@ def service_on_ros2(
     theirs = _looked_up(network, name, "service", (mapped and mapped.type) or cls._type)
     problems: list[str] = []
     fields = _fields_of_parts(mapped, ("request", "response"), problems)
-    there = mapped.name_there if mapped else name
+    there = name_on_ros2(network, name)
     request, response = (
         MessageOnRos2(there, part, *_ways(ours, part, fields[which], problems, f"{which}."))
         for which, ours, part in (
@@ -187,6 +187,12 @@ def service_on_ros2(
     if problems:
         raise ConfigError(f"ros2: {name}", *problems)
     return theirs, request, response
+
+
+def name_on_ros2(network: Ros2, name: str) -> str:
+    """Return a topic's or service's name on a network, before the network's namespace."""
+    mapped = _mapped(network, name)
+    return mapped.name_there if mapped else name
 
 
 def _mapped(network: Ros2, name: str) -> Mapped | None:

@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from actionlib_core.clock import RealClock
-from actionlib_core.config import Config, Ros2
+from actionlib_core.config import Config, Mapped, Ros2
 from actionlib_core.exceptions import (
     ConfigError,
     ServiceConflictError,
@@ -25,7 +25,7 @@ from actionlib_core.interfaces.ros2.std_srvs.srv import SetBool, Trigger
 from actionlib_core.interfaces.std_srvs.srv import SetBool as SetBool1
 from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.pubsub.service_proxy import ServiceProxy, wait_for_service
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.attachment import unpack_attachment
@@ -284,6 +284,32 @@ def test_service_is_called_and_answers(world):
     assert (answer.success, answer.message) == (True, "done")
     assert proxy(False).success is False
     assert isinstance(answer, SetBool.Response)
+    service.close()
+
+
+@pytest.mark.parametrize(("settings", "name"), [
+    (None, "flag"),
+    ({}, "flag"),
+    ({"robot": "red"}, "red/flag"),
+    ({"map": (Mapped("lamp", service="flag"),)}, "lamp"),
+])  # fmt: skip
+def test_waiting_for_a_service_by_its_name_finds_it_on_ros_2(world, settings, name):
+    service = Service("flag", SetBool, lambda request: (True, ""), node=world.robot)
+    if settings is None:  # a program without a configured robot, in the same network
+        node = Node("other", transport=world.session(), clock=world.clock)
+        world.left.callback(node.close)
+    else:
+        node = world.node("other", **settings)
+    wait_for_service(name, WAIT_S, node=node)
+    service.close()
+
+
+def test_waiting_for_a_service_with_a_name_of_no_robot_looks_on_our_own_wire(world):
+    config = Config(ros2=(Ros2(robot="red"), Ros2(robot="blue")))
+    node = Node("other", transport=world.session(), clock=world.clock, config=config)
+    world.left.callback(node.close)
+    service = Service("flag", SetBool1, lambda request: (True, ""), node=node)
+    wait_for_service("flag", WAIT_S, node=node)
     service.close()
 
 
