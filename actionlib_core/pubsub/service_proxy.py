@@ -198,7 +198,8 @@ class ServiceProxy(ServiceEnd):
         if not self._wait_for_server(seconds):
             raise WaitTimeoutError(
                 f"/{self.resolved_name}: no server: got none in {_show(seconds)}; expected one of "
-                f"type {self.type}. Try 'actionlib service list'."
+                f"type {self.type}. "
+                + (self._end.explain_absence() or "Try 'actionlib service list'.")
             )
 
     def _wait_for_server(self, timeout: float | None) -> bool:
@@ -221,8 +222,8 @@ class ServiceProxy(ServiceEnd):
         if not self._wait_for_server(longest):
             raise ServiceUnavailableError(
                 self.resolved_name,
-                f"no server: got none in {longest:g} s; expected one of type {self.type}. Try "
-                "starting it, or wait_for_service() first.",
+                f"no server: got none in {longest:g} s; expected one of type {self.type}. "
+                + (self._end.explain_absence() or "Try starting it, or wait_for_service() first."),
             )
 
     def _ask(self, request: Message, timeout: float | None) -> Reply:

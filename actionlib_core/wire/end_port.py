@@ -73,6 +73,12 @@ class EndPort(Protocol):
     def list_services(self) -> list[Endpoint]:
         """Return the servers of the name. Blocks: until the network has answered, 1 s at most."""
 
+    def explain_absence(self) -> str:
+        """Return where else there is a server of the name, and what to try; "" if nowhere.
+
+        Blocks: as `list_services`.
+        """
+
     def send(self, *, latch: bool) -> Sender:
         """Declare a publication."""
 
@@ -179,6 +185,19 @@ class OwnEndPort:
 
     def list_services(self) -> list[Endpoint]:
         return list_endpoints(self._transport, kind=Kind.SERVICE, name=self.own.name)
+
+    def explain_absence(self) -> str:
+        if not self._node.config.ros2:
+            return ""
+        from actionlib_core.wire.ros2.end_port import list_any_type
+
+        with contextlib.suppress(ConfigError):  # the name is on none of several networks
+            for other in list_any_type(self._node, self.own.name):
+                return (
+                    f"A ROS 2 robot has one, of type {other.type}, in node '/{other.node}'. Try "
+                    f"'names: [{self.own.name}]' in the section ros2 of the configuration."
+                )
+        return ""
 
     def send(self, *, latch: bool) -> Sender:
         quality = Quality(express=True, latch=latch)

@@ -81,6 +81,9 @@ class RosEndPort:
         tokens = self._network.ros.list(kind=Kind.SERVICE, name=self._name_there)
         return [self._convert(token) for token in tokens]
 
+    def explain_absence(self) -> str:
+        return ""
+
     def send(self, *, latch: bool) -> Sender:
         quality = Quality(block=False, cache=LATCHED.depth if latch else 0)
         if latch:
@@ -181,6 +184,14 @@ def watch_any_type(node: Node, name: str, callback: OnEnd) -> Closable:
 
     pattern = token_pattern(settings.domain, Kind.SERVICE, name=there)
     return transport.watch_alive(pattern, on_presence)
+
+
+def list_any_type(node: Node, name: str) -> list[Endpoint]:
+    """Return the services of a name on its configured ROS 2 network; otherwise as above."""
+    settings = choose_network(node.config.ros2, name)
+    there = name_there(settings, name_on_ros2(settings, name))
+    tokens = network_of(node, settings).ros.list(kind=Kind.SERVICE, name=there)
+    return [_endpoint(token, name) for token in tokens]
 
 
 def _read(on_ros2: MessageOnRos2, payload: bytes) -> Any:

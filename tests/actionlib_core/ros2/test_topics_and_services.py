@@ -16,6 +16,7 @@ from actionlib_core.exceptions import (
     ServiceException,
     ServiceUnavailableError,
     TypeMismatchError,
+    WaitTimeoutError,
 )
 from actionlib_core.interfaces import nav_msgs, std_msgs
 from actionlib_core.interfaces.ros2.nav_msgs.msg import OccupancyGrid, Odometry
@@ -400,6 +401,20 @@ def test_second_service_of_a_name_is_refused(world):
 def test_service_that_is_not_there(world):
     with pytest.raises(ServiceUnavailableError):
         ServiceProxy("nobody", Trigger, node=world.mission, timeout=0.1)()
+
+
+def test_service_that_is_on_ros_2_and_not_here_is_told_with_the_way_there(world):
+    service = Service("flag", SetBool, lambda request: (True, ""), node=world.robot)
+    # std_srvs are not taken to a robot by `**`, as programs use them among themselves.
+    proxy = ServiceProxy("flag", SetBool1, node=world.node("old", names=("**",)), timeout=1.0)
+    for call in (proxy, lambda: proxy.wait_for_service(1.0)):
+        with pytest.raises((ServiceUnavailableError, WaitTimeoutError)) as caught:
+            call()
+        assert "A ROS 2 robot has one, of type std_srvs/srv/SetBool, in node '/robot'. Try" in str(
+            caught.value
+        )
+        assert "'names: [flag]' in the section ros2" in str(caught.value)
+    service.close()
 
 
 def test_service_of_a_ros_1_type_goes_to_ros_2_where_the_configuration_names_it(world):
