@@ -94,7 +94,7 @@ class RosEndPort:
             self.own = self._convert(self._end.token)
         end, to_ros2 = self._end, self._message.to_ros2
         port = self._network.transport.publisher(end.key, "", quality)
-        lock = threading.Lock()
+        lock = threading.RLock()  # a signal's handler may publish while this thread does
 
         def put(message: Any) -> None:
             payload = to_ros2(message).to_cdr()

@@ -134,7 +134,7 @@ class RosServerPort:
         self._unknown = with_status(self.pack_result(types.result()), GoalCode.UNKNOWN)
         self._readable = Readable(log)
         self._lock = threading.Lock()
-        self._feedback_lock = threading.Lock()
+        self._feedback_lock = threading.RLock()  # a signal's handler may publish, too
         self._status_due = self._status_busy = False
         self._ends: dict[str, End] = {}
         self._declared: list[Closable] = []

@@ -155,6 +155,26 @@ def test_messages_of_several_threads_are_sent_in_the_order_of_their_numbers(monk
     assert [unpack_attachment(sample.attachment).sequence for sample in samples] == [1, 2]
 
 
+@pytest.mark.timeout(30)
+def test_a_message_published_by_a_signal_handler_during_another_one(world, monkeypatch):
+    seen = world.inbox()
+    key = data_key(0, "chatter", "std_msgs/msg/String", String._rihs01)
+    world.session().subscribe(key, seen)
+    publisher = Publisher("chatter", String, node=world.robot)
+    take, handled = End.attachment, []
+
+    def interrupted(end):
+        if not handled:
+            handled.append(True)
+            publisher.publish("from the handler")
+        return take(end)
+
+    monkeypatch.setattr(End, "attachment", interrupted)
+    publisher.publish("first")
+    words = [String.from_cdr(sample.payload).data for sample in seen.wait_for(2)]
+    assert words == ["from the handler", "first"]
+
+
 @pytest.mark.zenoh
 @pytest.mark.parametrize("latch", [False, True])
 def test_suspended_subscriber_holds_nothing_up(robot, latch):
