@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core._arguments import check_function
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.exceptions import (
+    ActionlibError,
+    DeserializationError,
     ServiceBusyError,
     ServiceConflictError,
     ServiceException,
@@ -28,6 +30,7 @@ from actionlib_core.exceptions import (
 )
 from actionlib_core.pubsub._ends import NameWatch
 from actionlib_core.pubsub.service_proxy import ServiceEnd, handler_raised, is_from
+from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.encoding import parse_encoding
 from actionlib_core.wire.presence import (
     Endpoint,
@@ -97,6 +100,7 @@ class Service(ServiceEnd):
         self._alone = alone
         self._lock = threading.Lock()
         self._running = 0
+        self._readable = Readable(logger)
         self._busy_logged = -math.inf  # when refused calls were last logged [s, clock]
         self._shown = False  # the token was declared
         # Check for another server, then watch for later ones: both may miss a server that starts at
@@ -189,7 +193,7 @@ class Service(ServiceEnd):
             _fail(query, error)
             return
         except ValueError as error:
-            logger.warning("service /%s: dropped a request: %s", self.resolved_name, error)
+            self._report_unreadable("dropped a request", error)
             query.finish()
             return
         if not self._begin_call():
@@ -247,7 +251,13 @@ class Service(ServiceEnd):
 
     def _reply(self, query: Query) -> None:
         try:
-            response = self._respond(self.handler(self._end.read_request(query)))
+            request = self._end.read_request(query)
+        except DeserializationError as error:
+            self._report_unreadable("a request cannot be read", error)
+            _send_error(query, "", f"the request cannot be read: {error}")
+            return
+        try:
+            response = self._respond(self.handler(request))
             self._end.reply(query, response)
         except BaseException as error:  # also for sys.exit(), the caller waits for an answer
             busy = _find_busy(error)
@@ -261,6 +271,11 @@ class Service(ServiceEnd):
                 raise
         finally:
             query.finish()
+
+    def _report_unreadable(self, what: str, error: Exception) -> None:
+        """Log what is wrong with a request, once per kind, as a caller may send many of them."""
+        text = f"service /{self.resolved_name}: {what}: {error}"
+        self._readable.report(what, ActionlibError(text))
 
     def _respond(self, result: object) -> Message:
         # The return values that rospy accepts.

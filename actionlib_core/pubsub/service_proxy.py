@@ -88,7 +88,7 @@ def handler_raised(name: str, remote_type: str, remote_text: str) -> ServiceExce
     """Return the error for a handler that raised."""
     return ServiceException(
         name,
-        f"the handler raised {remote_type or 'an error'}: {remote_text}",
+        f"the handler raised {remote_type}: {remote_text}",
         remote_type=remote_type,
         remote_text=remote_text,
     )
@@ -328,6 +328,9 @@ class ServiceProxy(ServiceEnd):
         if busy and is_from(self.resolved_name, remote_text):
             _, _, reason = remote_text.partition(": ")
             raise ServiceBusyError(self.resolved_name, reason)
+        if not remote_type:
+            reason = f"the server answered with an error: {remote_text}"
+            raise ServiceException(self.resolved_name, reason, remote_text=remote_text)
         raise handler_raised(self.resolved_name, remote_type, remote_text)
 
     def _raise_mismatch(self, remote_text: str) -> None:

@@ -29,7 +29,7 @@ from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.service_proxy import ServiceProxy, wait_for_service
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.ros2.attachment import unpack_attachment
+from actionlib_core.wire.ros2.attachment import Numbering, unpack_attachment
 from actionlib_core.wire.ros2.graph import End, RosNode, RosType
 from actionlib_core.wire.ros2.names import DEFAULT, LATCHED, Kind, data_key
 from tests.transports import TRANSPORTS, opened
@@ -375,6 +375,27 @@ def test_request_that_would_kill_a_real_node_is_dropped_without_harm(world, atta
     done.wait_for(1)
     assert replies.items == []
     assert proxy().message == "gone"
+    service.close()
+
+
+def test_request_that_cannot_be_read_is_told_and_logged_once(world, caplog):
+    service = Service("flag", SetBool, pytest.fail, node=world.robot)
+    key = data_key(0, "flag", "std_srvs/srv/SetBool", SetBool._rihs01)
+    proxy = ServiceProxy("flag", SetBool, node=world.mission)
+    proxy.wait_for_service(WAIT_S)
+    for payload in (b"", b"\0\1\0\0"):
+        replies = world.inbox()
+        attachment = Numbering(bytes(16)).take(1)[1]
+        world.mission.transport.query(
+            key, payload, attachment=attachment, timeout=WAIT_S, on_reply=replies, on_done=list
+        )
+        (reply,) = replies.wait_for(1)
+        assert reply.error
+        assert b"the request cannot be read: std_srvs/srv/SetBool_Request: got" in reply.payload
+    (record,) = (r for r in caplog.records if "cannot be read" in r.getMessage())
+    assert record.getMessage().startswith("service /flag: a request cannot be read: std_srvs")
+    with pytest.raises(ServiceException, match="/flag: the server answered with an error: the re"):
+        proxy._read(replies.items[0])
     service.close()
 
 
