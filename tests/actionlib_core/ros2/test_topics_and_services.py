@@ -158,9 +158,9 @@ def test_messages_of_several_threads_are_sent_in_the_order_of_their_numbers(monk
 @pytest.mark.timeout(30)
 def test_a_message_published_by_a_signal_handler_during_another_one(world, monkeypatch):
     seen = world.inbox()
-    key = data_key(0, "chatter", "std_msgs/msg/String", String._rihs01)
-    world.session().subscribe(key, seen)
+    Subscriber("chatter", String, seen, node=world.mission)
     publisher = Publisher("chatter", String, node=world.robot)
+    assert publisher.wait_for_connections(timeout=WAIT_S)
     take, handled = End.attachment, []
 
     def interrupted(end):
@@ -171,7 +171,7 @@ def test_a_message_published_by_a_signal_handler_during_another_one(world, monke
 
     monkeypatch.setattr(End, "attachment", interrupted)
     publisher.publish("first")
-    words = [String.from_cdr(sample.payload).data for sample in seen.wait_for(2)]
+    words = [message.data for message in seen.wait_for(2)]
     assert words == ["from the handler", "first"]
 
 
