@@ -112,7 +112,7 @@ class ServiceProxy(ServiceEnd):
         InvalidNameError: the name breaks the ROS rules.
         NodeError: the node is closed.
 
-    Threads: any number of threads may call at the same time; a transport callback may not.
+    Threads: any number of threads may call at the same time, but not the network's own.
     """
 
     def __init__(
