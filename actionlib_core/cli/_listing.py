@@ -31,7 +31,7 @@ def add_list(
         record: Returns the object that `--json` prints for a name and its ends.
     """
     run = partial(_list, kinds, record)
-    parser = add_command(verbs, "list", run, f"list the {what} there are")
+    parser = add_command(verbs, "list", run, f"list the {what} on the network")
     parser.add_argument("-t", "--show-types", action="store_true", help="with their types")
     parser.add_argument(
         "-c", f"--count-{what}", dest="count", action="store_true", help="only how many"

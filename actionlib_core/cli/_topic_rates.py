@@ -36,8 +36,8 @@ class _Arrival(NamedTuple):
 def register(verbs: Any) -> None:
     """Add the commands to an argparse subparsers object."""
     for name, show, help_, window in (
-        ("hz", _show_rate, "print how often messages come", 10_000),
-        ("bw", _show_bandwidth, "print how many bytes come in a second", 100),
+        ("hz", _show_rate, "print the rate of messages", 10_000),
+        ("bw", _show_bandwidth, "print the bytes per second", 100),
     ):
         parser = add_command(verbs, name, partial(_measure, show), help_)
         parser.add_argument("name", metavar="NAME")

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 def register(subparsers: Any) -> None:
     """Add the command to an argparse subparsers object."""
-    parser = add_command(subparsers, "echo", run, "print goals, feedback and results as they pass")
+    parser = add_command(
+        subparsers, "echo", run, "print goals, feedback and results as they are sent"
+    )
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument("-s", "--status", action="store_true", help="also the status lists")
     parser.add_argument("--once", action="store_true", help="end after the first message")

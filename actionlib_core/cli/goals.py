@@ -38,7 +38,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--all", action="store_true", help="all goals")
     parser.add_argument("--before", metavar="STAMP", help="seconds since the epoch")
 
-    parser = subparsers.add_parser("goal", help="look at the goals of an action")
+    parser = subparsers.add_parser("goal", help="show the goals of an action")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     verb = add_command(verbs, "list", _list, "list the goals that a server tracks")
     verb.add_argument("name", metavar="NAME", help="the action")

@@ -23,7 +23,7 @@ def register(subparsers: Any) -> None:
         "run a router, for networks without multicast",
         description="Runs a zenoh router until Ctrl-C. Programs with mode 'client' or 'peer' and "
         "its endpoint in 'connect' reach each other through it. Without --listen or a "
-        "configuration only programs on this machine get in.",
+        "configuration only programs on this computer can connect.",
     )
     parser.add_argument(
         "-l", "--listen", action="append", metavar="ENDPOINT",

@@ -44,7 +44,7 @@ def register(subparsers: Any) -> None:
         "words",
         metavar="[TYPE] YAML",
         nargs="*",
-        help="the goal as YAML, for example '{order: 10}'; the type is asked of the server",
+        help="the goal as YAML, for example '{order: 10}'; the server is asked for the type",
     )
     parser.add_argument("-f", "--feedback", action="store_true", help="print feedback")
     parser.add_argument("--stdin", action="store_true", help="read the YAML from standard input")

@@ -26,7 +26,7 @@ def register(subparsers: Any) -> None:
         subparsers,
         "server",
         run,
-        "be the server of an action, by hand",
+        "offer an action and answer its goals by hand",
         description="Prints goals and takes commands from standard input.",
         epilog=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,

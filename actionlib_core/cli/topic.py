@@ -53,7 +53,7 @@ def register(subparsers: Any) -> None:
         help="with publishers, subscribers",
     )  # fmt: skip
     add_type(verbs, "a topic", TOPIC_KINDS)
-    info = add_command(verbs, "info", _info, "who publishes and subscribes")
+    info = add_command(verbs, "info", _info, "show its publishers and subscribers")
     info.add_argument("name", metavar="NAME")
     info.add_argument("-v", "--verbose", action="store_true", help="with nodes and checksums")
     _register_echo(add_command(verbs, "echo", _echo, "print the messages of a topic"))
