@@ -101,7 +101,11 @@ def _report(error: Exception, text: str, *, debug: bool) -> int:
 
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    parser = _Parser(prog="smachpy", description="Robot missions: run, draw and test them.")
+    parser = _Parser(
+        prog="smachpy",
+        description="Robot missions: run, draw and test them.",
+        epilog="Begin with: smachpy run patrol --start-robot",
+    )
     parser.add_argument("--version", action="version", version=f"smachpy {version('smachpy')}")
     subparsers = parser.add_subparsers(
         metavar="COMMAND", required=True, parser_class=_Parser, dest="command"
