@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from actionlib_core import shutdown
+from smachpy import log
 from smachpy.context import current_frame
 from smachpy.events import Entered, Failed, Left, Retried, UserdataWritten
 from smachpy.exceptions import InvalidStateError, InvalidUserCodeError, error_text
@@ -404,6 +405,9 @@ def _attempts(
             decision = after_attempt(result, options, attempt, asked=True, timed_out=False)
         if isinstance(decision, BaseException):
             raise decision
+        if isinstance(result, Exception):  # else its reason would be lost
+            where = frame.here()
+            log.logwarn(f"{where}: {error_text(result)}; on_exception makes it {decision!r}")
         return decision
 
 

@@ -602,3 +602,18 @@ def test_a_state_without_execute_says_what_to_define():
         smachpy.InvalidUserCodeError, match=r"/M/A: .*def execute\(self, userdata\)"
     ):
         machine.execute()
+
+
+def test_an_exception_that_becomes_an_outcome_is_logged_with_its_reason(caplog):
+    @smachpy.state(["held"], on_exception={OSError: "failed"})
+    def hold(_userdata):
+        raise OSError("no answer from the gripper")
+
+    machine = smachpy.StateMachine(["held", "failed"], name="M")
+    machine.add("HOLD", hold)
+    with caplog.at_level(logging.WARNING, logger="smachpy"):
+        assert machine.execute() == "failed"
+    (record,) = caplog.records
+    assert record.getMessage() == (
+        "/M/HOLD: OSError: no answer from the gripper; on_exception makes it 'failed'"
+    )
