@@ -6,6 +6,7 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli import UsageError
 from actionlib_core.cli._command import add_command
 from actionlib_core.cli._network import known, load_packages
 
@@ -45,6 +46,12 @@ def register(subparsers: Any) -> None:
 def _show(args: argparse.Namespace) -> int:
     from actionlib_core.interfaces import _cli
 
+    if "/" not in args.name:
+        load_packages()
+        names = sorted(name for found in _cli.list_interfaces().values() for name in found)
+        near = [name for name in names if name.endswith(f"/{args.name}")]
+        hint = f" Try {' or '.join(near)}." if near else ""
+        raise UsageError(f"interface name: got {args.name!r}; expected 'package/Name'.{hint}")
     if args.json:
         print(json.dumps(known(_cli.describe, args.name), indent=2))
     else:

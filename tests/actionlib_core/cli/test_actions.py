@@ -292,6 +292,7 @@ def test_definitions_of_installed_packages_are_known(shell, capsys):
     assert shell("find", "mission_msgs/Charge") == ""
     assert "mission_msgs/action/Charge" in shell("interface", "list", "-a")
     assert "until" in shell("interface", "show", "mission_msgs/Charge")
+    assert "Try mission_msgs/action/Charge." in shell("interface", "show", "Charge", code=2)
 
 
 def test_echo_prints_what_passes(shell, counting, clock, capsys):
