@@ -12,7 +12,7 @@ from smachpy.actions.messages import Outgoing
 from smachpy.checks import source, suppression
 from smachpy.checks.model import RULES, Facts, OutcomeRule, Place, Problem, Reads, Subject
 from smachpy.machines.concurrence import Concurrence
-from smachpy.machines.container import Container, state_problems
+from smachpy.machines.container import Container, problems_of, state_problems
 from smachpy.machines.iterator import Iterator as IteratorState
 from smachpy.machines.old_states import Delegate
 from smachpy.machines.state import CBState, State, get_options
@@ -41,7 +41,7 @@ def find_problems(state: State, path: str) -> Iterator[Problem]:
 
     `add` refuses most of them; changes that a program made afterwards are found here.
     """
-    for text in state.find_problems(path) if isinstance(state, Container) else ():
+    for text in problems_of(state, path) if isinstance(state, Container) else ():
         if state._smachpy_kind == "plan" and not text.startswith(f"{path}: one state"):
             continue  # reported by `smachpy.checks.plans`, with its line in the plan's file
         rule = "unmapped-outcome" if "outcome has no transition" in text else "inconsistent"

@@ -213,7 +213,7 @@ class Concurrence(Container):
                 if label not in data.children:
                     yield unknown_name(what, label, data.children)
                     continue
-                known = (*data.children[label]._smachpy.outcomes, "preempted")
+                known = dict.fromkeys((*data.children[label]._smachpy.outcomes, "preempted"))
                 for one in wanted:
                     if one not in known:
                         yield unknown_name(f"{what}: outcome of {label}", one, known)

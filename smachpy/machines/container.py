@@ -396,9 +396,9 @@ class Container(Openable, Callbacks, State):
         """
         epoch = EPOCH.value  # read first: a change during compilation makes the plan stale again
         if plan is None or plan.userdata is not self.userdata or plan.is_stale():
-            if any((*self.__own_problems(""), *self.find_problems(""))):
+            if any((*self.__own_problems(""), *problems_of(self, ""))):
                 where = frame.path  # expensive, so it is made only for the error text
-                problems = (*self.__own_problems(where), *self.find_problems(where))
+                problems = (*self.__own_problems(where), *problems_of(self, where))
                 raise InconsistentMachineError(f"{type(self).__name__} {where!r}", problems)
             plan = self._smachpy_compile()
         plan.epoch = epoch
@@ -512,11 +512,16 @@ def below(state: State) -> Iterator[State]:
 
 
 def _all_problems(container: Container, where: str) -> Iterator[str]:
-    yield from container.find_problems(where)
-    yield from _key_problems(container, where)
+    yield from problems_of(container, where)
     for label, child in container.get_children().items():
         if isinstance(child, Container):
             yield from _all_problems(child, f"{where}/{label}")
+
+
+def problems_of(container: Container, where: str) -> Iterator[str]:
+    """Yield the problems of `container` and of its userdata, not those of its children."""
+    yield from container.find_problems(where)
+    yield from _key_problems(container, where)
 
 
 def _key_problems(container: Container, where: str) -> Iterator[str]:

@@ -397,6 +397,15 @@ def test_typed_userdata_is_checked_with_the_machine():
             smachpy.StateMachine.add("A", read, constants={"speed": 1})
 
 
+def test_typed_userdata_is_checked_in_a_machine_that_was_built_without_a_with_block():
+    machine = smachpy.StateMachine(["done"], userdata_type=Mission, name="M")
+    machine.add("A", smachpy.CBState(lambda _: "done", outcomes=["done"], input_keys=["batery"]))
+    with pytest.raises(smachpy.InconsistentMachineError, match=r"no field of Mission.*'battery'"):
+        machine.execute()
+    report = smachpy.check(machine)
+    assert [problem.rule for problem in report] == ["inconsistent"]
+
+
 def test_states_write_typed_userdata():
     sm = smachpy.StateMachine(["ok"], userdata_type=Mission)
 
