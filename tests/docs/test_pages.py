@@ -216,3 +216,12 @@ def test_the_files_that_the_architecture_names_are_there():
     roots = (ROOT, ROOT / "actionlib_core")
     assert len(named) > 10
     assert not [name for name in named if not any((root / name).exists() for root in roots)]
+
+
+def test_the_configuration_page_lists_every_environment_variable():
+    packages = ("actionlib_core", "smachpy", "viz")
+    files = [file for name in packages for file in (ROOT / name).rglob("*.py")]
+    used = {word for file in files for word in re.findall(r"SMACHPY_[A-Z0-9_]+", file.read_text())}
+    page = (ROOT / "docs" / "configuration.md").read_text("utf-8")
+    listed = page[page.index("## Environment variables") :]
+    assert used == set(re.findall(r"`(SMACHPY_[A-Z0-9_]+)`", listed))
