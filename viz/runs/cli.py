@@ -35,6 +35,7 @@ EXAMPLES = """examples:
   smachpy runs export runs/ -o report.html    one report of many runs
   smachpy view runs/1.jsonl                   replay it in the browser
 """
+COLUMN_GAP = 2
 MOST_UNTAKEN = 20
 """Transitions that no run has taken, in the output."""
 
@@ -103,6 +104,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def _list(args: argparse.Namespace) -> int:
+    from rich.cells import cell_len
     from rich.table import Table
     from rich.text import Text
 
@@ -112,13 +114,23 @@ def _list(args: argparse.Namespace) -> int:
         for recording in each_recording(args.places):
             print(json.dumps(_facts(recording)))
         return 0
+    titles = ("file", "machine", "began", "time", "outcome", "outages", "events")
+    rows = [[printable(word) for word in _line(one)] for one in each_recording(args.places)]
+    out = console()
+    widths = [max(map(cell_len, column)) for column in zip(titles, *rows, strict=True)]
+    if sum(widths) + COLUMN_GAP * (len(widths) - 1) > out.width:
+        # A table would cut the outcomes away: the facts stand below the name instead.
+        for file, *facts, outages, events in rows:
+            more = [*([f"{outages} outages"] if outages else []), f"{events} events"]
+            out.print(file, markup=False, soft_wrap=True)
+            out.print(f"  {'  '.join([*facts, *more])}", markup=False, soft_wrap=True)
+        return 0
     table = Table(box=None, pad_edge=False)
-    for title in ("file", "machine", "began", "time", "outcome", "outages", "events"):
+    for title in titles:
         table.add_column(title, no_wrap=True, justify="right" if title == "events" else "left")
-    # As Text, because rich would read "[...]" in a name as markup.
-    for recording in each_recording(args.places):
-        table.add_row(*(Text(printable(word)) for word in _line(recording)))
-    console().print(table)
+    for row in rows:  # as Text, because rich would read "[...]" in a name as markup
+        table.add_row(*map(Text, row))
+    out.print(table)
     return 0
 
 
@@ -365,6 +377,15 @@ def collect_one(place: str, command: str) -> Runs:
 
 
 def _write(recording: Recording, output: Path, runs: list[str], floor: Path | None) -> None:
+    from viz.pictures.drawing import FORMATS
+
+    form = output.suffix.lstrip(".").lower()
+    if form not in {"html", "mcap", *FORMATS}:
+        raise UsageError(
+            f"smachpy runs export: {str(output)!r}: got {form or 'no extension'}; expected html, "
+            f"mcap, or one of {', '.join(sorted(FORMATS))} for a picture. "
+            f"Try -o {output.stem or 'run'}.html"
+        )
     if output.suffix == ".html":
         from viz.runs.html import standalone_page
 

@@ -648,6 +648,35 @@ def test_names_with_brackets_are_shown_as_they_are(tmp_path, clock, capsys):
     assert "M[/x]" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("columns", [20, 80, 400])
+def test_the_outcome_of_each_run_is_shown_however_narrow_the_terminal(
+    record, tmp_path, capsys, monkeypatch, columns
+):
+    from smachpy.command import main
+
+    (tmp_path / ("f" * 100)).mkdir()
+    path = record(f"{'f' * 100}/run.jsonl")
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert main(["runs", "list", str(path.parent)]) == 0
+    shown = capsys.readouterr().out
+    assert str(path) in shown
+    assert "JOB" in shown
+    assert "succeeded" in shown
+
+
+@pytest.mark.parametrize("name", ["run", "run.xyz", "", ".hidden"])
+def test_an_export_of_an_unknown_kind_names_the_kinds_that_there_are(
+    record, capsys, monkeypatch, tmp_path, name
+):
+    from smachpy.command import main
+
+    path = record("run.jsonl")
+    monkeypatch.chdir(tmp_path)
+    assert main(["runs", "export", str(path), "-o", name]) == 2
+    assert "expected html, mcap, or one of dot" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["x.html", "x.mcap"])
 def test_an_export_to_nowhere_is_told(record, tmp_path, capsys, name):
     from smachpy.command import main
