@@ -119,6 +119,11 @@ def _run(args: argparse.Namespace) -> int:
             f"smachpy view: --qr: got --host {args.host}, which only this computer can open; "
             "expected an address on the network. Try --host 0.0.0.0"
         )
+    if args.tui and not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise UsageError(
+            "smachpy view: --tui: got no terminal for input and output; expected one, for keys and "
+            "colours. Over ssh, try: ssh -t HOST smachpy view --tui"
+        )
     from actionlib_core.node import get_node
     from viz.live.actions import Actions
     from viz.live.machines import Machines

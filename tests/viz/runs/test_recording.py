@@ -751,6 +751,7 @@ def test_files_of_one_name_are_two_machines(record, tmp_path):
         (["--port", "99999"], "got '99999'; expected 0 to 65535"),
         (["--port", "http"], "got 'http'; expected 0 to 65535"),
         (["--runs", "/nonexistent"], "no such file or folder"),
+        (["--tui"], "got no terminal"),  # pytest's input and output are none
     ],
 )
 def test_a_viewer_that_cannot_be_started_says_why(words, text, capsys):
