@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 from typing import TYPE_CHECKING
 
@@ -29,13 +30,15 @@ class AddressError(SmachError):
         port: The port.
     """
 
-    def __init__(self, host: str, port: int, reason: str) -> None:
+    def __init__(self, host: str, port: int, reason: str, *, bad_host: bool = False) -> None:
         self.host = host
         self.port = port
-        super().__init__(
-            f"smachpy view: {host}:{port}: cannot listen: {reason}; expected a free port. "
-            "Try --port 0 for any free port."
+        advice = (
+            "expected an address of this computer. Try --host 127.0.0.1, or 0.0.0.0 for others."
+            if bad_host
+            else "expected a free port. Try --port 0 for any free port."
         )
+        super().__init__(f"smachpy view: {host}:{port}: cannot listen: {reason}; {advice}")
 
 
 def outward_address(host: str) -> str:
@@ -75,12 +78,20 @@ class PageServer(uvicorn.Server):
         # The socket is opened here and not by uvicorn, which would exit the program on an error and
         # does not tell which port it got.
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        if not host:  # the system takes it for all addresses: an unset variable would open the page
+            raise AddressError(host, port, "got no host", bad_host=True)
         try:
+            host.encode("idna")  # as binding does, but there a failure leaks a socket
             self._socket = socket.create_server((host, port), family=family)
         except OSError as error:
-            raise AddressError(host, port, error.strerror or str(error)) from error
-        except (OverflowError, UnicodeError) as error:  # an invalid port or host name
+            # Any other reason is the host: unknown, or another computer's.
+            bad_host = error.errno not in {errno.EADDRINUSE, errno.EACCES}
+            reason = error.strerror or str(error)
+            raise AddressError(host, port, reason, bad_host=bad_host) from error
+        except OverflowError as error:  # an invalid port
             raise AddressError(host, port, str(error)) from error
+        except UnicodeError as error:  # a host that no name server can look up
+            raise AddressError(host, port, str(error), bad_host=True) from error
         self.host = host
         self.port: int = self._socket.getsockname()[1]
         config = uvicorn.Config(

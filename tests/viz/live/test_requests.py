@@ -99,6 +99,13 @@ def test_an_address_of_version_six_stands_in_brackets():
     server._socket.close()
 
 
+@pytest.mark.parametrize("host", ["", "192.0.2.1", "half\ud800", "a" * 100])
+def test_a_host_that_is_no_address_of_this_computer_is_named(host):
+    """The empty one means all addresses to the system, as an unset variable must not."""
+    with pytest.raises(AddressError, match="expected an address of this computer"):
+        PageServer(Viewer(Machines()), host, 0)
+
+
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])
 def test_a_qr_code_of_an_address_that_a_phone_cannot_open_is_refused(host, capsys):
     assert main(["view", "--qr", "--host", host, "--port", "0"]) == 2
