@@ -376,16 +376,25 @@ def collect_one(place: str, command: str) -> Runs:
     return runs
 
 
-def _write(recording: Recording, output: Path, runs: list[str], floor: Path | None) -> None:
+def check_extension(command: str, output: Path, *forms: str) -> None:
+    """Check that the extension of a file is one of `forms`, or that of a picture.
+
+    Raises:
+        UsageError: it is not.
+    """
     from viz.pictures.drawing import FORMATS
 
     form = output.suffix.lstrip(".").lower()
-    if form not in {"html", "mcap", *FORMATS}:
+    if form not in {*forms, *FORMATS}:
         raise UsageError(
-            f"smachpy runs export: {str(output)!r}: got {form or 'no extension'}; expected html, "
-            f"mcap, or one of {', '.join(sorted(FORMATS))} for a picture. "
+            f"smachpy {command}: {str(output)!r}: got {form or 'no extension'}; expected "
+            f"{', '.join(forms)}, or one of {', '.join(FORMATS)} for a picture. "
             f"Try -o {output.stem or 'run'}.html"
         )
+
+
+def _write(recording: Recording, output: Path, runs: list[str], floor: Path | None) -> None:
+    check_extension("runs export", output, "html", "mcap")
     if output.suffix == ".html":
         from viz.runs.html import standalone_page
 

@@ -471,6 +471,10 @@ def _write_config(file: Path, values: Mapping[str, Value]) -> None:
     document = yaml.load(OFFICE_ROBOT)
     for key, value in values.items():
         section, _, name = key.partition(".")
-        document.setdefault(section, {})[name] = float(value) if isinstance(value, str) else value
+        try:
+            number = float(value) if isinstance(value, str) else value
+        except ValueError:
+            raise ValueError(f"{key}: got {value!r}; expected a number.") from None
+        document.setdefault(section, {})[name] = number
     with file.open("w", encoding="utf-8") as stream:
         yaml.dump(document, stream)

@@ -142,10 +142,23 @@ def _end(number: int, _frame: object) -> None:
 
 
 def _simulate(args: argparse.Namespace, folder: Path) -> int:
-    from viz.runs.cli import collect_one, console, print_differences, print_statistics
+    from viz.runs.cli import (
+        check_extension,
+        collect_one,
+        console,
+        print_differences,
+        print_statistics,
+    )
     from viz.runs.simulate import Plan, simulate
 
-    # Read first: a mistake in the name should not be reported after an hour of simulation.
+    # First: a mistake in a name should not be reported after an hour of simulation.
+    if args.output is not None:
+        check_extension("simulate", args.output, "html")
+        if not args.output.parent.is_dir():
+            raise UsageError(
+                f"smachpy simulate: {str(args.output)!r}: got no folder "
+                f"{str(args.output.parent)!r}; expected one that exists."
+            )
     before = None if args.compare is None else collect_one(args.compare, "simulate --compare")
     plan = Plan(args.mission, args.runs, folder, args.vary, args.seed, args.limit)
     progress = _Progress(args.runs, as_json=args.json)

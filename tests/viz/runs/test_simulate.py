@@ -185,6 +185,12 @@ def test_parameters_of_the_robot_can_vary(tmp_path):
     assert not list(tmp_path.glob("*.yaml"))
 
 
+def test_a_parameter_of_the_robot_that_is_no_number_is_named(tmp_path):
+    vary = Vary.read("robot.max_speed=slow,fast")
+    [result] = simulate(Plan("there_and_back", 1, tmp_path, [vary]), Here())
+    assert "robot.max_speed: got 'slow'; expected a number" in result.error
+
+
 @pytest.mark.parametrize(
     "text",
     ["", "x", "x=", "=1..2", "x=..", "x=1..", "x=2..1", "x=nan..1", "x=1..inf", "x=a..b"],
@@ -271,6 +277,9 @@ def test_the_command_prints_a_table_and_writes_a_report(job, tmp_path, capsys):
         (["--vary", "seconds=1..2", "--vary", "seconds=3..4"], "expected each key once"),
         (["--compare", "nowhere"], "nowhere"),
         (["--record", "."], "not empty"),
+        (["--record", "new", "-o", "report.pdfx"], "expected html, or one of dot"),
+        (["--record", "new", "-o", "report"], "got no extension"),
+        (["--record", "new", "-o", "none/report.html"], "got no folder 'none'"),
     ],
 )
 def test_bad_requests_end_with_2(job, tmp_path, monkeypatch, capsys, arguments, words):
@@ -279,6 +288,7 @@ def test_bad_requests_end_with_2(job, tmp_path, monkeypatch, capsys, arguments, 
     error = capsys.readouterr().err
     assert words in error
     assert "Traceback" not in error
+    assert not list(tmp_path.glob("new/*"))  # nothing has run
 
 
 @pytest.mark.parametrize("ending", ["run.mcap", "run"])
