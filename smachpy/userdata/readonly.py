@@ -13,7 +13,7 @@ import contextlib
 import enum
 import functools
 import types
-from collections import OrderedDict, deque
+from collections import OrderedDict, defaultdict, deque
 from operator import is_
 from typing import TYPE_CHECKING, Any
 
@@ -148,14 +148,17 @@ _SEQUENCE = (
     *("append", "extend", "insert", "remove", "pop", "clear", "reverse"),
     *("__setitem__", "__delitem__", "__iadd__", "__imul__"),
 )
+_MAPPING = (
+    *("update", "clear", "pop", "popitem", "setdefault"),
+    *("__setitem__", "__delitem__", "__ior__"),
+)
+# Subclasses come before their base class: the first that fits counts.
 _CHANGES: dict[type, tuple[str, ...]] = {
     list: (*_SEQUENCE, "sort"),
     bytearray: _SEQUENCE,
     deque: (*_SEQUENCE, "appendleft", "extendleft", "popleft", "rotate"),
-    dict: (
-        *("update", "clear", "pop", "popitem", "setdefault"),
-        *("__setitem__", "__delitem__", "__ior__"),
-    ),
+    OrderedDict: (*_MAPPING, "move_to_end"),
+    dict: _MAPPING,
     set: (
         *("add", "discard", "remove", "pop", "clear", "update", "difference_update"),
         *("intersection_update", "symmetric_difference_update"),
@@ -249,6 +252,8 @@ def _view_class(kind: type, base: type | None) -> Any:
         "__reduce_ex__": _reduce,
         "_smach_still_shows": _comparer(kind, base),
     }
+    if issubclass(kind, defaultdict):
+        body["__missing__"] = _missing
     if kind is not base:
         body |= {
             "__getattribute__": __getattribute__,
@@ -259,6 +264,14 @@ def _view_class(kind: type, base: type | None) -> Any:
         return types.new_class(kind.__name__, (kind, _View), exec_body=lambda ns: ns.update(body))
     except TypeError:  # a final class, or a metaclass with its own rules
         return None
+
+
+def _missing(self: Any, name: Any) -> Any:
+    """Return the default of a `defaultdict` for a key that it does not have, without adding it."""
+    factory = self._smach_original.default_factory
+    if factory is None:
+        raise KeyError(name)
+    return read_only(factory(), self._smach_key)
 
 
 def _comparer(kind: type, base: type | None) -> Callable[[Any, Any], bool] | None:

@@ -84,7 +84,9 @@ def through_a_state(value, body, **keys):
         (bytearray(b"ab"), lambda v: v.extend(b"c")),
         (deque([1]), lambda v: v.popleft()),
         (OrderedDict(a=1), lambda v: v.pop("a")),
+        (OrderedDict(a=1, b=2), lambda v: v.move_to_end("a")),
         (defaultdict(list, a=[1]), lambda v: v["a"].append(2)),
+        (defaultdict(list), lambda v: v["a"].append(2)),
         (Counter("ab"), lambda v: v.update("c")),
         (([1],), lambda v: v[0].append(2)),
         (Pair([1], 2), lambda v: v.a.append(2)),
@@ -125,6 +127,21 @@ def test_read_only_values_are_what_they_were():
         assert sorted(v, key=str)
 
     through_a_state([1, [2], Pose(1.0)], look).execute()
+
+
+def test_a_read_only_defaultdict_has_its_defaults():
+    """A key that it does not have was a KeyError."""
+    rooms = defaultdict(list, lab=[1])
+
+    def look(v):
+        assert isinstance(v, defaultdict)
+        assert (v["lab"], v["hall"], v.get("hall")) == ([1], [], None)
+        assert "hall" not in v
+
+    through_a_state(rooms, look).execute()
+    assert rooms == {"lab": [1]}
+    with pytest.raises(smachpy.InvalidUserCodeError, match="KeyError: 'hall'"):
+        through_a_state(defaultdict(None, lab=1), lambda v: v["hall"]).execute()
 
 
 def test_read_only_objects_have_their_methods_length_and_items():
