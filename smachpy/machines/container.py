@@ -519,24 +519,18 @@ def _all_problems(container: Container, where: str) -> Iterator[str]:
 
 
 def problems_of(container: Container, where: str) -> Iterator[str]:
-    """Yield the problems of `container` and of its userdata, not those of its children."""
-    yield from container.find_problems(where)
-    yield from _key_problems(container, where)
-
-
-def _key_problems(container: Container, where: str) -> Iterator[str]:
-    """Yield a problem for each key of a child that is not a field of the typed userdata."""
+    """Yield the problems of `container` and of its typed userdata, not those of its children."""
     data = data_of(container.userdata)
-    if not isinstance(data, CheckedDict):
-        return
-    fields = data.fields
-    for label, state in container.get_children().items():
-        names = container._smachpy.remappings[label]
-        keys = (*state.get_registered_input_keys(), *state.get_registered_output_keys())
-        for key in dict.fromkeys(names.get(key, key) for key in keys):
-            if "." not in key and key not in fields.types:
-                what = f"{where}/{label}: userdata key is no field of {fields.kind.__name__}"
-                yield unknown_name(what, key, fields.types)
+    if isinstance(data, CheckedDict):
+        fields = data.fields
+        for label, state in container.get_children().items():
+            names = container._smachpy.remappings[label]
+            keys = (*state.get_registered_input_keys(), *state.get_registered_output_keys())
+            for key in dict.fromkeys(names.get(key, key) for key in keys):
+                if "." not in key and key not in fields.types:
+                    what = f"{where}/{label}: userdata key is no field of {fields.kind.__name__}"
+                    yield unknown_name(what, key, fields.types)
+    yield from container.find_problems(where)
 
 
 _MAX_ARGUMENTS = 4  # of a signal handler: self, the number, the interrupted frame, one default
