@@ -107,7 +107,8 @@ class PageServer(uvicorn.Server):
     @property
     def address(self) -> str:
         """The page's URL; if the server listens on all addresses, one that others can open."""
-        host = outward_address(self.host) if self.host in EVERYWHERE else self.host
+        bound = self._socket.getsockname()[0]  # "0.0.0.0", also if it was written as "0"
+        host = outward_address(bound) if bound in EVERYWHERE else self.host
         host = f"[{host}]" if ":" in host and not host.startswith("[") else host
         return f"http://{host}:{self.port}/"
 

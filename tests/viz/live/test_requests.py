@@ -99,6 +99,18 @@ def test_an_address_of_version_six_stands_in_brackets():
     server._socket.close()
 
 
+@pytest.mark.parametrize("host", ["0.0.0.0", "0", "::", "0::0"])
+def test_a_server_that_listens_everywhere_prints_an_address_that_others_can_open(host):
+    try:
+        server = PageServer(Viewer(Machines()), host, 0)
+    except AddressError:
+        pytest.skip("this computer has no such addresses")
+    shown = urllib.parse.urlsplit(server.address).hostname
+    assert shown is not None
+    assert not ipaddress.ip_address(shown).is_unspecified
+    server._socket.close()
+
+
 @pytest.mark.parametrize("host", ["", "192.0.2.1", "half\ud800", "a" * 100])
 def test_a_host_that_is_no_address_of_this_computer_is_named(host):
     """The empty one means all addresses to the system, as an unset variable must not."""
