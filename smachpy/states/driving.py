@@ -9,7 +9,9 @@ from actionlib_core.interfaces.geometry_msgs.msg import Point, Pose, PoseStamped
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Header
-from smachpy import MonitorState, SimpleActionState
+from smachpy import InvalidStateError, MonitorState, SimpleActionState
+from smachpy.context import current_path
+from smachpy.machines.problems import as_number
 from smachpy.sim.geometry import Pose2D, quaternion_of, yaw_of
 
 if TYPE_CHECKING:
@@ -26,7 +28,16 @@ def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
     Args:
         pose: The pose [m, m, rad].
         frame: Its frame, which the robot must know. In "base_link" x is ahead of the robot.
+
+    Raises:
+        InvalidStateError: `pose` is no `Pose2D`, or has a number that is not finite.
     """
+    numbers = [as_number(value) for value in pose] if isinstance(pose, Pose2D) else [None]
+    if not all(number is not None and math.isfinite(number) for number in numbers):
+        where = current_path() or "goal_at"
+        raise InvalidStateError(
+            f"{where}: pose: got {pose!r}; expected a Pose2D of finite numbers."
+        )
     heading = Quaternion(*quaternion_of(pose.yaw))
     there = Pose(position=Point(pose.x, pose.y, 0.0), orientation=heading)
     return MoveBaseGoal(target_pose=PoseStamped(header=Header(frame_id=frame), pose=there))
@@ -49,6 +60,9 @@ def drive_to(
             `Waypoint`, a `Pose`, or a `PoseStamped`, whose header names another frame.
         action: Name of the action.
         **options: Those of `SimpleActionState`; the default of `exec_timeout` is 600 s.
+
+    Raises:
+        InvalidStateError: an argument is wrong.
     """
     options.setdefault("exec_timeout", DRIVE_TIMEOUT)
     if not isinstance(place, str):
@@ -80,9 +94,15 @@ def turn(degrees: float, **options: Any) -> SimpleActionState:
         degrees: The angle [deg], anticlockwise. The robot turns the shorter way, so use two states
             for more than 180.
         **options: Those of `SimpleActionState`; the default of `exec_timeout` is 60 s.
+
+    Raises:
+        InvalidStateError: an argument is wrong.
     """
+    number = as_number(degrees)
+    if number is None or not math.isfinite(number):
+        raise InvalidStateError(f"turn: degrees: got {degrees!r}; expected a finite number.")
     options.setdefault("exec_timeout", TURN_TIMEOUT)
-    goal = goal_at(Pose2D(0.0, 0.0, math.radians(degrees)), frame="base_link")
+    goal = goal_at(Pose2D(0.0, 0.0, math.radians(number)), frame="base_link")
     return SimpleActionState("move_base", MoveBaseAction, goal=goal, **options)
 
 

@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from smachpy import State, StateMachine, UserData
+from smachpy.machines.problems import Problems
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -38,7 +39,11 @@ def serve_during(machine: Container, *makers: Callable[[], Server]) -> None:
     Args:
         machine: The machine.
         *makers: Functions that make one server each.
+
+    Raises:
+        InvalidStateError: one of them cannot be called without arguments.
     """
+    _check("serve_during", makers)
     stack = ExitStack()
 
     def start(_userdata: UserData, _initial: object) -> None:
@@ -51,6 +56,13 @@ def serve_during(machine: Container, *makers: Callable[[], Server]) -> None:
     machine.register_termination_cb(end)
 
 
+def _check(where: str, makers: Iterable[object]) -> None:
+    problems = Problems(where)
+    for maker in makers:
+        problems.function("maker", maker, "maker()", 0, optional=False)
+    problems.raise_all()
+
+
 def _open(stack: ExitStack, makers: Iterable[Callable[[], Server]]) -> None:
     for make in makers:
         server: Any = make()
@@ -61,6 +73,7 @@ class Serve(State):
     """Keeps servers on the network until the state is preempted, by Ctrl-C for example."""
 
     def __init__(self, *makers: Callable[[], Server]) -> None:
+        _check("Serve", makers)
         super().__init__(outcomes=["preempted"])
         self.__makers = makers
 

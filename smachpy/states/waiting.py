@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.pubsub.topic import Subscriber
 from smachpy import State, UserData
+from smachpy.machines.problems import Problems
 from smachpy.run.frame import clock_of_run
 from smachpy.run.grace import on_preempt
 
@@ -23,16 +24,25 @@ class AwaitMessage(State):
         msg_type: Class of its messages.
         wanted: Called with each message, in the subscriber's thread; a true value ends the wait.
         timeout: Longest wait [s].
+
+    Raises:
+        InvalidStateError: an argument is wrong; all problems at once.
     """
 
     def __init__(
         self, topic: str, msg_type: Any, wanted: Callable[[Any], bool], *, timeout: float
     ) -> None:
+        problems = Problems(f"AwaitMessage {topic!r}")
+        problems.network_name("topic", topic)
+        problems.kind_of("msg_type", msg_type, "_slot_types", "a class of messages")
+        problems.function("wanted", wanted, "wanted(message)", 1, optional=False)
+        longest = problems.seconds("timeout", timeout, optional=False)
+        problems.raise_all()
         super().__init__(outcomes=["came", "timeout", "preempted"])
         self.__topic = topic
         self.__msg_type = msg_type
         self.__wanted = wanted
-        self.__longest = timeout
+        self.__longest = longest
 
     def execute(self, userdata: UserData) -> str:
         """Wait for the message.
@@ -70,9 +80,15 @@ class Wait(State):
 
     Args:
         seconds: The time [s]; None for the userdata key `seconds`.
+
+    Raises:
+        InvalidStateError: `seconds` is not a duration.
     """
 
     def __init__(self, seconds: float | None = None) -> None:
+        problems = Problems("Wait")
+        problems.seconds("seconds", seconds)
+        problems.raise_all()
         keys = ["seconds"] if seconds is None else []
         super().__init__(outcomes=["done", "preempted"], input_keys=keys)
         self.__seconds = seconds

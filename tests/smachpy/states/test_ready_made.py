@@ -9,7 +9,7 @@ import pytest
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Bool
-from smachpy import StateMachine
+from smachpy import InvalidStateError, StateMachine
 from smachpy.states import (
     AwaitMessage,
     Pose2D,
@@ -46,6 +46,42 @@ def alone(state, **userdata):
 
 def target(goal):
     return pytest.approx(pose_of(goal.target_pose.pose))
+
+
+def yields(message):
+    yield True
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: Wait(-1), "seconds: got -1"),
+        (lambda: Wait(math.nan), "seconds: got nan"),
+        (lambda: Wait("5"), "Try 5"),
+        (lambda: AwaitMessage("a b", Bool, bool, timeout=1.0), "topic: got 'a b'"),
+        (lambda: AwaitMessage("a", 3, bool, timeout=1.0), "msg_type: got 3"),
+        (lambda: AwaitMessage("a", Bool, yields, timeout=1.0), "without `yield`"),
+        (lambda: AwaitMessage("a", Bool, bool, timeout=-1), "timeout: got -1"),
+        (lambda: drive_to(None), "pose: got None; expected a Pose2D of finite numbers"),
+        (lambda: drive_to((1.0, 2.0, 0.0)), "pose: got"),
+        (lambda: drive_to(Pose2D(1.0, math.nan, 0.0)), "pose: got Pose2D"),
+        (lambda: drive_to(Pose2D("1", 2.0, 0.0)), "pose: got Pose2D"),
+        (lambda: turn(math.inf), "degrees: got inf"),
+        (lambda: turn("90"), "degrees: got '90'"),
+        (lambda: Serve(None), "maker: got None"),
+        (lambda: serve_during(alone(Wait(1.0)), lambda node: node), "maker"),
+    ],
+)
+def test_wrong_arguments_are_refused_where_they_are_given(make, problem):
+    """They were noticed during the mission; a pose that is no number was sent to the robot."""
+    with pytest.raises(InvalidStateError, match=problem):
+        make()
+
+
+def test_a_pose_of_the_userdata_that_is_no_number_is_not_sent(mission, base):
+    with pytest.raises(InvalidStateError, match="/ALONE/STATE: pose: got Pose2D"):
+        mission(alone(drive_to("place"), place=Pose2D(math.nan, 0.0, 0.0)))
+    assert base.goals == []
 
 
 def test_a_goal_holds_the_pose():
