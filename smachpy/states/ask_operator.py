@@ -26,7 +26,7 @@ from smachpy import State, UserData
 from smachpy.events import QuestionAnswered, QuestionAsked
 from smachpy.exceptions import MissionError
 from smachpy.log import logwarn
-from smachpy.machines.problems import name_of
+from smachpy.machines.problems import Problems, name_of
 from smachpy.run.frame import current_scope
 from smachpy.run.grace import on_preempt
 from smachpy.states.questions import (
@@ -76,6 +76,7 @@ class AskOperator(State):
         **options: See `smachpy.machines.state.StateOptions`, and `input_keys` for the functions.
 
     Raises:
+        InvalidStateError: `question` is empty, or neither a text nor a function of the userdata.
         MissionError: `patience` is not a duration, `default` is not possible, or `answers` is empty
             or has an answer with another meaning.
     """
@@ -91,6 +92,13 @@ class AskOperator(State):
         channel: str = "operator",
         **options: Any,
     ) -> None:
+        problems = Problems("AskOperator")
+        for name, given in (("question", question), ("picture", picture)):
+            if callable(given):
+                problems.function(name, given, f"{name}(userdata)", 1)
+        if not callable(question):
+            problems.word("question", question)
+        problems.raise_all()
         if not isinstance(patience, (int, float)) or not 0.0 < patience < math.inf:
             got = f"{patience:g}" if isinstance(patience, (int, float)) else repr(patience)
             raise MissionError(f"patience: got {got}; expected more than 0 [s].")

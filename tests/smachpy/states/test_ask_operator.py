@@ -146,3 +146,30 @@ def test_two_questions_at_once_have_channels_of_their_own(mission, answer):
 def test_a_patience_that_is_no_time_is_refused(patience):
     with pytest.raises(MissionError, match=f"patience: got {patience:g}; expected more than 0"):
         AskOperator("Shall I?", patience=patience)
+
+
+async def waits(userdata):
+    return "Go on?"
+
+
+def yields(userdata):
+    yield "Go on?"
+
+
+@pytest.mark.parametrize(
+    ("question", "problem"),
+    [
+        ("", "question: got ''"),
+        (None, "question: got None"),
+        (waits, "not an async one"),
+        (yields, "without `yield`"),
+        (lambda: "Go on?", r"question\(userdata\)"),
+    ],
+)
+def test_a_question_that_no_person_could_read_is_refused(question, problem):
+    """A coroutine was shown as the question."""
+    with pytest.raises(smachpy.InvalidStateError, match=problem):
+        AskOperator(question, ["yes"], patience=1.0)
+    if callable(question):
+        with pytest.raises(smachpy.InvalidStateError, match="picture: got"):
+            AskOperator("Go on?", ["yes"], patience=1.0, picture=question)
