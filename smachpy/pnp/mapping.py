@@ -29,7 +29,8 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits
 from smachpy.exceptions import InvalidStateError
-from smachpy.pnp.actions import Goal
+from smachpy.machines.state import State
+from smachpy.pnp.actions import Function, Goal, Made
 from smachpy.pnp.knowledge import Events, Expression, Polled, TopicCondition
 from smachpy.pnp.problems import PlanError, PlanProblem
 from smachpy.pnp.server import PNPServer
@@ -50,6 +51,7 @@ class Registered:
 
 
 _SERVER: Final = ("action", "conditions", "events", "robot", "every", "timeout")
+_ACTIONS: Final = (State, Function, Goal, Made)
 _GOAL: Final = ("action", "type", "goal", "cases", "timeout", "server_wait_timeout")
 _POSITIVE: Final = Limits(above=0)
 
@@ -115,6 +117,9 @@ def _action(section: Section) -> Any:
     if "run" in section:
         thing = _thing(section)
         section.close()
+        if not (thing is None or callable(thing) or isinstance(thing, _ACTIONS)):
+            got = f"got {section.value('run')!r}, which is {thing!r}"
+            section.report("run", f"{got}; expected a function or a state.")
         return thing
     section.allow("run", *_GOAL)
     section.close()

@@ -93,6 +93,7 @@ def test_goals_are_typed_by_their_fields(folder):
         ("position.x", "position.xx", "xx", 0),
         ("move_base_msgs/MoveBase", "move_base_msgs/Move", "type", 5),
         ("cases:", "case:", "Did you mean", 7),
+        ("  goto:", "  say: {run: 'math:pi'}\n  goto:", "which is 3.14", 3),
         ("obstacle: false", "obstacle: {userdata: 'f(x)'}", "with Call in it", 10),
         ("obstacle: false", "obstacle: {}", "expected true, false", 10),
         ("actions:", "action:", "Did you mean", 2),
