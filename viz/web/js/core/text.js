@@ -19,6 +19,21 @@ export function shorten(text, length = 34) {
   return line.length <= length ? line.join("") : `${line.slice(0, length - 1).join("")}\u2026`;
 }
 
+/**
+ * The same with the line breaks of the text; all lines together have at most about `length` characters.
+ * @param {string} text @param {number} length
+ */
+export function shortenLines(text, length) {
+  const lines = [];
+  let left = length;
+  for (const line of text.trim().split(/\r?\n/)) {
+    if (left <= 0) return [...lines, "\u2026"].join("\n");
+    lines.push(shorten(line, left));
+    left -= line.length + 1;
+  }
+  return lines.join("\n");
+}
+
 /** @param {number} seconds */
 export function duration(seconds) {
   if (seconds < 10) return `${seconds.toFixed(1)} s`;

@@ -287,7 +287,10 @@ export class Layout {
 const hasOver = ({ links, children }, limit) =>
   links.length > limit.links && links.length > limit.perState * children.length;
 
-/** Whether the arrows of a visible container are too many to follow. @param {StateNode} node @param {Set<string>} open @returns {boolean} */
+/**
+ * Whether the arrows of a visible container are too many to follow.
+ * @param {StateNode} node @param {Set<string>} open @returns {boolean}
+ */
 const isTangled = (node, open) =>
   isOpen(node, open) && (hasOver(node, TANGLED) || node.children.some((child) => isTangled(child, open)));
 
@@ -480,7 +483,7 @@ class Plan {
         "elk.hierarchyHandling": "SEPARATE_CHILDREN",
         "elk.padding": `[top=14,left=14,bottom=${bottom},right=${right}]`,
         "elk.layered.spacing.nodeNodeBetweenLayers": dir === "DOWN" ? "18" : "26",
-        // The simplex method makes more arrows straight, but takes minutes for a dozen states that all lead to each other.
+        // The simplex method makes more arrows straight, but takes minutes if twelve states all lead to each other.
         "elk.layered.nodePlacement.strategy": hasOver(node, DENSE) ? "BRANDES_KOEPF" : "NETWORK_SIMPLEX",
         "elk.layered.nodePlacement.favorStraightEdges": "true",
         "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",

@@ -3,7 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { canAnswer, command, control, encoded, isFile, link } from "#core/connection.js";
 import { answerText, buttonsOf, heldStates, isUrgent, questionsOf, titleOf } from "#core/questions.js";
 import * as store from "#core/store.js";
-import { shorten } from "#core/text.js";
+import { shorten, shortenLines } from "#core/text.js";
 import { html, StateLink } from "#panels/html.js";
 
 /** @typedef {import("#drawing/page.js").Page} Page */
@@ -65,7 +65,7 @@ function Card({ one, page }) {
   };
   const id = `question-${encoded(one.path)}`; // without spaces, which separate ids in aria-labelledby
   return html`<article class=${`question ${one.isOpen ? "" : "over"}`} role="alertdialog" aria-labelledby=${id}>
-    <header><div><h3 id=${id} ref=${text} tabindex="-1">${shorten(one.text, LONGEST)}</h3>
+    <header><div><h3 id=${id} ref=${text} tabindex="-1">${shortenLines(one.text, LONGEST)}</h3>
       <${StateLink} path=${one.path} page=${page} /></div>
       ${one.isOpen && html`<${Ring} one=${one} />`}</header>
     ${one.isOpen && one.has_picture && !isFile() && html`<${Picture} one=${one} />`}

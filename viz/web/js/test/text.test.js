@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { KINDS_OF, lineOf } from "#core/log_lines.js";
 import { commonClass, FAILURE, outcomeClass, PREEMPTED_PREFIXES, SUCCESS } from "#core/outcomes.js";
-import { askerText, duration, holdText, shorten } from "#core/text.js";
+import { askerText, duration, holdText, shorten, shortenLines } from "#core/text.js";
 import { brief, pretty, wasShortened } from "#core/values.js";
 import { event, fixture } from "./fixtures.js";
 
@@ -10,6 +10,13 @@ const texts = fixture("texts.json");
 
 test("names are shortened as in Python", () => {
   for (const [text, length, short] of texts.shorten) assert.equal(shorten(text, length), short);
+});
+
+test("texts of several lines keep their line breaks", () => {
+  assert.equal(shortenLines("Boxes:\n  2 red\r\n\n3 blue", 600), "Boxes:\n2 red\n\n3 blue");
+  assert.equal(shortenLines("one\ntwo\nthree", 8), "one\ntwo\n\u2026");
+  assert.equal(shortenLines("word ".repeat(500), 600).length, 600);
+  assert.equal(shortenLines("\n".repeat(5000), 600), "");
 });
 
 test("askers are called as in Python", () => {
