@@ -260,3 +260,25 @@ def test_there_is_no_minimap_of_no_machine(served, look):
     page = look(served.start(), drawn=False)
     page.wait_for_selector("text=No machine on the network yet")
     wait_for(page, "getComputedStyle(document.querySelector('.minimap')).opacity === '0'")
+
+
+def test_titles_that_are_enlarged_stay_inside_their_containers(served, look):
+    big = chain([f"STEP_{n}" for n in range(30)], name="CHAIN")
+    with big:
+        inner = chain(["A"])
+        StateMachine.add("RECHARGE_THE_BATTERY", inner, {"done": "done"})
+    served.add("one", sm=big)
+    page = look(served.start())
+    page.set_viewport_size({"width": 390, "height": 844})
+    all_levels(page)
+    wait_for(page, "smachpy.page.view.k < 0.6")
+    sizes = page.evaluate(
+        """() => [...document.querySelectorAll("svg .box")].map((box) => {
+          const title = box.querySelector(".title").getBoundingClientRect();
+          const frame = box.querySelector(".frame").getBoundingClientRect();
+          return { name: box.querySelector(".title").textContent, over: title.right - frame.right,
+            font: parseFloat(getComputedStyle(box.querySelector(".title")).fontSize) }; })"""
+    )
+    assert {one["name"] for one in sizes} == {"CHAIN", "RECHARGE_THE_BATTERY"}
+    assert max(one["font"] for one in sizes) > 11  # enlarged
+    assert all(one["over"] < 0 for one in sizes)
