@@ -41,8 +41,15 @@ from actionlib_core.goal.client import (
     KnownServers,
     Path,
 )
-from actionlib_core.goal.states import OVER, TERMINAL, CommState, Status, TerminalState
-from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
+from actionlib_core.goal.states import (
+    OVER,
+    TERMINAL,
+    CommState,
+    SimpleGoalState,
+    Status,
+    TerminalState,
+)
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
 from actionlib_core.time import Time
@@ -146,6 +153,11 @@ def get_name_of_constant(C: Any, n: int) -> str:  # noqa: N803  actionlib's name
         if not name.startswith("_") and isinstance(getattr(C, name), int) and getattr(C, name) == n:
             return name
     return "???"
+
+
+for _states in (CommState, TerminalState, SimpleGoalState, GoalStatus):
+    # As in actionlib: programs log `GoalStatus.to_string(client.get_state())`.
+    setattr(_states, "to_string", classmethod(get_name_of_constant))  # noqa: B010  for mypy
 
 
 @dataclass(slots=True, weakref_slot=True, eq=False, repr=False)

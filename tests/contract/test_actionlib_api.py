@@ -9,6 +9,7 @@ import sys
 import pytest
 
 import actionlib_core as actionlib
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 
 # Positional parameters and the defaults they have in ROS 1 ("D" is a zero duration there).
 SIGNATURES = {
@@ -134,6 +135,9 @@ def test_constants():
     assert actionlib.SimpleGoalState.DONE == 2
     assert actionlib.get_name_of_constant(actionlib.CommState, 7) == "DONE"
     assert actionlib.get_name_of_constant(actionlib.TerminalState, 99) == "???"
+    assert GoalStatus.to_string(3) == "SUCCEEDED"
+    assert actionlib.TerminalState.to_string(2) == "PREEMPTED"
+    assert actionlib.CommState.to_string(7) == actionlib.SimpleGoalState.to_string(2) == "DONE"
 
 
 def test_new_parameters_are_keyword_only():
