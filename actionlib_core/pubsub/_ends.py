@@ -42,7 +42,7 @@ class End:
         self, name: str, interface: type[Message | ServiceType], node: Node | None
     ) -> None:
         self.node = get_node() if node is None else node
-        self.resolved_name = self.node.resolve(name, f"{self._what} name")
+        self._full_name = self.node.resolve(name, f"{self._what} name")
         self.type = interface._type
         self.md5sum = interface._md5sum
         self._end = self._make_end(interface)
@@ -50,7 +50,12 @@ class End:
         self._closed = False
 
     def _make_end(self, interface: type[Message | ServiceType]) -> EndPort:
-        return make_end_port(self.node, self._kind, self.resolved_name, interface)
+        return make_end_port(self.node, self._kind, self._full_name, interface)
+
+    @property
+    def resolved_name(self) -> str:
+        """The full name without a slash in front, which is the network's key."""
+        return self._full_name
 
     @property
     def mismatches(self) -> list[TypeMismatchError]:
@@ -70,7 +75,7 @@ class End:
         self._leave()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} /{self.resolved_name} [{self.type}]>"
+        return f"<{type(self).__name__} /{self._full_name} [{self.type}]>"
 
 
 def close_all(parts: list[Closable]) -> None:

@@ -109,7 +109,7 @@ class Service(ServiceEnd):
         self._ends = self._watch()
         self._parts.append(self._ends)
         self._forget = self.node.on_close(self.close)
-        self._calls = CallbackQueue(self.node, f"service /{self.resolved_name}")
+        self._calls = CallbackQueue(self.node, f"service /{self._full_name}")
         try:
             self._parts.append(self._end.answer(self._on_query))
             self._parts.append(self._end.show())
@@ -128,7 +128,7 @@ class Service(ServiceEnd):
         Args:
             reason: For the log.
         """
-        logger.info("service /%s is shut down: %s", self.resolved_name, reason or "requested")
+        logger.info("service /%s is shut down: %s", self._full_name, reason or "requested")
         self.close()
 
     def spin(self) -> None:
@@ -180,7 +180,7 @@ class Service(ServiceEnd):
 
     def _conflict(self, other: Endpoint, *, stays: bool = False) -> ServiceConflictError:
         return ServiceConflictError(
-            self.resolved_name, *in_conflict(self._end.own, other, stays=stays)
+            self._full_name, *in_conflict(self._end.own, other, stays=stays)
         )
 
     # -- calls ---------------------------------------------------------------------------------
@@ -201,7 +201,7 @@ class Service(ServiceEnd):
             self._refuse(query, _BUSY.format(CALLS_AT_ONCE))
             return
         try:
-            self._calls.spawn(partial(self._answer, query), f"service /{self.resolved_name}")
+            self._calls.spawn(partial(self._answer, query), f"service /{self._full_name}")
         except BaseException as error:
             self._end_call()
             if not isinstance(error, RuntimeError):  # Python's "can't start new thread"
@@ -209,7 +209,7 @@ class Service(ServiceEnd):
             self._refuse(query, f"no thread is left: {error}.")
 
     def _refuse(self, query: Query, reason: str) -> None:
-        error = ServiceBusyError(self.resolved_name, reason)
+        error = ServiceBusyError(self._full_name, reason)
         self._log_busy(error)
         _fail(query, error)
 
@@ -219,8 +219,8 @@ class Service(ServiceEnd):
         Handlers that call each other would otherwise each put their own text in front of it.
         """
         kind = ServiceBusyError.__name__
-        if not is_from(self.resolved_name, text):  # our own was logged when it was raised
-            self._log_busy(handler_raised(self.resolved_name, kind, text))
+        if not is_from(self._full_name, text):  # our own was logged when it was raised
+            self._log_busy(handler_raised(self._full_name, kind, text))
         _send_error(query, kind, text)
 
     def _log_busy(self, error: ServiceException) -> None:
@@ -265,7 +265,7 @@ class Service(ServiceEnd):
                 self._pass_on(query, busy)
             else:
                 if isinstance(error, Exception | SystemExit):  # not when a virtual clock ends it
-                    logger.exception("service /%s: the handler raised", self.resolved_name)
+                    logger.exception("service /%s: the handler raised", self._full_name)
                 _fail(query, error)
             if not isinstance(error, Exception):
                 raise
@@ -274,7 +274,7 @@ class Service(ServiceEnd):
 
     def _report_unreadable(self, what: str, error: Exception) -> None:
         """Log what is wrong with a request, once per kind, as a caller may send many of them."""
-        text = f"service /{self.resolved_name}: {what}: {error}"
+        text = f"service /{self._full_name}: {what}: {error}"
         self._readable.report(what, ActionlibError(text))
 
     def _respond(self, result: object) -> Message:
@@ -289,7 +289,7 @@ class Service(ServiceEnd):
         if result is None and self.response_class.__slots__:
             name = self.response_class.__name__
             raise ServiceException(
-                self.resolved_name,
+                self._full_name,
                 f"the handler returned None; expected {name}, a dict or its field values",
             )
         return make() if result is None else make(result)

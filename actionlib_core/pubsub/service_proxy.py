@@ -132,12 +132,12 @@ class ServiceProxy(ServiceEnd):
         self._ends = self.node.shared(("service", *self._shared_key()), self._watch)
 
     def _make_end(self, interface: type[Message | ServiceType]) -> EndPort:
-        make = partial(make_end_port, self.node, Kind.SERVICE, self.resolved_name, interface)
+        make = partial(make_end_port, self.node, Kind.SERVICE, self._full_name, interface)
         return self.node.shared(("caller", *self._shared_key()), partial(make, calls=True))
 
     def _shared_key(self) -> tuple[str, str, str]:
         """Return the key of what proxies share: programs make many of them and close none."""
-        return self.resolved_name, self.type, self.md5sum
+        return self._full_name, self.type, self.md5sum
 
     def close(self) -> None:
         """Make running and later calls fail; a second call does nothing."""
@@ -194,10 +194,10 @@ class ServiceProxy(ServiceEnd):
 
         Blocks: see `timeout`.
         """
-        seconds = check_delay(f"service /{self.resolved_name}", "timeout", timeout)
+        seconds = check_delay(f"service /{self._full_name}", "timeout", timeout)
         if not self._wait_for_server(seconds):
             raise WaitTimeoutError(
-                f"/{self.resolved_name}: no server: got none in {_show(seconds)}; expected one of "
+                f"/{self._full_name}: no server: got none in {_show(seconds)}; expected one of "
                 f"type {self.type}. "
                 + (self._end.explain_absence() or "Try 'actionlib service list'.")
             )
@@ -206,14 +206,14 @@ class ServiceProxy(ServiceEnd):
         # A server of another type ends the wait too, so that it is reported at once.
         self._ends.wait(lambda: self._closed or bool(self._ends.ends(any_type=True)), timeout)
         if self._closed:
-            raise NodeError(f"/{self.resolved_name}: not called: the proxy is closed.")
+            raise NodeError(f"/{self._full_name}: not called: the proxy is closed.")
         if self._ends.ends():
             return True
         if self.mismatches:
             raise self.mismatches[0]
         if self.node.closed or (timeout is None and requested()):
             raise NodeError(
-                f"/{self.resolved_name}: not called: the node was closed or shutdown was requested."
+                f"/{self._full_name}: not called: the node was closed or shutdown was requested."
             )
         return False
 
@@ -221,7 +221,7 @@ class ServiceProxy(ServiceEnd):
         longest = APPEAR_S if self.timeout is None else min(self.timeout, APPEAR_S)
         if not self._wait_for_server(longest):
             raise ServiceUnavailableError(
-                self.resolved_name,
+                self._full_name,
                 f"no server: got none in {longest:g} s; expected one of type {self.type}. "
                 + (self._end.explain_absence() or "Try starting it, or wait_for_service() first."),
             )
@@ -233,7 +233,7 @@ class ServiceProxy(ServiceEnd):
         """
         replies: list[Reply] = []
         done: list[bool] = []
-        news = self.node.clock.event(f"the answer of service /{self.resolved_name}")
+        news = self.node.clock.event(f"the answer of service /{self._full_name}")
 
         def on_reply(reply: Reply) -> None:
             replies.append(reply)
@@ -259,7 +259,7 @@ class ServiceProxy(ServiceEnd):
         # Only a call without a limit can end here: `MARGIN_S` lets others time out before.
         if done and self.node.clock.now() >= start + longest:
             raise ServiceTimeoutError(
-                self.resolved_name,
+                self._full_name,
                 f"no answer: got none in {longest:g} s; expected one sooner, as the program has "
                 "made many calls without a limit. Try a timeout.",
             )
@@ -292,17 +292,15 @@ class ServiceProxy(ServiceEnd):
 
     def _explain_silence(self, timeout: float | None, *, in_time: bool) -> ActionlibError:
         if self._closed:
-            return NodeError(f"/{self.resolved_name}: no answer: the proxy was closed.")
+            return NodeError(f"/{self._full_name}: no answer: the proxy was closed.")
         if in_time:
-            return ServiceLostError(
-                self.resolved_name, "the server died or left before it answered."
-            )
+            return ServiceLostError(self._full_name, "the server died or left before it answered.")
         if self.node.closed or timeout is None:
             return NodeError(
-                f"/{self.resolved_name}: no answer: the node was closed or shutdown was requested."
+                f"/{self._full_name}: no answer: the node was closed or shutdown was requested."
             )
         return ServiceTimeoutError(
-            self.resolved_name,
+            self._full_name,
             f"no answer: got none in {self.timeout:g} s; expected one from the server that is "
             "there. Try a longer timeout.",
         )
@@ -313,7 +311,7 @@ class ServiceProxy(ServiceEnd):
                 response: Message = self._end.read_response(reply)
             except DeserializationError as unreadable:
                 reason = f"the response cannot be read: {unreadable}"
-                raise ServiceException(self.resolved_name, reason) from unreadable
+                raise ServiceException(self._full_name, reason) from unreadable
             return response
         text = reply.payload.decode(errors="replace")
         try:
@@ -325,20 +323,20 @@ class ServiceProxy(ServiceEnd):
             self._raise_mismatch(remote_text)
         busy = remote_type == ServiceBusyError.__name__
         # Otherwise a service is busy that the handler has called.
-        if busy and is_from(self.resolved_name, remote_text):
+        if busy and is_from(self._full_name, remote_text):
             _, _, reason = remote_text.partition(": ")
-            raise ServiceBusyError(self.resolved_name, reason)
+            raise ServiceBusyError(self._full_name, reason)
         if not remote_type:
             reason = f"the server answered with an error: {remote_text}"
-            raise ServiceException(self.resolved_name, reason, remote_text=remote_text)
-        raise handler_raised(self.resolved_name, remote_type, remote_text)
+            raise ServiceException(self._full_name, reason, remote_text=remote_text)
+        raise handler_raised(self._full_name, remote_type, remote_text)
 
     def _raise_mismatch(self, remote_text: str) -> None:
         """Raise the mismatch found by tokens, which says more than the server's text."""
         if self.mismatches:
             raise self.mismatches[0]
         raise ServiceException(
-            self.resolved_name,
+            self._full_name,
             f"the server has another type: {remote_text}",
             remote_type=TypeMismatchError.__name__,
             remote_text=remote_text,

@@ -66,7 +66,7 @@ class _TopicEnd(End):
     @property
     def name(self) -> str:
         """The topic as rospy prints it, with a slash in front."""
-        return f"/{self.resolved_name}"
+        return f"/{self._full_name}"
 
     def get_num_connections(self) -> int:
         """Return the number of ends of the other kind and of our type."""

@@ -12,6 +12,7 @@ import logging
 import os
 import re
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import shutdown
@@ -131,8 +132,8 @@ def _set_private_parameters(argv: Sequence[str]) -> None:
     from smachpy.ros1.names.rospy.names import resolve_name
 
     for word in argv:
-        key, sign, value = word.partition(":=")
-        if sign and re.fullmatch(r"_[A-Za-z]\w*", key):
+        key, _, value = (part.strip() for part in word.partition(":="))
+        if value and re.match("_[^_]", key):  # as in rospy: "_name:=" sets nothing
             try:
                 parsed = load_yaml(value)
             except ValueError:
@@ -266,13 +267,16 @@ _logged: dict[tuple[Any, ...], Any] = {}
 """Level and line of the program -> when and what it has logged, for `throttle` and `once`."""
 
 
-def _text(msg: Any, args: tuple[Any, ...]) -> str:
+def _text(msg: Any, args: Any) -> str:
     if not args:
         return str(msg)
+    if len(args) == 1 and isinstance(args[0], Mapping) and args[0]:  # as `logging` does
+        args = args[0]
     try:
-        return str(msg) % args
-    except (TypeError, ValueError):  # a log line must not end a mission
+        text: str = str(msg) % args
+    except (TypeError, ValueError, KeyError):  # a log line must not end a mission
         return f"{msg} {args}"
+    return text
 
 
 def _place() -> tuple[str, int]:

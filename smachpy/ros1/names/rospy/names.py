@@ -9,6 +9,7 @@ from smachpy.ros1.session import session
 from smachpy.ros1.stubs import Anything
 
 __all__ = [
+    "Named",
     "get_caller_id",
     "get_name",
     "get_namespace",
@@ -75,3 +76,14 @@ def get_resolved_mappings() -> dict[str, str]:
     name, full = session().name or node.name, _own_name().strip("/")
     rules = node.arguments.remappings(name, namespace=node.namespace, node=full)
     return {f"/{old}": f"/{new}" for old, new in rules.items()}
+
+
+class Named:
+    """An end of a topic or service with rospy's `resolved_name`, which has a slash in front."""
+
+    _full_name: str
+
+    @property
+    def resolved_name(self) -> str:
+        """The full name, remapped."""
+        return f"/{self._full_name}"

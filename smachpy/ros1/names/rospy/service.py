@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.exceptions import TypeMismatchError
 from actionlib_core.pubsub.service import Service as _Service
 from actionlib_core.pubsub.service_proxy import ServiceProxy as _ServiceProxy
 from smachpy.ros1.names.rospy.client import wait_for_service as wait_for_service
 from smachpy.ros1.names.rospy.exceptions import ServiceException as ServiceException
 from smachpy.ros1.names.rospy.exceptions import as_rospy
+from smachpy.ros1.names.rospy.names import Named
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["Service", "ServiceException", "ServiceProxy", "wait_for_service"]
 
 
-class Service(_Service):
+class Service(Named, _Service):
     """Offers a service: an `actionlib_core.Service` with rospy's arguments."""
 
     def __init__(
@@ -43,7 +45,7 @@ class Service(_Service):
             super().spin()
 
 
-class ServiceProxy(_ServiceProxy):
+class ServiceProxy(Named, _ServiceProxy):
     """Calls a service: an `actionlib_core.ServiceProxy` with rospy's arguments.
 
     As in rospy, a call has no time limit; it ends with an error when the server dies.
@@ -63,7 +65,8 @@ class ServiceProxy(_ServiceProxy):
         """Send a request, given or made from the arguments, and return the response.
 
         Raises:
-            ServiceException: there is no server, it died, or its handler raised.
+            ServiceException: there is no server, it has another type or died, or its handler
+                raised.
             ROSSerializationException: a value does not fit its field.
 
         Blocks: until the answer.
@@ -71,8 +74,14 @@ class ServiceProxy(_ServiceProxy):
         if session().dry:
             return self.response_class()
         with as_rospy():
-            return super().call(*args, **kwds)
+            try:
+                return super().call(*args, **kwds)
+            except TypeMismatchError as error:
+                raise ServiceException(str(error)) from error
+
+    def close(self) -> None:
+        """Do nothing, as there is no connection: in rospy too a later call works."""
 
     def wait_for_service(self, timeout: Any = None) -> None:
         """Wait until there is a server; as `rospy.wait_for_service`."""
-        wait_for_service(f"/{self.resolved_name}", timeout)
+        wait_for_service(self.resolved_name, timeout)

@@ -17,6 +17,7 @@ from actionlib_core.wire.encoding import parse_encoding
 from smachpy.ros1.names.rospy.core import is_initialized, logerr_once
 from smachpy.ros1.names.rospy.exceptions import ROSException, as_rospy
 from smachpy.ros1.names.rospy.msg import AnyMsg
+from smachpy.ros1.names.rospy.names import Named
 from smachpy.ros1.session import session
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class SubscribeListener:
         """Handle the end of a subscriber."""
 
 
-class Publisher(_Publisher):
+class Publisher(Named, _Publisher):
     """Publishes on a topic: an `actionlib_core.Publisher` with rospy's arguments."""
 
     def __init__(
@@ -87,7 +88,7 @@ class Publisher(_Publisher):
         return 1 if session().dry else super().get_num_connections()
 
 
-class Subscriber(_Subscriber[Any]):
+class Subscriber(Named, _Subscriber[Any]):
     """Subscribes to a topic, with rospy's arguments; with `AnyMsg`, to messages of any type."""
 
     def __new__(cls, name: str, data_class: Any, *_args: Any, **_kwargs: Any) -> Any:
@@ -125,14 +126,14 @@ class _AnySubscriber(Subscriber):
     ) -> None:
         node = get_node()
         self.node = node
-        self.resolved_name = node.resolve(name, "topic name")
+        self._full_name = node.resolve(name, "topic name")
         self.type = "*"
         self.data_class = data_class
         self.callback = callback
         self.callback_args = callback_args
         self._closed = False
-        self._calls = CallbackQueue(node, f"topic /{self.resolved_name}")
-        self._parts = [node.transport.subscribe(self.resolved_name, self._on_sample)]
+        self._calls = CallbackQueue(node, f"topic /{self._full_name}")
+        self._parts = [node.transport.subscribe(self._full_name, self._on_sample)]
         self._forget = node.on_close(self.unregister)
 
     def get_num_connections(self) -> int:
@@ -148,7 +149,7 @@ class _AnySubscriber(Subscriber):
         message._connection_header = {
             "type": encoding.type,
             "md5sum": encoding.md5,
-            "topic": f"/{self.resolved_name}",
+            "topic": f"/{self._full_name}",
             "callerid": str(sample.source),
         }
         self._call_back(message)
