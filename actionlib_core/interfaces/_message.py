@@ -146,7 +146,8 @@ class Message:
         return dump(self)
 
     def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
+        # `__class__`, as the read-only view of a message in userdata has a type of its own.
+        if other.__class__ is not self.__class__:
             return NotImplemented
         for field in self._definition.fields:
             mine, theirs = getattr(self, field.attribute), getattr(other, field.attribute)

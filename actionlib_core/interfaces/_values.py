@@ -110,7 +110,8 @@ def coerced(message: AnyMessage) -> AnyMessage:
         FieldError: Values that cannot be converted; the error lists all of them with their paths.
     """
     check = _Check(message._type, from_plain=False)
-    result = check.message(type(message), message, "$")
+    # Not `type(message)`: a read-only view of a message in userdata has a type of its own.
+    result = check.message(message.__class__, message, "$")
     check.finish()
     return result  # type: ignore[return-value] # of the class asked for
 

@@ -243,6 +243,7 @@ def _view_class(kind: type, base: type | None) -> Any:
     changes = () if base is None else _CHANGES[base]
     body: dict[str, Any] = {name: _refuser(base or object, name) for name in changes}
     body |= {
+        "__new__": lambda _cls, *args, **kwargs: kind.__new__(kind, *args, **kwargs),
         "__slots__": ("_smach_key", "_smach_original"),
         "__class__": property(lambda _self: kind),  # dataclasses compare `__class__`
         "__module__": kind.__module__,
@@ -261,9 +262,34 @@ def _view_class(kind: type, base: type | None) -> Any:
             "__delattr__": _refuser(object, "__delattr__"),
         }
     try:
-        return types.new_class(kind.__name__, (kind, _View), exec_body=lambda ns: ns.update(body))
+        made: Any = types.new_class(
+            kind.__name__,
+            (kind, _View),
+            {"metaclass": _view_metaclass(type(kind))},
+            exec_body=lambda ns: ns.update(body),
+        )
     except TypeError:  # a final class, or a metaclass with its own rules
         return None
+    # Programs list an object's attributes by `__slots__`, as the `repr` of a message does.
+    if hasattr(kind, "__slots__"):
+        made.__slots__ = kind.__slots__
+    else:
+        del made.__slots__
+    return made
+
+
+@functools.lru_cache(maxsize=64)
+def _view_metaclass(metaclass: type) -> type:
+    """Return the metaclass of views of classes with this metaclass.
+
+    Methods of the user's class make new objects by `type(self)(...)`, and class methods by
+    `cls(...)`; both are the view's class here. The new objects are ordinary ones.
+    """
+
+    def call(cls: Any, *args: Any, **kwargs: Any) -> Any:
+        return cls.__mro__[1](*args, **kwargs)  # the viewed class
+
+    return type(metaclass)(metaclass.__name__, (metaclass,), {"__call__": call})
 
 
 def _missing(self: Any, name: Any) -> Any:

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from actionlib_core.interfaces.geometry_msgs.msg import Point
 from actionlib_core.interfaces.smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
@@ -35,6 +36,7 @@ from smachpy.introspection import (
     IntrospectionServer,
 )
 from smachpy.network.server import DESCRIPTION_TOPIC, EVENTS_TOPIC
+from smachpy.userdata.json_text import loads
 from tests.two_nodes import TwoNodes
 
 
@@ -116,6 +118,19 @@ def active(found, path):
     """The active states of `path` one after another, repetitions left out."""
     states = [sorted(message.active_states) for message in found if message.path == path]
     return [s for i, s in enumerate(states) if i == 0 or s != states[i - 1]]
+
+
+def test_status_shows_messages_that_a_nested_machine_may_only_read(world):
+    machine, nested = StateMachine(["done"]), StateMachine(["done"], input_keys=["goal"])
+    machine.add("NESTED", nested)
+    nested.add("WAIT", Wait())
+    machine.userdata.goal = Point(x=7.0)
+    world.serve(machine)
+    found = world.listen(STATUS_TOPIC, SmachContainerStatus)
+    machine.execute()
+    world.clock.sleep(0.1)
+    shown = [m.local_data for m in found if m.path == "/SM_ROOT/NESTED" and m.active_states]
+    assert any(loads(text).get("goal") == Point(x=7.0) for text in shown)
 
 
 def test_status_tells_what_is_active_and_the_userdata(world):

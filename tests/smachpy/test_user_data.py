@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import pickle
 from collections import Counter, OrderedDict, defaultdict, deque
+from collections.abc import Sized
 from typing import Literal, NamedTuple, TypedDict
 
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import smachpy
+from actionlib_core.interfaces.geometry_msgs.msg import Point
 from smachpy.events import UserdataWritten
 from smachpy.userdata.user_data import Remapper, UserData, get_const
 
@@ -155,6 +157,89 @@ def test_read_only_objects_have_their_methods_length_and_items():
         assert (v.a, v.private(), hasattr(v, "b")) == ([1], 7, False)
 
     through_a_state(Slotted(), look_slotted).execute()
+
+
+class Vector:
+    def __init__(self, x):
+        self.x = x
+
+    def __add__(self, other):
+        return type(self)(self.x + other.x)
+
+    def copy(self):
+        made = type(self).__new__(type(self))
+        made.__dict__.update(self.__dict__)
+        return made
+
+    @classmethod
+    def unit(cls):
+        return cls(1)
+
+
+class OfAbstract(Sized):  # its metaclass is ABCMeta
+    def __init__(self, x):
+        self.x = x
+
+    def __len__(self):
+        return self.x
+
+    def copy(self):
+        return type(self)(self.x)
+
+
+class Listed:
+    __slots__ = ("x",)
+
+    def __init__(self, x):
+        self.x = x
+
+    def copy(self):
+        return type(self)(*(getattr(self, name) for name in self.__slots__))
+
+
+class Numbers(list):
+    def copy(self):
+        return type(self)(self)
+
+    @classmethod
+    def unit(cls):
+        return cls([1])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda v: v[0] + v[0],
+        lambda v: v[0].copy(),
+        lambda v: v[0].unit(),
+        lambda v: v[1].copy(),
+        lambda v: v[2].copy(),
+        lambda v: v[3].copy(),
+        lambda v: v[3].unit(),
+    ],
+)
+def test_methods_of_read_only_values_make_objects_that_can_be_changed(make):
+    def look(v):
+        made = make(v)
+        assert type(made) in {Vector, OfAbstract, Listed, Numbers}
+        if isinstance(made, list):
+            made.append(2)
+        else:
+            made.x = 2
+
+    through_a_state([Vector(3), OfAbstract(3), Listed(3), Numbers([3])], look).execute()
+
+
+def test_read_only_messages_are_equal_and_plain_like_others():
+    def look(v):
+        same = Point(1.0, 2.0, 3.0)
+        assert v[0] == same
+        assert same == v[0]
+        assert v[0] != Point()
+        assert v[0].to_dict() == {"x": 1.0, "y": 2.0, "z": 3.0}
+        assert repr(v[0]) == repr(same)
+
+    through_a_state([Point(1.0, 2.0, 3.0)], look).execute()
 
 
 def test_copies_of_read_only_values_can_be_changed():
