@@ -1,5 +1,7 @@
 """Behaviour of rospy that programs rely on, compared with the original of Debian's packages."""
 
+import warnings
+
 import pytest
 
 from actionlib_core.node import get_node
@@ -8,14 +10,19 @@ from smachpy.ros1 import session
 from smachpy.ros1.session import Session
 from smachpy.testing import MissionKit
 
+WORDS = ["_a/b:=3", "_c-d:= [1, x]", "_empty:=", "__log:=x", "_1:=true"]
+
 
 @pytest.fixture
 def rospy(tmp_path):
-    """rospy on a network in memory."""
+    """rospy on a network in memory, for a program with the arguments `WORDS`."""
+    made = Session(["script.py", *WORDS], make_node=lambda _name: get_node())
     with ros1.installed(tmp_path / "script.py"), MissionKit():
         import rospy
 
+        session.begin(made)
         yield rospy
+        session.end(made)
 
 
 @pytest.fixture
@@ -53,15 +60,8 @@ def test_a_service_of_another_type_is_a_service_exception(rospy, grip):
 
 
 def test_private_parameters_of_the_command_line(rospy):
-    words = ["_a/b:=3", "_c-d:= [1, x]", "_empty:=", "__log:=x", "_1:=true"]
-    made = Session(["script.py", *words], make_node=lambda _name: get_node())
-    session.begin(made)
-    try:
-        rospy.init_node("script")
-        names = rospy.get_param("~")
-    finally:
-        session.end(made)
-    assert names == {"a": {"b": 3}, "c-d": [1, "x"], "1": True}
+    rospy.init_node("script")
+    assert rospy.get_param("~") == {"a": {"b": 3}, "c-d": [1, "x"], "1": True}
 
 
 def test_log_messages_are_formatted_as_logging_does(rospy, capsys):
@@ -73,3 +73,27 @@ def test_log_messages_are_formatted_as_logging_does(rospy, capsys):
         "{}",
         "%(what)s {'speed': 2}",
     ]
+
+
+def test_published_headers_are_numbered(rospy):
+    import smach
+    from geometry_msgs.msg import PoseStamped
+
+    heard = []
+    rospy.Subscriber("pose", PoseStamped, lambda pose: heard.append(pose.header.seq))
+    publisher = rospy.Publisher("pose", PoseStamped, queue_size=1)
+
+    def publish(userdata):
+        publisher.publish(userdata.pose)
+        publisher.publish(pose=userdata.pose.pose)
+        return "done"
+
+    sm = smach.StateMachine(["done"])
+    sm.userdata.pose = PoseStamped()
+    sm.add("PUBLISH", smach.CBState(publish, outcomes=["done"], input_keys=["pose"]))
+    rospy.init_node("numbers")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sm.execute()
+    rospy.sleep(0.1)
+    assert heard == [1, 2]

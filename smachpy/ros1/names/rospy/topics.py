@@ -6,6 +6,7 @@ Source:
 
 from __future__ import annotations
 
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.action._callbacks import CallbackQueue
@@ -19,6 +20,7 @@ from smachpy.ros1.names.rospy.exceptions import ROSException, as_rospy
 from smachpy.ros1.names.rospy.msg import AnyMsg
 from smachpy.ros1.names.rospy.names import Named
 from smachpy.ros1.session import session
+from smachpy.userdata.readonly import writable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,9 +59,10 @@ class Publisher(Named, _Publisher):
         with as_rospy():
             super().__init__(name, data_class, latch, queue_size)
         self.impl = self
+        self._numbers = count(1)
 
     def publish(self, *args: Any, **kwds: Any) -> None:
-        """Send a message, given or made from the arguments.
+        """Send a message, given or made from the arguments; its header gets the next `seq`.
 
         Raises:
             ROSException: `init_node` was not called, or the topic is closed.
@@ -73,7 +76,7 @@ class Publisher(Named, _Publisher):
             return
         try:
             with as_rospy():
-                super().publish(*args, **kwds)
+                super().publish(self._numbered(args, kwds))
         except ROSException as error:
             # In rospy, publishing goes on when a subscriber has another type.
             if isinstance(error.__cause__, TypeMismatchError):
@@ -82,6 +85,14 @@ class Publisher(Named, _Publisher):
                 raise ROSException("publish() to a closed topic") from error
             else:
                 raise
+
+    def _numbered(self, args: tuple[Any, ...], kwds: dict[str, Any]) -> Any:
+        given = len(args) == 1 and not kwds and isinstance(args[0], self.data_class)
+        message = args[0] if given else self.data_class(*args, **kwds)
+        if self.data_class._has_header:
+            message = writable(message)  # rospy numbers also messages that a state only reads
+            message.header.seq = next(self._numbers)
+        return message
 
     def get_num_connections(self) -> int:
         """Return the number of subscribers; 1 in a dry program, as some wait for the first."""
