@@ -38,8 +38,9 @@ class UsageError(SmachError):
 class _Parser(argparse.ArgumentParser):
     """argparse with smachpy's exit code and the hint `--help` in every error."""
 
-    def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\nTry '{self.prog} --help'.\n")
+    def error(self, message: str, way_out: str = "") -> NoReturn:
+        way_out = printable(f"Try '{self.prog} --help'{way_out}.")
+        self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\n{way_out}\n")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Separate the words for this command from those for the mission that it runs."""
@@ -56,7 +57,11 @@ class _Parser(argparse.ArgumentParser):
             found.words, found.names = tuple(args[end + 1 :]), names
         # Reported here: argparse would report it for the parser above, without its usage.
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            text = " ".join(unknown)
+            way_out = ""
+            if self.get_default("words") is not None and "--" not in args:
+                way_out = f", or '-- {text}' if the mission or script itself takes them"
+            self.error(f"unrecognized arguments: {text}", way_out)
         return found, []
 
 

@@ -188,6 +188,8 @@ def test_a_robot_that_is_killed_ends_the_mission(far):
             "got 'nan'; expected a finite",
         ),
         (["run", "patrol", "--start-robot", "--pose", "a", "0", "0"], "got 'a'; expected a finite"),
+        (["run", "--ros1", "old.py", "-x", "3"], "or '-- -x 3' if the mission or script itself"),
+        (["run", "patrol", "--fats", "--", "3"], "Try 'smachpy run --help'."),
     ],
 )
 def test_bad_input_is_one_screen_without_traceback(arguments, text, capsys):
