@@ -54,17 +54,20 @@ class Parameters:
         Raises:
             KeyError: there is none.
         """
-        try:
-            return copy.deepcopy(self._find(name))
-        except KeyError:
-            if self.robot is not None:
-                with contextlib.suppress(KeyError):
-                    return self.robot.get_param(f"/{_clean(name)}")
+        found: list[Any] = []
+        with contextlib.suppress(KeyError):
+            found.append(copy.deepcopy(self._find(name)))
+        # A namespace may have values on both sides.
+        if self.robot is not None and (not found or isinstance(found[0], dict)):
+            with contextlib.suppress(KeyError):
+                found.append(self.robot.get_param(f"/{_clean(name)}"))
+        if not found:
             known = self.names()
             raise KeyError(
                 f"parameter '/{_clean(name)}': got no value; expected one."
                 + did_you_mean(f"/{_clean(name)}", known)
-            ) from None
+            )
+        return _merged(*found)
 
     def set(self, name: str, value: Any) -> None:
         """Set a value; a dict becomes a namespace."""
@@ -183,6 +186,13 @@ def _leaves(tree: dict[str, Any]) -> Iterator[str]:
             yield from (f"{name}/{below}" for below in _leaves(value))
         else:
             yield name
+
+
+def _merged(own: Any, robots: Any = None) -> Any:
+    """Return a value of the program, which hides the robot's; of two namespaces, both's values."""
+    if not (isinstance(own, dict) and isinstance(robots, dict)):
+        return own
+    return robots | {key: _merged(value, robots.get(key)) for key, value in own.items()}
 
 
 def _plain(value: Any) -> Any:
