@@ -4,6 +4,7 @@ Source:
     https://docs.ros.org/en/noetic/api/rospy/html/ for names, arguments and exceptions.
 """
 
+from actionlib_core.interfaces import Message
 from actionlib_core.interfaces.std_msgs.msg import Header
 from smachpy.ros1.names.rospy import (
     client,
