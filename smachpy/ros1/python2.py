@@ -42,6 +42,8 @@ _GONE: Final = re.compile(
 )
 # `print >> file, text`, which is valid Python 3: a shift.
 _SHIFTED_PRINT: Final = re.compile(r"^[ ]*print\s*>>", re.MULTILINE)
+# Operators of Python 2 that have another name now.
+_DIVISION: Final = re.compile(r"\bdef __([ir]?)div__\s*\(")
 _INDENT: Final = re.compile(r"^[ ]*\t[ \t]*", re.MULTILINE)
 # Errors of Python 3's parser for Python 2 source. If the conversion of such a source fails, too,
 # its error is reported; else the error of Python 3's parser.
@@ -174,6 +176,8 @@ def straight(text: str) -> str:
 @lru_cache(maxsize=64)  # each star import from a stand-in reads its file again
 def _convert(text: str, filename: str) -> str:
     """Return source that Python 3 can parse: unchanged, with spaces for tabs, or converted."""
+    if "__truediv__" not in text:  # else the class has the operators of both
+        text = _DIVISION.sub(r"def __\1truediv__(", text)
     try:
         ast.parse(text, filename)
     except SyntaxError as error:
