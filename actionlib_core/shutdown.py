@@ -253,8 +253,36 @@ def _restore_in_child() -> None:
         handler.restore()
 
 
+restorers: list[Callable[[], None]] = [_restore_in_child]
+"""Called in a forked process, to return its signals to the handlers of before."""
+_masks: dict[int, set[int]] = {}  # of the threads that fork just now
+
+
+def _before_fork() -> None:
+    # A signal that reaches the new process before its handlers are restored would be lost: CPython
+    # drops what is pending after a fork. Blocked, it waits for `_after_fork_in_child`.
+    blocked = (signal.SIGINT, signal.SIGTERM)
+    _masks[threading.get_ident()] = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
+
+
+def _after_fork() -> None:
+    mask = _masks.pop(threading.get_ident(), None)
+    if mask is not None:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _after_fork_in_child() -> None:
+    for restore in restorers:
+        restore()
+    _after_fork()
+
+
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_restore_in_child)
+    os.register_at_fork(
+        before=_before_fork,
+        after_in_parent=_after_fork,
+        after_in_child=_after_fork_in_child,
+    )
 
 _process = Shutdown()
 _current: ContextVar[Shutdown] = ContextVar("shutdown", default=_process)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import _signal  # type: ignore[import-not-found]  # `signal` without enums saves 20 us a run
-import os
 import signal
 import threading
 from collections import deque
@@ -370,8 +369,7 @@ def _restore_in_child() -> None:
             _signal.signal(number, default)
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_restore_in_child)
+shutdown.restorers.append(_restore_in_child)
 
 OBSERVERS: list[Callable[[Any], Callable[[str | None], object] | None]] = []
 """Each is called with every root before it runs, and returns a function to call with its outcome

@@ -81,3 +81,26 @@ def test_the_parent_is_preempted_by_signals_also_after_a_fork():
 def test_a_signal_ends_a_process_that_was_forked_in_handle_signals(number):
     with use_shutdown(Shutdown()), shutdown.handle_signals(), shutdown.handle_signals():
         assert end_of_child(number) == number
+
+
+def test_a_signal_just_after_the_fork_is_not_lost(monkeypatch):
+    """One worker of `multiprocessing.Pool` in fifty was not ended by `terminate`."""
+    ends = []
+
+    def work(userdata):
+        # In the child, before the handlers are restored.
+        monkeypatch.setattr(
+            shutdown,
+            "restorers",
+            [lambda: os.kill(os.getpid(), signal.SIGTERM), *shutdown.restorers],
+        )
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        child = os.fork()
+        if child == 0:
+            os._exit(IGNORED)
+        ends.append(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
+        return "done"
+
+    assert machine_of(StateMachine, work).execute() == "done"
+    assert ends == [-signal.SIGTERM]
