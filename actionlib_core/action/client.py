@@ -1245,7 +1245,7 @@ class ActionClient(Generic[A_co]):
         """Ask the server to cancel the goals of all clients with a stamp at or before `time`.
 
         Args:
-            time: A `Time`, or seconds since the epoch.
+            time: A `Time`, or seconds since the epoch. 0 means all goals, as in ROS.
         """
         stamp = time if isinstance(time, Time) else Time.from_sec(time)
         self.manager.cancel_many(stamp.to_nsec())

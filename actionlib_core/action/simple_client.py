@@ -355,7 +355,11 @@ class SimpleActionClient(Generic[A]):
         self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: Time | float) -> None:
-        """Ask the server to cancel the goals of all clients with a stamp at or before `time`."""
+        """Ask the server to cancel the goals of all clients with a stamp at or before `time`.
+
+        Args:
+            time: A `Time`, or seconds since the epoch. 0 means all goals, as in ROS.
+        """
         self.action_client.cancel_goals_at_and_before_time(time)
 
     def cancel_goal(self) -> None:

@@ -222,12 +222,18 @@ def _stamp(text: str | None) -> int:
         return 0
     try:
         seconds, _, fraction = text.partition(".")
-        return Time(int(seconds), int((fraction + "0" * 9)[:9])).to_nsec()
+        stamp_ns = Time(int(seconds), int((fraction + "0" * 9)[:9])).to_nsec()
     except (ValueError, TypeError) as error:
         raise UsageError(
             f"cancel: --before: got {text!r}; expected seconds since the epoch, 1700000000.5 "
             "for example."
         ) from error
+    if stamp_ns == 0:  # to the server, an empty id with the stamp 0 means all goals
+        raise UsageError(
+            f"cancel: --before: got {text!r}; expected seconds since the epoch above 0. Try --all "
+            "to cancel all goals."
+        )
+    return stamp_ns
 
 
 # -- ROS 2 -----------------------------------------------------------------------------------------

@@ -268,6 +268,11 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     assert "its result is not there; its status is ACTIVE." in shown
     shown = shell("goal", "info", "keep", "unknown", "--goal-only", code=1)
     assert "its goal is not there; its status is LOST." in shown
+    for zero in ("0", "0.0", "0.0000000009"):  # the stamp 0 means all goals on the wire
+        refused = shell("cancel", "keep", "--before", zero, code=2)
+        assert f"got '{zero}'; expected seconds since the epoch above 0. Try --all" in refused
+    assert not first.wait(1.0)
+    assert not second.wait(1.0)
     assert shell("cancel", "keep", "--before", "1000000000.5") == (
         f"Cancel requested for goal {ids[0]}\n"
     )
