@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,8 @@ from actionlib_core.output import tell
 
 if TYPE_CHECKING:
     from actionlib_core.action.server import ServerGoalHandle
+
+_NUMBER = re.compile("[0-9]{1,9}")  # a goal's; `str.isdigit` is also true for '²'
 
 HELP = """Commands, one a line; N is a goal's number, the newest open one when left out:
   [N] accept [TEXT]      [N] reject [TEXT]
@@ -90,7 +93,7 @@ class Operator:
         try:
             if not first:
                 return
-            if first.isdigit():
+            if _NUMBER.fullmatch(first):
                 number = int(first)
                 first, _, rest = rest.strip().partition(" ")
             else:
@@ -105,14 +108,13 @@ class Operator:
     def _open(self) -> list[int]:
         from actionlib_core.goal.states import TERMINAL
 
-        return [
-            n for n, goal in self._goals.items() if goal.get_goal_status().status not in TERMINAL
-        ]
+        goals = list(self._goals.items())  # a goal may come meanwhile, in another thread
+        return [n for n, goal in goals if goal.get_goal_status().status not in TERMINAL]
 
     def _list(self) -> None:
         from actionlib_core.goal.states import Status
 
-        for number, goal in self._goals.items():
+        for number, goal in list(self._goals.items()):  # as in `_open`
             print(f"{number} {Status(goal.get_goal_status().status).name}", flush=True)
 
     def _do(self, number: int, verb: str, rest: str) -> None:

@@ -342,6 +342,8 @@ def test_server_by_hand(capsys, monkeypatch):
             yield "1 feedback {feedback: 3}\n"
             yield "accept fine\n"
             yield "nonsense\n"
+            yield "² accept\n"
+            yield "1" * 5000 + " accept\n"
             yield "1 feedback {feedback: 3}\n"
             yield "list\n"
             yield "succeed {result: 8}\n"
@@ -379,3 +381,5 @@ def test_server_by_hand(capsys, monkeypatch):
     assert "Goal 1 (" in out
     assert "1 ACTIVE" in out
     assert "got 'nonsense'; expected one of" in err
+    assert "got '²'; expected one of" in err
+    assert "got '1111" in err
