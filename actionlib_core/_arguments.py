@@ -33,6 +33,20 @@ def check_function(where: str, argument: str, value: object) -> None:
         )
 
 
+def is_goal_id(value: object) -> bool:
+    """Return whether a goal may have this id: a string that is not empty and can be sent as UTF-8.
+
+    Bytes of a command line that are no UTF-8 are lone surrogates in Python's string.
+    """
+    if not isinstance(value, str) or not value:
+        return False
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def check_class(where: str, value: object, attribute: str, kind: str) -> None:
     """Check that a value is an interface class of the right kind.
 

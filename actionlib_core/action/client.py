@@ -27,6 +27,7 @@ from actionlib_core._arguments import (
     check_limit,
     check_seconds,
     check_wait,
+    is_goal_id,
 )
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.action.sent_goal import SentGoal
@@ -1276,7 +1277,7 @@ class ActionClient(Generic[A_co]):
         Raises:
             ActionlibError: `goal_id` is not an id.
         """
-        if not isinstance(goal_id, str) or not goal_id:
+        if not is_goal_id(goal_id):
             raise ActionlibError(
                 f"action '{self.ns}': goal id: got {goal_id!r}; expected the id of a goal that "
                 "was sent, SentGoal.id for example."

@@ -6,6 +6,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core._arguments import is_goal_id
 from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._command import add_command, print_message
 from actionlib_core.cli._network import ask, class_of_end, find_server, open_node
@@ -95,10 +96,7 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace) -> int:
-    if not args.id:  # to the server, an empty id means all goals
-        raise UsageError(
-            "goal info: ID: got ''; expected a goal's id. Try 'actionlib goal list NAME'."
-        )
+    _check_id("goal info", args.id)  # to the server, an empty id means all goals
     with open_node(args) as node:
         server = find_server(node, args.name)
         goal = None  # ROS 2 servers do not send it
@@ -124,6 +122,13 @@ def _info(args: argparse.Namespace) -> int:
     else:
         _print_info(args, entry, goal, result)
     return EXIT_FAILED if status["status"] == "LOST" else 0
+
+
+def _check_id(command: str, goal_id: str) -> None:
+    if not is_goal_id(goal_id):
+        raise UsageError(
+            f"{command}: ID: got {goal_id!r}; expected a goal's id. Try 'actionlib goal list NAME'."
+        )
 
 
 def _print_info(args: argparse.Namespace, entry: StatusEntry, goal: Any, result: Any) -> None:
@@ -175,6 +180,8 @@ def _cancel(args: argparse.Namespace) -> int:
         )
     if args.all and (args.id or args.before):
         raise UsageError("cancel: got --all beside ID or --before; expected one of the two.")
+    if args.id:
+        _check_id("cancel", args.id)
     stamp_ns = _stamp(args.before)
     from actionlib_core.goal.states import TERMINAL
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID

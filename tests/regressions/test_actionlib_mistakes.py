@@ -386,7 +386,7 @@ def test_simple_server_whose_session_is_closed_stops(nodes, clock):
 
 def test_goal_to_follow_has_an_id(nodes):
     client = ActionClient("demo", msg.TestAction, node=nodes[1])
-    for wrong in ("", 3, None):
+    for wrong in ("", 3, None, "\udcff"):
         with pytest.raises(ActionlibError, match=r"demo.*goal id: got .*; expected"):
             client.attach(wrong)
         with pytest.raises(ActionlibError, match=r"demo.*goal id: got .*; expected"):

@@ -220,6 +220,8 @@ def test_reader_of_a_list_may_leave(shell, counting, monkeypatch):
         (["type", "count"], "expected one of ['/robot/count']"),
         (["cancel", "robot/coun", "--all"], "Did you mean '/robot/count'?"),
         (["goal", "list", "nobody"], "got no server"),
+        (["goal", "info", "robot/count", "\udcff"], "ID: got '\\udcff'; expected a goal's id"),
+        (["cancel", "robot/count", "\udcff"], "ID: got '\\udcff'; expected a goal's id"),
     ],
 )
 def test_mistakes_fit_on_a_screen(shell, counting, argv, text):
