@@ -11,6 +11,7 @@ The annotations give the types; the first line and the `Args:` of the docstring 
 
 from __future__ import annotations
 
+import datetime as dt
 import enum
 import inspect
 import math
@@ -24,11 +25,13 @@ from typing import (
     Any,
     Final,
     Literal,
+    NewType,
     TypeVar,
     Union,
     get_args,
     get_origin,
     get_type_hints,
+    is_typeddict,
 )
 
 from actionlib_core.suggest import nearest
@@ -40,7 +43,7 @@ if TYPE_CHECKING:
     from smachpy.command.targets import Target
 
 NO_DEFAULT: Final = inspect.Parameter.empty
-_OPTION = re.compile(r"--?[A-Za-z]")
+_OPTION = re.compile(r"--?[^\W\d]")  # a letter of any script, or the underscore of `_name`
 _DOC = re.compile(r"(?P<name>\w+): (?P<text>.*)")
 _HELP = frozenset({"-h", "--help"})
 _LISTS = (list, tuple, Sequence)
@@ -50,6 +53,10 @@ _WORDS: Final[dict[object, str]] = {
     float: "a number",
     str: "text",
     Path: "a path",
+    dict: "a dictionary",
+    Mapping: "a dictionary",
+    dt.date: "a date",
+    dt.datetime: "a date and time",
     type(None): "null",
     Any: "a value in YAML",
 }
@@ -141,9 +148,13 @@ def _kind_in_words(kind: Any) -> str:
     if choices:
         return f"one of {list(choices)}"
     if _is_list(kind):
-        (item, *_) = get_args(kind) or (Any,)
-        return "a list" if item is Any else f"a list, each {expectation(item)}"
-    return _WORDS.get(kind) or str(getattr(kind, "__name__", kind))
+        items = _items(kind)
+        if isinstance(items, tuple):
+            return f"a list of {len(items)}: {', '.join(map(expectation, items))}"
+        return "a list" if items is Any else f"a list, each {expectation(items)}"
+    name = getattr(kind, "__name__", kind)
+    known = _WORDS.get(get_origin(kind) or kind)
+    return known or f"{name} (cannot be typed on a command line)"
 
 
 def _alternatives(hint: Any) -> tuple[Any, ...]:
@@ -151,6 +162,10 @@ def _alternatives(hint: Any) -> tuple[Any, ...]:
         return tuple(kind for part in get_args(hint) for kind in _alternatives(part))
     if hint is NO_DEFAULT or hint is object or isinstance(hint, TypeVar):
         return (Any,)
+    if isinstance(hint, NewType):
+        return _alternatives(hint.__supertype__)
+    if is_typeddict(hint):
+        return (dict,)
     return (hint,)
 
 
@@ -165,6 +180,14 @@ def _choices(kind: Any) -> dict[str, Any]:
 
 def _is_list(kind: Any) -> bool:
     return (get_origin(kind) or kind) in _LISTS
+
+
+def _items(kind: Any) -> Any:
+    """Return the type of a list's items; of a tuple of a given length, the tuple of their types."""
+    arguments = get_args(kind)
+    if (get_origin(kind) or kind) is tuple and arguments and arguments[-1] is not ...:
+        return arguments
+    return arguments[0] if arguments else Any
 
 
 def _read(text: Text, kinds: tuple[Any, ...]) -> Any:
@@ -208,14 +231,17 @@ def _is_a(value: object, kind: Any) -> bool:
     if get_origin(kind) is not None or _is_list(kind):
         origin = get_origin(kind)
         return origin in {dict, Mapping} and isinstance(value, Mapping)
-    return isinstance(kind, type) and isinstance(value, kind)
+    try:
+        return isinstance(kind, type) and isinstance(value, kind)
+    except TypeError:  # a protocol that is not `runtime_checkable`
+        return False
 
 
 def _convert(value: object, kind: Any, text: Text | None = None) -> Any:
     """Return a value converted to `kind`; None if that is impossible."""
     choices = _choices(kind)
     if choices:
-        return choices.get(str(value), value if value in choices.values() else None)
+        return choices.get(str(value))
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if kind is str and isinstance(value, int | float | PurePath):
@@ -228,10 +254,16 @@ def _convert(value: object, kind: Any, text: Text | None = None) -> Any:
 
 
 def _convert_list(value: object, kind: Any, text: Text | None) -> Any:
-    (item, *_) = get_args(kind) or (Any,)
+    items = _items(kind)
     if not isinstance(value, list | tuple):
         value = [value if text is None else text]
-    made = [fit(one, item) for one in value]
+    hints = items if isinstance(items, tuple) else (items,) * len(value)
+    if len(hints) != len(value):
+        return None
+    try:
+        made = [fit(one, hint) for one, hint in zip(value, hints, strict=True)]
+    except MisfitError:
+        return None
     return tuple(made) if (get_origin(kind) or kind) is tuple else made
 
 

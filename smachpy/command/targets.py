@@ -56,7 +56,7 @@ class Target:
     summary: str
     thing: Any
 
-    def build(self, **arguments: object) -> Container:
+    def build(self, /, **arguments: object) -> Container:
         """Return the machine; a factory is called with `arguments`.
 
         Raises:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NewType, Protocol, TypedDict
 
 import pytest
 
@@ -27,6 +27,24 @@ from smachpy.exceptions import MissionError
 class Mode(enum.Enum):
     ABS = 0
     REL = 1
+
+
+class Speed(enum.IntEnum):
+    SLOW = 1
+    FAST = 2
+
+
+class Offset(TypedDict):
+    x: float
+
+
+class Shape(Protocol):
+    """A protocol that `isinstance` refuses."""
+
+    sides: int
+
+
+Metres = NewType("Metres", float)
 
 
 def target(thing):
@@ -157,6 +175,12 @@ def test_a_finished_machine_takes_no_words():
         ("REL", Mode, Mode.REL),
         (Mode.REL, Mode, Mode.REL),
         ([1], list, [1]),
+        (Text("FAST"), Speed, Speed.FAST),
+        (Text("3"), Metres, 3.0),
+        (Text("{x: 1}"), Offset, {"x": 1}),
+        (Text("[1, lab]"), tuple[int, str], (1, "lab")),
+        (Text("lab"), list[int] | str, "lab"),
+        (Text("true"), Literal[True, "auto"], True),
     ],
 )
 def test_what_fits(value, hint, fitted):
@@ -173,7 +197,14 @@ def test_what_fits(value, hint, fitted):
         (True, int, "a whole number"),
         (Text(".inf"), float, "a number"),
         (Text("yes"), bool, "true or false"),
-        (Text("[a]"), list[int], "a whole number"),
+        (Text("[a]"), list[int], "a list, each a whole number"),
+        (Text("1"), Speed, "one of ['SLOW', 'FAST']"),
+        (Text("true"), Literal[1], "one of ['1']"),
+        (Text("[1, 2, 3]"), tuple[float, float], "a list of 2: a number, a number"),
+        (Text("[lab, 1]"), tuple[int, str], "a list of 2: a whole number, text"),
+        (Text("a"), dict[str, int], "a dictionary"),
+        (Text("x"), Offset, "a dictionary"),
+        (Text("a"), Shape, "Shape (cannot be typed on a command line)"),
         ([1], str, "text"),
         (None, str, "text"),
         (Text("x"), float | None, "a number or null"),
@@ -183,6 +214,18 @@ def test_what_does_not_fit(value, hint, expected):
     with pytest.raises(MisfitError) as caught:
         fit(value, hint)
     assert str(caught.value) == expected
+
+
+def test_names_may_begin_with_any_letter_or_an_underscore():
+    def free(_x: int = 1, öffnen: bool = False, self: str = ""):  # noqa: PLC2401
+        return _x, öffnen, self
+
+    assert call(free, "--_x=2", "--öffnen", "--self", "me") == (2, True, "me")
+
+
+def test_a_parameter_may_be_called_self():
+    machine = smachpy.StateMachine(outcomes=["done"])
+    assert target(lambda self: machine).build(self="me") is machine
 
 
 def test_a_default_stands_for_a_missing_annotation():
