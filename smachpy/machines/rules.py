@@ -49,8 +49,15 @@ def all_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
 
 
 def any_of(conditions: Mapping[str, str | Iterable[str]]) -> Rule:
-    """Return a rule: at least one child named here must have its outcome, or one of them."""
-    return Rule(1, _conditions(conditions))
+    """Return a rule: at least one child named here must have its outcome, or one of them.
+
+    Raises:
+        InvalidStateError: there is no condition, so that the rule would never hold.
+    """
+    made = _conditions(conditions)
+    if not made:
+        raise InvalidStateError("any_of: got no conditions; expected at least one.")
+    return Rule(1, made)
 
 
 def n_of(n: int, conditions: Mapping[str, str | Iterable[str]]) -> Rule:
@@ -96,7 +103,10 @@ def _conditions(
         raise InvalidStateError(
             f"rule: got {conditions!r}; expected a dict: child label -> outcome, or outcomes."
         )
-    return tuple(
-        (label, (wanted,) if isinstance(wanted, str) else unique_names(wanted, f"rule {label!r}"))
-        for label, wanted in conditions.items()
-    )
+    made = []
+    for label, wanted in conditions.items():
+        names = (wanted,) if isinstance(wanted, str) else unique_names(wanted, f"rule {label!r}")
+        if not names:  # it would never hold
+            raise InvalidStateError(f"rule {label!r}: got no outcome; expected at least one.")
+        made.append((label, names))
+    return tuple(made)

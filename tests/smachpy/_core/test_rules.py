@@ -47,6 +47,14 @@ def test_n_out_of_range_is_told(n):
         n_of(n, {"A": "x", "B": "x"})
 
 
+def test_rules_that_could_never_hold_are_refused():
+    with pytest.raises(InvalidStateError, match="any_of"):
+        any_of({})
+    for rule in (all_of, any_of, lambda wanted: n_of(1, wanted)):
+        with pytest.raises(InvalidStateError, match="'A'"):
+            rule({"A": [], "B": "x"})
+
+
 def test_rules_read_well():
     assert str(all_of({"A": "x"})) == "A:x"
     assert str(all_of({"A": "x", "B": ["y", "z"]})) == "all of A:x, B:y|z"
