@@ -262,7 +262,9 @@ class SimpleActionClient(Generic[A]):
             preempt_timeout: Longest wait for the end after the cancel [s]; likewise.
 
         Returns:
-            The status (`GoalStatus`); not a final one when `preempt_timeout` was too short.
+            The status (`GoalStatus`); not a final one when `preempt_timeout` was too short, or
+            when another goal was sent meanwhile or `stop_tracking_goal` called: the wait then ends
+            and nothing is cancelled.
 
         Blocks: until the goal is over or both times have passed.
         """
@@ -270,10 +272,12 @@ class SimpleActionClient(Generic[A]):
         execute = self._check_wait("execute_timeout", execute_timeout)
         preempt = self._check_wait("preempt_timeout", preempt_timeout)
         self.send_goal(goal)
-        if not self.wait_for_result(execute):
-            self.cancel_goal()
+        handle = self._handle
+        # The wait also ends when another thread has sent the next goal: that one is not cancelled.
+        if not self.wait_for_result(execute) and handle is not None and not handle.forgotten:
+            handle.cancel()
             self.wait_for_result(preempt)
-        return self.get_state()
+        return self._state_of(handle)
 
     def wait_for_result(self, timeout: float | Duration | None = 0.0) -> bool:
         """Wait until the goal is over and `done_cb` has returned.
@@ -289,7 +293,8 @@ class SimpleActionClient(Generic[A]):
                 usually a mistake, such as the rest of a time that is already over.
 
         Returns:
-            Whether the goal is over; False also when no goal was sent.
+            Whether the goal is over; False also when no goal was sent, or when during the wait
+            another one is sent or `stop_tracking_goal` called.
 
         Raises:
             InvalidDurationError: `timeout` is not a duration.
@@ -334,7 +339,9 @@ class SimpleActionClient(Generic[A]):
         RECALLING is shown as PENDING, PREEMPTING as ACTIVE, no goal as LOST. While the answer to a
         cancel is awaited, it is the last status from the server.
         """
-        handle = self._handle
+        return self._state_of(self._handle)
+
+    def _state_of(self, handle: ClientGoalHandle | None) -> int:
         if handle is None:
             return int(Status.LOST)
         shown = _SHOWN.get(handle.get_comm_state())

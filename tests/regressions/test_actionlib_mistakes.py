@@ -381,6 +381,37 @@ def test_simple_server_whose_session_is_closed_stops(nodes, clock):
     assert clock.now() < 2.0
 
 
+@pytest.mark.parametrize("how", ["send", "stop tracking"])
+def test_send_goal_and_wait_cancels_only_its_own_goal(nodes, clock, how):
+    """It cancelled the goal that another thread had sent meanwhile, and returned its status."""
+    handles = {}
+
+    def take(handle):
+        handle.set_accepted()
+        handles[handle.get_goal().goal] = handle
+
+    ActionServer("demo", msg.TestAction, take, node=nodes[0])
+    client = SimpleActionClient("demo", msg.TestAction, node=nodes[1])
+    states = []
+    task = clock.spawn(
+        lambda: states.append(client.send_goal_and_wait(msg.TestGoal(1), LONG_S)), name="waits"
+    )
+    clock.sleep(1.0)
+    began = clock.now()
+    if how == "send":
+        client.send_goal(msg.TestGoal(2))
+    else:
+        client.stop_tracking_goal()
+    task.join()
+    assert clock.now() == began
+    assert states == [GoalStatus.ACTIVE]
+    clock.sleep(1.0)
+    assert [handle.get_goal_status().status for handle in handles.values()] == (
+        [GoalStatus.ACTIVE] * (2 if how == "send" else 1)
+    )
+    client.stop()
+
+
 # -- mistakes ----------------------------------------------------------------------------------
 
 
