@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -12,13 +13,18 @@ from actionlib_core.cli._command import add_command, count, print_json, print_me
 from actionlib_core.cli._feed import Feed
 from actionlib_core.cli._network import class_of_end, find_server, open_node
 from actionlib_core.cli._ros2 import RemoteAction, is_ros2
+from actionlib_core.exceptions import DeserializationError
+from actionlib_core.output import tell
 
 if TYPE_CHECKING:
     import argparse
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Sample
+    from actionlib_core.wire.arrivals import Readable
     from actionlib_core.wire.presence import Endpoint
+
+log = logging.getLogger(__name__)
 
 
 def register(subparsers: Any) -> None:
@@ -37,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Print messages until Ctrl-C, `--timeout` or, with `--once` or `-n`, enough of them."""
     from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatusArray
     from actionlib_core.wire.actions import action_keys
+    from actionlib_core.wire.arrivals import Readable
 
     with open_node(args, settle=0.0) as node:
         server = find_server(node, args.name, args.timeout)
@@ -52,9 +59,9 @@ def run(args: argparse.Namespace) -> int:
         }
         if args.status:
             classes[keys.status] = GoalStatusArray
-        feed = Feed(node.clock)
+        feed, readable = Feed(node.clock), Readable(log)
         subscriptions = [
-            node.transport.subscribe(key, partial(_put, feed, message_class))
+            node.transport.subscribe(key, partial(_put, feed, readable, message_class))
             for key, message_class in classes.items()
         ]
         return _show_all(node, feed, subscriptions, args)
@@ -79,9 +86,10 @@ def _show_all(
 ) -> int:
     deadline = None if args.timeout is None else node.clock.now() + args.timeout
     limit = 1 if args.once else args.count
+    unreadable: set[str] = set()  # the parts of the action of which this was told
     try:
         for _ in itertools.count() if limit is None else range(limit):
-            _show(feed.next(deadline), as_json=args.json)
+            _show_next(feed, deadline, unreadable, as_json=args.json)
     except TimeoutError:
         return 0 if limit is None else _too_few(args)
     finally:
@@ -95,14 +103,24 @@ def _too_few(args: argparse.Namespace) -> int:
     return EXIT_FAILED
 
 
-def _put(feed: Feed, message_class: Any, sample: Sample) -> None:
-    feed.put((sample.key.rpartition("/")[2], message_class, sample.payload))
+def _put(feed: Feed, readable: Readable, message_class: Any, sample: Sample) -> None:
+    if readable.check(sample, message_class):
+        feed.put((sample.key.rpartition("/")[2], message_class, sample.payload))
 
 
-def _show(item: tuple[str, Any, bytes], *, as_json: bool) -> None:
-    word, message_class, payload = item
-    message = message_class.from_bytes(payload)
-    if as_json:
-        print_json(topic=word, message=message.to_dict())
-    else:
-        print_message(f"{word}:", message)
+def _show_next(feed: Feed, deadline: float | None, unreadable: set[str], *, as_json: bool) -> None:
+    """Print the next message. Those that cannot be read are dropped, and the first one is told."""
+    while True:
+        word, message_class, payload = feed.next(deadline)
+        try:
+            message = message_class.from_bytes(payload)
+        except DeserializationError as error:
+            if word not in unreadable:
+                unreadable.add(word)
+                tell("actionlib", f"{word}: a message cannot be read: {error}")
+            continue
+        if as_json:
+            print_json(topic=word, message=message.to_dict())
+        else:
+            print_message(f"{word}:", message)
+        return

@@ -18,6 +18,8 @@ from actionlib_core.clock import RealClock
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.wire.actions import GOAL
+from actionlib_core.wire.encoding import encoding_of
 
 
 @server("robot/count", msg.TestAction)
@@ -46,6 +48,9 @@ class Shell:
         assert main(argv, node=self.node) == code
         out, err = self._capsys.readouterr()
         return out if not code else out + err
+
+    def output(self):
+        return self._capsys.readouterr()
 
     def json(self, *argv, code=0):
         return json.loads(self(*argv, "--json", code=code))
@@ -325,6 +330,29 @@ def test_echo_ends_after_enough(shell, counting, clock):
     task.join()
     out = shell("echo", "robot/count", "--once", "--timeout", "2", code=1)
     assert "/robot/count: not enough in 2 s" in out
+
+
+def test_echo_drops_what_it_cannot_read(shell, counting, clock, caplog):
+    """One message of a wrong form or type ended it."""
+
+    def later():
+        clock.sleep(1.0)
+        for encoding in ("", encoding_of(msg.TestGoal)):
+            wrong = shell.node.transport.publisher("robot/count/goal", encoding, GOAL)
+            wrong.put(b"")
+            wrong.put(b"no goal")
+            wrong.close()
+        main(["send_goal", "robot/count", "{goal: 0}", "--json"], node=shell.node)
+
+    task = clock.spawn(later, name="later")
+    code = main(["echo", "robot/count", "-n", "2"], node=shell.node)
+    task.join()
+    out, err = shell.output()
+    assert code == 0
+    assert "goal:\n    header:" in out
+    assert "result:\n    header:" in out
+    assert err.count("actionlib: goal: a message cannot be read: ") == 1
+    assert "types differ: got 'actionlib/TestGoal'" in caplog.text
 
 
 def test_server_by_hand(capsys, monkeypatch):
