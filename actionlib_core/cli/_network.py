@@ -274,17 +274,25 @@ def typed_class(node: Node, kind: Literal["action", "message", "service"], name:
 # -- goals -----------------------------------------------------------------------------------------
 
 
-def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = "result") -> Reply:
+def ask(
+    node: Node,
+    name: str,
+    goal_id: str,
+    read: Callable[[Reply], T],
+    about: Literal["result", "goal"] = "result",
+) -> T:
     """Query the server of an action for a goal, or for the status list.
 
     Args:
         node: The command's node.
         name: The action.
         goal_id: The goal; "": all goals.
+        read: Reads an answer; a ValueError if it cannot. Anybody may answer: the first answer that
+            can be read counts.
         about: "result": its result or status; "goal": its goal message.
 
     Raises:
-        UsageError: there was no answer, or an error.
+        UsageError: there was no answer that can be read, or an error.
 
     Blocks: `ASK_S` at most.
     """
@@ -304,11 +312,13 @@ def ask(node: Node, name: str, goal_id: str, about: Literal["result", "goal"] = 
         on_done=done.set,
     )
     done.wait(ASK_S + 1.0)
+    problem = f"got no answer within {ASK_S:g} s; expected one"
     # An answer of one server counts more than the error of another.
     for reply in sorted(replies, key=lambda reply: reply.error):
         if reply.error:
             raise UsageError(reply.payload.decode(errors="replace"))
-        return reply
-    raise UsageError(
-        f"action '/{full}': got no answer within {ASK_S:g} s; expected one. Try 'actionlib info'."
-    )
+        try:
+            return read(reply)
+        except ValueError as error:
+            problem = f"got an answer that cannot be read ({error}); expected that of its server"
+    raise UsageError(f"action '/{full}': {problem}. Try 'actionlib info'.")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.goal.ports import StatusEntry
     from actionlib_core.node import Node
+    from actionlib_core.transport import Reply
     from actionlib_core.wire.presence import Endpoint
     from actionlib_core.wire.ros2.action_messages import GoalState
 
@@ -65,7 +66,7 @@ def _goals(node: Node, name: str) -> list[StatusEntry]:
     from actionlib_core.goal.states import Status
     from actionlib_core.wire.actions import unpack_statuses
 
-    entries = unpack_statuses(ask(node, name, "").payload)
+    entries = ask(node, name, "", lambda answer: unpack_statuses(answer.payload))
     return [entry for entry in entries if entry.stamp_ns or entry.status != Status.RECALLING]
 
 
@@ -155,22 +156,26 @@ def _status(node: Node, args: argparse.Namespace, spec: Any) -> tuple[StatusEntr
     from actionlib_core.wire.actions import unpack_report, unpack_status
     from actionlib_core.wire.encoding import encoding_of
 
-    answer = ask(node, args.name, args.id)
-    if answer.encoding == encoding_of(GoalStatus):
-        return unpack_status(answer.payload), None
-    entry, start = unpack_report(answer.payload)
-    return entry, type(spec().action_result.result).from_bytes(answer.payload[start:])
+    def read(answer: Reply) -> tuple[StatusEntry, Any]:
+        if answer.encoding == encoding_of(GoalStatus):
+            return unpack_status(answer.payload), None
+        entry, start = unpack_report(answer.payload)
+        return entry, type(spec().action_result.result).from_bytes(answer.payload[start:])
+
+    return ask(node, args.name, args.id, read)
 
 
 def _goal(node: Node, args: argparse.Namespace, spec: Any) -> Any:
     """Return the goal message of a goal, None when the server no longer has it."""
     from actionlib_core.wire.actions import unpack_goal
 
+    def read(answer: Reply) -> Any:
+        return type(spec().action_goal.goal).from_bytes(unpack_goal(answer.payload)[2])
+
     try:
-        answer = ask(node, args.name, args.id, "goal")
+        return ask(node, args.name, args.id, read, "goal")
     except UsageError:
         return None
-    return type(spec().action_goal.goal).from_bytes(unpack_goal(answer.payload)[2])
 
 
 def _cancel(args: argparse.Namespace) -> int:
@@ -202,7 +207,7 @@ def _cancel(args: argparse.Namespace) -> int:
         publisher = node.transport.publisher(f"{name}/cancel", encoding_of(GoalID), GOAL)
         publisher.put(pack_goal_id(args.id, stamp_ns))
         # The reply to a query shows that the cancel before it has arrived: only then close.
-        ask(node, f"/{name}", "")
+        ask(node, f"/{name}", "", lambda _answer: None)
         publisher.close()
     missed = bool(args.id) and args.id not in asked
     if args.json:

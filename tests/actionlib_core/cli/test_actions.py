@@ -16,6 +16,7 @@ from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.cli import main
 from actionlib_core.clock import RealClock
 from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.actions import GOAL
@@ -298,6 +299,24 @@ def test_goals_are_listed_shown_and_cancelled(shell, network, clock):
     assert "expected a goal's id" in shell("goal", "info", "keep", "", code=2)
     assert "Status: LOST" in shell("goal", "info", "keep", "never-1-1.1", code=1)
     node.close()
+
+
+@pytest.mark.parametrize("encoding", ["", encoding_of(GoalStatus), encoding_of(GoalStatusArray)])
+def test_answers_of_others_that_cannot_be_read_are_passed_over(shell, network, clock, encoding):
+    """They ended the commands with a traceback; a cancel was then not sent."""
+
+    def answer(query):
+        query.reply(b"garbage", encoding)
+        query.finish()
+
+    session = network.session()
+    for word in ("result", "goal"):
+        session.queryable(f"robot/count/{word}", answer)
+    with Node("counter", transport=network.session(), clock=clock) as node, count.start(node=node):
+        assert shell("goal", "list", "robot/count") == ""
+        assert "Status: LOST" in shell("goal", "info", "robot/count", "x", code=1)
+        assert shell("cancel", "robot/count", "--all") == "No running goal is meant.\n"
+    session.close()
 
 
 def test_definitions_of_installed_packages_are_known(shell, capsys):

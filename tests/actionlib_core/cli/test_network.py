@@ -66,4 +66,4 @@ def test_error_that_a_server_answers_with_is_told(nodes):
 
     robot.transport.queryable("dock/result", answer)
     with pytest.raises(UsageError, match=r"^action 'dock': out of order$"):
-        _network.ask(cli, "dock", "/nobody-1")
+        _network.ask(cli, "dock", "/nobody-1", lambda reply: reply)
