@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from functools import partial
+from types import CodeType
+from typing import Any
 
 from actionlib_core.exceptions import ActionlibError, DurationTypeError, InvalidDurationError
 from actionlib_core.time import to_seconds
+
+_MAKES_AN_OBJECT = inspect.CO_COROUTINE | inspect.CO_GENERATOR | inspect.CO_ASYNC_GENERATOR
 
 
 def check_functions(where: str, **callbacks: object) -> None:
     """Check several callbacks by the names of their arguments; see `check_function`."""
     for argument, value in callbacks.items():
-        if value is not None and not callable(value):
+        if value is not None and not (callable(value) and _runs(value)):
             check_function(where, argument, value)
 
 
 def check_function(where: str, argument: str, value: object) -> None:
-    """Check that a callback can be called; None is allowed.
+    """Check that a callback can be called and that the call runs its body; None is allowed.
 
     Args:
         where: The owner, for the error: "action 'dock'".
@@ -24,13 +30,32 @@ def check_function(where: str, argument: str, value: object) -> None:
         value: The callback.
 
     Raises:
-        ActionlibError: it cannot be called.
+        ActionlibError: it cannot be called, or is an `async` function or a generator.
     """
-    if value is not None and not callable(value):
+    if value is None:
+        return
+    if not callable(value):
         raise ActionlibError(
             f"{where}: {argument}: got {value!r}; expected a function. Try giving the function "
             "itself, without calling it."
         )
+    if not _runs(value):
+        raise ActionlibError(
+            f"{where}: {argument}: got {value!r}, an async function or a generator, whose body "
+            "would not run; expected a function without async and yield. Try "
+            "asyncio.run_coroutine_threadsafe() in it."
+        )
+
+
+def _runs(function: Any) -> bool:
+    """Return whether a call runs the body: that of a coroutine or generator only makes an object.
+
+    By the flags of its code, as goals are sent with callbacks and `inspect` is slower.
+    """
+    while isinstance(function, partial):
+        function = function.func
+    code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
+    return not (isinstance(code, CodeType) and code.co_flags & _MAKES_AN_OBJECT)
 
 
 def is_goal_id(value: object) -> bool:

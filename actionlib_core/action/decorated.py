@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from actionlib_core._arguments import check_function
 from actionlib_core.action.simple_server import TEXT_ACCEPTED, SimpleActionServer
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.goal.states import Status
@@ -260,8 +261,9 @@ def server(
     """
 
     def decorate(function: Callable[[G, GoalContext[F]], R]) -> GoalServer[G, R, F]:
-        if not callable(function):
-            raise ActionlibError(f"server {name!r}: got {function!r}; expected a function")
+        if function is None:
+            raise ActionlibError(f"action {name!r}: function: got None; expected a function.")
+        check_function(f"action {name!r}", "function", function)
         options = {"policy": policy, "on_client_lost": on_client_lost}
         return GoalServer(function, name, ActionSpec, options)
 

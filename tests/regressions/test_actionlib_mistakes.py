@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import threading
 
@@ -10,7 +11,7 @@ import pytest
 from actionlib_core import shutdown
 from actionlib_core.action import client as action_client
 from actionlib_core.action.client import ActionClient, CommState
-from actionlib_core.action.decorated import Reject
+from actionlib_core.action.decorated import Reject, server
 from actionlib_core.action.server import ActionServer
 from actionlib_core.action.simple_client import SimpleActionClient, SimpleGoalState
 from actionlib_core.action.simple_server import SimpleActionServer
@@ -543,6 +544,43 @@ def test_callbacks_are_functions(nodes):
     }
     for what, call in calls.items():
         with pytest.raises(ActionlibError, match=rf"demo.*: {what}: got .*; expected a function"):
+            call()
+    assert simple.get_state() == GoalStatus.LOST  # no goal was sent
+
+
+async def coroutine(*_args):
+    pass
+
+
+def generator(*_args):
+    yield
+
+
+class AsyncCall:
+    async def __call__(self, *_args):
+        pass
+
+
+@pytest.mark.parametrize(
+    "lazy", [coroutine, generator, functools.partial(coroutine, 1), AsyncCall(), AsyncCall.__call__]
+)
+def test_callbacks_run_when_they_are_called(nodes, lazy):
+    """The body of such a callback never ran: messages were lost, goals aborted, without a reason."""
+    node = nodes[0]
+    simple = SimpleActionClient("demo", msg.TestAction, node=node)
+    calls = {
+        "done_cb": lambda: simple.send_goal(msg.TestGoal(1), lazy),
+        "feedback_cb": lambda: simple.send_goal(msg.TestGoal(1), feedback_cb=lazy),
+        "execute_cb": lambda: SimpleActionServer("demo", msg.TestAction, lazy, node=node),
+        "goal_cb": lambda: ActionServer("demo", msg.TestAction, lazy, node=node),
+        "function": lambda: server("demo", msg.TestAction)(lazy),
+        "handler": lambda: Service("demo", Trigger, lazy, node=node),
+        "callback": lambda: Subscriber("demo", String, lazy, node=node),
+    }
+    for what, call in calls.items():
+        with pytest.raises(
+            ActionlibError, match=rf"demo.*: {what}: got .*whose body would not run"
+        ):
             call()
     assert simple.get_state() == GoalStatus.LOST  # no goal was sent
 
