@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.util
 import inspect
@@ -20,11 +21,14 @@ from smachpy.mission_info import is_mission, mission
 from smachpy.run.stack_text import trace_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import ModuleType
 
 GROUP = "smachpy.missions"
 DEFAULT_NAMES = ("mission", "machine", "sm")
 PLANS = (".pnml", ".plan", ".pddlout")
+# A script that calls `sys.exit()` would end the command, with 0 as if the mission had succeeded.
+_FAILURES = (Exception, SystemExit)
 
 
 class TargetError(SmachError):
@@ -76,7 +80,7 @@ class Target:
             machine = self.thing(**arguments)
         except (SmachError, ActionlibError):  # these say themselves which argument was wrong
             raise
-        except Exception as error:
+        except _FAILURES as error:
             why = advice(error) if isinstance(error, ImportError) else None
             raise TargetError(
                 self.name,
@@ -205,18 +209,26 @@ def _mission_names() -> list[str]:
 
 
 def _load_mission(name: str) -> Target:
-    (point,) = (point for point in entry_points(group=GROUP) if point.name == name)
+    points = {point.value: point for point in entry_points(group=GROUP) if point.name == name}
+    if len(points) > 1:
+        raise TargetError(
+            name,
+            f"installed packages have {len(points)} missions of that name; expected one. "
+            f"Try {' or '.join(sorted(points))}",
+        )
+    (point,) = points.values()
     try:
         thing = point.load()
-    except ImportError as error:
-        text = advice(error) or f"importing {point.value!r} raised {raised_text(error)}"
+    except _FAILURES as error:
+        why = advice(error) if isinstance(error, ImportError) else None
+        text = why or f"importing {point.value!r} raised {raised_text(error)}"
         raise TargetError(name, text) from error
-    return _target(name, point.value, thing)
+    return _target(name, name, point.value, thing)
 
 
 def _import_file(text: str, path: Path) -> ModuleType:
     if not path.is_file():
-        near = sorted(str(p) for p in path.parent.glob("*.py")) if path.parent.is_dir() else []
+        near = sorted(str(p) for p in path.parent.glob("*.py") if p.is_file())
         raise TargetError(text, f"no file {str(path)!r}; {_suggest(str(path), near)}")
     name = _free_name(path.stem)
     spec = importlib.util.spec_from_file_location(name, path)
@@ -226,20 +238,32 @@ def _import_file(text: str, path: Path) -> ModuleType:
         )
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses and pickles look their module up
-    sys.path.insert(0, str(path.parent.resolve()))  # as `python path.py` would
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:
+        with _on_python_path(path.parent.resolve()):  # as `python path.py` would
+            spec.loader.exec_module(module)
+    except _FAILURES as error:
         sys.modules.pop(name, None)  # it was executed only in part
         why = clash(error, [path.parent]) if isinstance(error, ImportError) else None
         why = why or _ros1_text(error)
-        raise TargetError(text, why or f"running the file raised {raised_text(error)}") from error
-    finally:
-        sys.path.remove(str(path.parent.resolve()))
+        why = why or f"running the file raised {raised_text(error)}"
+        if isinstance(error, SystemExit):
+            why += "\n    Try `if __name__ == '__main__':` before what is not to run here."
+        raise TargetError(text, why) from error
     return module
 
 
-def _ros1_text(error: Exception) -> str:
+@contextlib.contextmanager
+def _on_python_path(folder: Path) -> Iterator[None]:
+    """Import from `folder` in a `with` block, whose code may change the path or the folder."""
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        with contextlib.suppress(ValueError):
+            sys.path.remove(str(folder))
+
+
+def _ros1_text(error: BaseException) -> str:
     """Return what to try if a file needs the modules of ROS 1; "" if that is not the cause."""
     from smachpy.ros1.hook import OLD_NAMES
 
@@ -264,20 +288,19 @@ def _free_name(stem: str) -> str:
 
 
 def _import_module(text: str, name: str) -> ModuleType:
-    here = str(Path.cwd())
-    sys.path.insert(0, here)
+    here = Path.cwd()
     try:
-        return importlib.import_module(name)
+        with _on_python_path(here):
+            return importlib.import_module(name)
     except ModuleNotFoundError as error:
-        why = clash(error, [Path(here)])
+        why = clash(error, [here])
         raise TargetError(
             text,
-            why or f"no module {error.name!r}; expected one on the Python path or in {here!r}.",
+            why
+            or f"no module {error.name!r}; expected one on the Python path or in {str(here)!r}.",
         ) from error
-    except Exception as error:
+    except _FAILURES as error:
         raise TargetError(text, f"importing {name!r} raised {raised_text(error)}") from error
-    finally:
-        sys.path.remove(here)
 
 
 def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Target:
@@ -308,11 +331,7 @@ def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Ta
                 text, f"nothing is called {names[0]!r}; {_suggest(word, _own_names(module))}"
             )
         thing = getattr(thing, word)
-    if not (isinstance(thing, Container) or callable(thing)):
-        raise TargetError(
-            text, f"{names[0]} is {thing!r}; expected a machine or a function that returns one."
-        )
-    return _target(name, f"{module.__name__}:{names[0]}", thing)
+    return _target(text, name, f"{module.__name__}:{names[0]}", thing)
 
 
 def _own_names(module: ModuleType) -> list[str]:
@@ -329,7 +348,14 @@ def _own_names(module: ModuleType) -> list[str]:
     ]
 
 
-def _target(name: str, source: str, thing: Any) -> Target:
+def _target(text: str, name: str, source: str, thing: Any) -> Target:
+    try:
+        if not isinstance(thing, Container):
+            inspect.signature(thing)
+    except (TypeError, ValueError) as error:  # no function, or one like `int`, written in C
+        raise TargetError(
+            text, f"{source} is {thing!r}; expected a machine or a function that returns one."
+        ) from error
     doc = "" if isinstance(thing, Container) else (inspect.getdoc(thing) or "").strip()
     return Target(name, source, doc.splitlines()[0] if doc else "", thing)
 

@@ -261,3 +261,71 @@ def test_a_mission_that_needs_an_extra_when_it_is_built_says_which(tmp_path):
         TargetError, match=r"package 'PIL' is missing. Try: pip install 'smachpy\[sim\]'"
     ):
         load_target(str(path)).build()
+
+
+@pytest.mark.parametrize("line", ["sys.exit()", "sys.exit(3)", 'sys.exit("no robot")'])
+def test_a_file_or_factory_that_ends_the_program_is_an_error(tmp_path, line):
+    # Otherwise `smachpy run` and `smachpy check` would end with 0, without a run or a check.
+    path = tmp_path / "ends.py"
+    path.write_text(f"import sys\n{line}\n")
+    with pytest.raises(TargetError, match="running the file raised SystemExit"):
+        load_target(str(path))
+    path.write_text(f"import sys\ndef mission():\n    {line}\n")
+    with pytest.raises(TargetError, match=":mission raised SystemExit"):
+        load_target(str(path)).build()
+
+
+@pytest.mark.parametrize("line", ["os.chdir('..')", "sys.path.clear()"])
+def test_a_file_may_change_the_folder_and_the_python_path(file, monkeypatch, line):
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    file.write_text(f"import os, sys\n{line}\n{FILE}")
+    assert load_target("drive_about.py").build().execute() == "done"
+
+
+def test_a_folder_is_not_suggested_as_a_file(tmp_path):
+    (tmp_path / "drive.py").mkdir()
+    with pytest.raises(TargetError, match=r"no file .*; expected one of \[\]\.$"):
+        load_target(str(tmp_path / "drive.py"))
+
+
+def test_a_function_whose_parameters_python_cannot_tell_is_no_mission(file):
+    file.write_text("mission = int\n")
+    with pytest.raises(TargetError, match="is <class 'int'>; expected a machine or a function"):
+        load_target("drive_about.py")
+
+
+def _install(monkeypatch, *values):
+    points = [EntryPoint("mine", value, smachpy.command.targets.GROUP) for value in values]
+    monkeypatch.undo()  # what `missions` replaced
+    monkeypatch.setattr(smachpy.command.targets, "entry_points", lambda **_: points)
+
+
+@pytest.mark.parametrize(
+    ("source", "problem"),
+    [
+        ("1 / 0", "importing 'mine_of_mine:mission' raised ZeroDivisionError: division by zero"),
+        ("raise SystemExit", "importing 'mine_of_mine:mission' raised SystemExit: "),
+        ("x = 1", "importing 'mine_of_mine:mission' raised AttributeError: "),
+        ("mission = 3", "mine_of_mine:mission is 3; expected a machine or a function"),
+    ],
+)
+def test_an_installed_mission_that_cannot_be_loaded_is_told_in_the_list(
+    tmp_path, monkeypatch, source, problem
+):
+    _install(monkeypatch, "mine_of_mine:mission")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "mine_of_mine", raising=False)
+    (tmp_path / "mine_of_mine.py").write_text(f"{source}\n")
+    assert list_missions()["mine"].startswith(f"not available: {problem}")
+    with pytest.raises(TargetError, match="mine_of_mine:mission"):
+        load_target("mine")
+
+
+def test_two_packages_with_a_mission_of_one_name(monkeypatch):
+    one, other = f"{__name__}:make_mission", f"{__name__}:other"
+    _install(monkeypatch, one, other)
+    with pytest.raises(TargetError, match=f"have 2 missions of that name.*Try {one} or {other}"):
+        load_target("mine")
+    assert list_missions()["mine"].startswith("not available: ")
+    _install(monkeypatch, one, one)  # the same package, found twice on the Python path
+    assert load_target("mine").summary == "Say hello."
