@@ -161,8 +161,9 @@ def read_record(text: str, args: argparse.Namespace | None = None) -> StateRecor
         return describe(target.build())
     try:
         return StateRecord.from_json(Path(text).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
+        said = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise UsageError(
-            f"{text!r}: got {error}; expected a record that "
-            "`smachpy render TARGET -o FILE.json` wrote."
+            f"{text!r}: {said.rstrip('.')}. "
+            "Try a record that `smachpy render TARGET -o FILE.json` wrote."
         ) from error

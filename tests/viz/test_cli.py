@@ -104,3 +104,19 @@ def test_a_record_that_cannot_be_read_is_told(tmp_path, capsys, text):
         file.write_text(text)
     assert main(["render", str(file), "-o", str(tmp_path / "m.txt")]) == 2
     assert "r.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("[]", "'r.json': $: got list; expected an object. Try a record that `smachpy render"),
+        ("[" * 100_000, "'r.json': maximum recursion depth exceeded"),
+        (None, "'r.json': No such file or directory. Try a record"),
+    ],
+)
+def test_a_file_that_is_no_record_is_one_line(tmp_path, monkeypatch, capsys, content, said):
+    monkeypatch.chdir(tmp_path)
+    if content is not None:
+        (tmp_path / "r.json").write_text(content)
+    assert main(["render", "r.json", "-o", "r.txt"]) == 2
+    assert capsys.readouterr().err.startswith(f"smachpy: {said}")
