@@ -42,6 +42,7 @@ def offer() -> ActionServerWrapper:
         MoveBaseAction,
         go_and_look(),
         succeeded_outcomes=["succeeded"],
+        preempted_outcomes=["preempted"],  # also if the mission was preempted, not this goal
         goal_slots_map={"target_pose": "place"},  # field of the goal -> userdata key
         feedback_key="feedback",
     )

@@ -142,6 +142,12 @@ def test_a_cancel_preempts_the_machine_and_its_drive(mission, drives):
     assert len(drives.goals) == 1
 
 
+def test_a_preempt_that_ends_the_machine_at_once_is_no_failure(mission):
+    # Nobody serves the drive: the machine ends before SEND's cancel reaches its server.
+    mission.preempt(on="SEND", after=3.0)
+    mission(look_at()).assert_outcome("preempted")
+
+
 def test_the_machine_that_is_served_has_no_problems():
     check(go_and_look()).assert_ok()
 
