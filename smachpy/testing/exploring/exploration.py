@@ -479,16 +479,17 @@ def _copied(values: Mapping[str, Any] | None) -> dict[str, Any]:
 
     The copies are made with one `memo`, so that values with a part in common have one again.
     """
+    # One object `memo` to the end: `deepcopy` notes its address in it. With another memo for each
+    # value, a dict that is made during a later copy could get this address.
     copies, memo = {}, dict[int, Any]()
     for key, value in (values or {}).items():
-        # Of a value that cannot be copied, `deepcopy` leaves unfinished parts in the memo.
-        made = memo.copy()
+        before = set(memo)
         try:
-            copies[key] = copy.deepcopy(value, made)
+            copies[key] = copy.deepcopy(value, memo)
         except Exception:  # noqa: BLE001  of any kind: the value's own code decides
             copies[key] = value
-        else:
-            memo = made
+            for part in memo.keys() - before:  # unfinished copies
+                del memo[part]
     return copies
 
 

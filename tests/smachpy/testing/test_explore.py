@@ -1180,3 +1180,32 @@ def test_a_function_that_returns_no_machine_is_named():
 
     with pytest.raises(TypeError, match=r"make\(\) returned None; expected .* Try `return`"):
         explore(make)
+
+
+class Sighting:
+    def __getstate__(self):
+        return {"seen": self.seen}
+
+
+def test_what_follows_a_value_that_cannot_be_copied_is_copied():
+    """It was shared as well, as its state got the address of a dict that `deepcopy` had noted."""
+    marks = []
+
+    def note(userdata):
+        marks.extend(sighting.seen for sighting in userdata.after)
+        for sighting in userdata.after:
+            sighting.seen = True
+        return "done"
+
+    machine = StateMachine(["done", "failed", "preempted"], name="M")
+    with machine:
+        keys = ["before", "again", "lock", "after"]
+        machine.add("A", CBState(note, outcomes=["done"], io_keys=keys), {"done": "B"})
+        machine.add("B", Leaf("done", "failed", "preempted"))
+    sightings = [Sighting() for _ in range(3)]
+    for sighting in sightings:
+        sighting.seen = False
+    values = {"before": [1], "again": [2], "lock": [threading.Lock()], "after": sightings}
+    explore(machine, keep=["A"], userdata=values).assert_ok()
+    assert not any(marks)
+    assert not any(sighting.seen for sighting in sightings)
