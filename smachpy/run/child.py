@@ -84,7 +84,8 @@ class StateData:
     def copy(self) -> Self:
         """Return the data for a copy of the state, without anything that belongs to a run."""
         made = type(self)()
-        for name in ("outcomes", "input_keys", "output_keys", "options", "version", "code"):
+        names = ("outcomes", "input_keys", "output_keys", "options", "version", "is_async", "code")
+        for name in names:
             setattr(made, name, getattr(self, name))
         return made
 

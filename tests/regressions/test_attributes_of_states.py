@@ -374,3 +374,17 @@ def test_a_copy_is_a_state_of_its_own(clock, copied):
     assert not first.preempt_requested()
     assert machine_of(first).execute() == "done"
     assert current_clock() is clock
+
+
+async def say_done(userdata):
+    return "done"
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+@pytest.mark.parametrize(
+    "state", [smachpy.CBState(say_done, outcomes=["done"]), smachpy.state(["done"])(say_done)]
+)
+def test_a_copy_of_an_async_function_is_awaited_too(clock, state, copied):
+    """Its outcome was the coroutine."""
+    assert machine_of(copied(state)).execute() == "done"
+    assert current_clock() is clock
