@@ -67,9 +67,25 @@ def _positive(text: str, wanted: str) -> float:
 # -- output ----------------------------------------------------------------------------------------
 
 
+def json_text(value: Any) -> str:
+    """Return a value with the content of messages as JSON. JSON has no NaN or infinity: null."""
+    try:
+        return json.dumps(value, allow_nan=False)
+    except ValueError:
+        return json.dumps(_without_nan(value))
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def print_json(**fields: Any) -> None:
     """Print a JSON object on one line, and flush it."""
-    print(json.dumps(fields), flush=True)
+    print(json_text(fields), flush=True)
 
 
 def print_message(title: str, message: Any) -> None:

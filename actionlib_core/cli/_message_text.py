@@ -9,6 +9,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli._command import json_text
 from actionlib_core.exceptions import ActionlibError
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class MessageText:
         args = self._args
         value = follow(message.to_dict(), self._path, args.field or "")
         if args.json:
-            return json.dumps(value)
+            return json_text(value)
         value = shorten(value, self._limit, no_arr=args.no_arr, no_str=args.no_str)
         if args.csv:
             return _csv_line(flatten(value))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core._arguments import is_goal_id
 from actionlib_core.cli import EXIT_FAILED, UsageError
-from actionlib_core.cli._command import add_command, print_message
+from actionlib_core.cli._command import add_command, json_text, print_message
 from actionlib_core.cli._network import ask, class_of_end, find_server, open_node
 from actionlib_core.cli._ros2 import RemoteAction, is_ros2
 
@@ -119,7 +119,7 @@ def _info(args: argparse.Namespace) -> int:
         }
         only = [key for key in parts if getattr(args, f"{key}_only")]
         whole = status if args.status_only else {**status, **parts}
-        print(json.dumps(parts[only[0]] if only else whole))
+        print(json_text(parts[only[0]] if only else whole))
     else:
         _print_info(args, entry, goal, result)
     return EXIT_FAILED if status["status"] == "LOST" else 0

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
-from actionlib_core.cli._command import add_command, print_progress, rate, seconds
+from actionlib_core.cli._command import add_command, json_text, print_progress, rate, seconds
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     SERVICE_KINDS,
@@ -72,7 +71,7 @@ def _call(args: argparse.Namespace) -> int:
             except ServiceException as error:
                 tell("actionlib", str(error))
                 return EXIT_FAILED
-            shown = json.dumps(response.to_dict()) if args.json else f"response:\n{response!r}\n"
+            shown = json_text(response.to_dict()) if args.json else f"response:\n{response!r}\n"
             print(shown, flush=True)
             if not args.rate:
                 return 0

@@ -12,6 +12,7 @@ from actionlib_core.cli import EXIT_FAILED, UsageError, _topic_rates
 from actionlib_core.cli._command import (
     add_command,
     count,
+    json_text,
     print_progress,
     rate,
     seconds,
@@ -235,7 +236,7 @@ def _pub(args: argparse.Namespace) -> int:
             messages = _at_rate(node.clock, args.rate, message, times)
         for number, each in enumerate(messages, 1):
             publisher.publish(each)
-            shown = json.dumps(each.to_dict()) if args.json else f"publishing #{number}: {each!r}\n"
+            shown = json_text(each.to_dict()) if args.json else f"publishing #{number}: {each!r}\n"
             print(shown, flush=True)
     return 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import sys
 
 import pytest
@@ -13,7 +14,7 @@ from actionlib_core.cli import main
 from actionlib_core.cli._message_text import flatten, shorten, split_path, to_yaml
 from actionlib_core.interfaces.geometry_msgs.msg import Point, PoseStamped
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
-from actionlib_core.interfaces.std_msgs.msg import Int32, String
+from actionlib_core.interfaces.std_msgs.msg import Float64MultiArray, Int32, String
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 
 NODES = ("cli", "robot")
@@ -52,6 +53,17 @@ def test_list(cli, robot, capsys):
         "name": "/chatter", "types": ["std_msgs/msg/String"],
         "publishers": ["/robot"], "subscribers": ["/robot"],
     }  # fmt: skip
+
+
+def test_json_of_numbers_that_json_lacks(cli, robot, capsys):
+    """They were written as NaN and Infinity, which parsers of JSON refuse."""
+    scan = Publisher("scan", Float64MultiArray, latch=True, node=robot)
+    scan.publish(Float64MultiArray(data=[math.inf, 1.5, math.nan]))
+    assert cli("echo", "scan", "--once", "--json") == 0
+    wanted = {"layout": {"dim": [], "data_offset": 0}, "data": [None, 1.5, None]}
+    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail) == wanted
+    assert cli("pub", "x", "std_msgs/Float64", "{data: .nan}", "-1", "-w", "0", "--json") == 0
+    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail) == {"data": None}
 
 
 def test_info_and_type(cli, robot, capsys):
