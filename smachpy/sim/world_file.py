@@ -185,6 +185,7 @@ class _Reader:
         self.grid = read_file(file.top, "map", load_map, OFFICE_MAP)
         self._config = read_file(file.top, "robot", load_config, OFFICE_ROBOT)
         self._names: dict[tuple[str, str], int] = {}  # kind and name -> line
+        self._stands: list[tuple[float, float, float, str]] = []  # x, y, radius, name of robots
 
     def read_each(
         self, key: str, read: Callable[[Section, str], T], default_name: str
@@ -200,6 +201,10 @@ class _Reader:
         config = read_file(row, "config", load_config) if "config" in row else self._config
         pose = self._standing(row, config)
         config = replace(config or SimConfig(), start=pose)
+        if row.is_good("x", "y"):
+            radius = config.robot.radius
+            self._check_free(row, pose.x, pose.y, radius)
+            self._stands.append((pose.x, pose.y, radius, name))
         if "charge" in row:
             charge = row.number("charge", REQUIRED, _CHARGE)
             config = replace(config, battery=replace(config.battery, charge=charge))
@@ -214,6 +219,8 @@ class _Reader:
         places = []
         for place in row.rows("places"):
             places.append(self._place_on_map(place, "x", "y"))
+            if len(places) == 1 and place.is_good("x", "y"):
+                self._check_free(place, *places[0], radius)
             place.close()
         row.close()
         return MoverSpec(name, tuple(places), radius, speed, loop)
@@ -259,6 +266,13 @@ class _Reader:
                 reason = str(error).removeprefix("goal ")
                 row.problem("x", "a place where the robot can stand", f"{reason}.")
         return Pose2D(x, y, yaw)
+
+    def _check_free(self, row: Section, x: float, y: float, radius: float) -> None:
+        """Report the start of a thing where a robot above it in the file stands."""
+        for other_x, other_y, other_radius, name in self._stands:
+            if math.hypot(other_x - x, other_y - y) < other_radius + radius:
+                row.problem("x", "a free place", f"({x:.2f}, {y:.2f}) is taken by {name}.")
+                return
 
     def _place_on_map(self, row: Section, x_key: str, y_key: str) -> tuple[float, float]:
         x, y = (row.number(key, REQUIRED, unit="m") for key in (x_key, y_key))

@@ -36,7 +36,8 @@ def test_robots_on_one_place_are_named(tmp_path, capsys):
     path = tmp_path / "world.yaml"
     path.write_text("robots:\n  - {x: 9.8, y: 7.1}\n  - {x: 9.9, y: 7.1}\n")
     assert main(["--world", str(path)]) == 2
-    assert "robot_1: start pose: (9.90, 7.10) is taken by robot_0" in capsys.readouterr().err
+    expected = f"{path}:3: robots[1].x: got 9.9; expected a free place. (9.90, 7.10) is taken by"
+    assert expected in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -91,20 +92,39 @@ def test_a_mistake_is_named_with_line_and_field(write, text, line, field, messag
     assert message in str(problem)
 
 
-def test_two_robots_on_one_place_are_refused(write):
-    path = write("robots:\n  - {x: 4, y: 7.7}\n  - {x: 4.2, y: 7.7}\n")
-    expected = r"world\.yaml: robot_1: start pose: \(4\.20, 7\.70\) is taken by robot_0"
-    with pytest.raises(NavigationError, match=expected):
-        load_world(path).build(0.0)
+@pytest.mark.parametrize(
+    ("text", "line", "field", "message"),
+    [
+        (
+            "robots:\n  - {x: 4, y: 7.7}\n  - {x: 4.2, y: 7.7}\n",
+            5,
+            "robots[1].x",
+            "expected a free place. (4.20, 7.70) is taken by robot_0.",
+        ),
+        (
+            "robots: [{x: 4, y: 7.7}]\nmoving: [{name: visitor, places: [{x: 4.3, y: 7.7}]}]\n",
+            4,
+            "moving[0].places[0].x",
+            "(4.30, 7.70) is taken by robot_0.",
+        ),
+    ],
+)
+def test_nothing_begins_where_a_robot_stands(write, text, line, field, message):
+    (problem,) = problems(write(text))
+    assert (problem.line, problem.field) == (line, field)
+    assert message in str(problem)
 
 
-def test_what_moves_cannot_begin_where_a_robot_stands(write):
-    path = write(
-        "robots: [{x: 4, y: 7.7}]\nmoving: [{name: visitor, places: [{x: 4.3, y: 7.7}]}]\n"
-    )
-    expected = r"visitor: first place: \(4\.30, 7\.70\) is taken by robot_0"
-    with pytest.raises(NavigationError, match=expected):
-        load_world(path).build(0.0)
+def test_a_world_made_in_code_also_refuses_two_at_one_place(write):
+    spec = load_world(write("robots: [{x: 4, y: 7.7}]\nmoving: [{places: [{x: 6, y: 7.7}]}]\n"))
+    (robot,), (mover,) = spec.robots, spec.movers
+    twins = (robot, replace(robot, name="twin"))
+    with pytest.raises(
+        NavigationError, match=r"twin: start pose: \(4\.00, 7\.70\) is taken by robot_0"
+    ):
+        replace(spec, robots=twins).build(0.0)
+    with pytest.raises(NavigationError, match=r"first place: \(4\.00, 7\.70\) is taken by robot_0"):
+        replace(spec, movers=(replace(mover, places=((4.0, 7.7),)),)).build(0.0)
 
 
 def test_robots_by_number_stand_apart_and_near_the_first(office, office_robot):
