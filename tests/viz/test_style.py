@@ -61,6 +61,13 @@ def test_no_text_gets_into_markup_as_markup(text):
     assert len(shorten(text)) <= 40
 
 
+@pytest.mark.parametrize(
+    "text", ["\u0645\u06cc\u200c\u062e\u0648\u0627\u0647\u0645", "\U0001f469\u200d\U0001f680"]
+)
+def test_joiners_inside_words_and_emoji_are_kept(text):
+    assert shorten(text) == text
+
+
 def test_values_that_look_like_markup_stay_text():
     import graphviz
 

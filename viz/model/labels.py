@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from smachpy.outcome_classes import OutcomeClass
 
 LABEL_LENGTH = 40
+# Not "printable" for Python, but part of words in Persian and Hindi, and of emoji.
+_JOINERS = frozenset("\u200c\u200d")
 # Glyphs that both Liberation Sans and Arial have, so that no picture shows empty boxes.
 GLYPHS = {"action": "\u25ba", "service": "\u2194", "monitor": "\u25cf", "condition": "?"}
 KIND_WORDS = {
@@ -47,7 +49,9 @@ def innermost(paths: Collection[str]) -> list[str]:
 def one_line(text: str) -> str:
     """Return a text on one line; characters that cannot be printed become U+FFFD."""
     line = " ".join(text.split())
-    return line if line.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in line)
+    if line.isprintable():
+        return line
+    return "".join(c if c.isprintable() or c in _JOINERS else "\ufffd" for c in line)
 
 
 def shorten(text: str, length: int = LABEL_LENGTH) -> str:
