@@ -398,7 +398,7 @@ class Concurrence(Container):
         known = self._smachpy.outcomes
         if answer and answer not in known:
             raise InvalidTransitionError(unknown_name(f"{frame.path}: outcome_cb", answer, known))
-        return str(answer) if answer else None
+        return answer or None
 
 
 def _outcomes(group: Group) -> dict[str, str | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import os
 import signal
 import threading
@@ -466,3 +467,18 @@ def test_what_follows_an_asked_child_in_such_a_container_has_the_grace(clock):
     clock.call_later(1.0, machine.request_preempt)
     assert machine.execute() == "preempted"
     assert clock.now() == pytest.approx(1.0 + GRACE_S)
+
+
+class Ends(str, enum.Enum):  # noqa: UP042  its `str` is not its value
+    DONE = "done"
+
+
+def test_an_outcome_callback_may_return_a_member_of_an_enumeration(clock):
+    """The concurrence ended with the text 'Ends.DONE', which was no outcome of it."""
+    machine = StateMachine(["end"])
+    both = Concurrence([Ends.DONE], Ends.DONE, outcome_cb=lambda _ended: Ends.DONE)
+    with machine:
+        machine.add("BOTH", both, {Ends.DONE: "end"})
+        both.add("A", smachpy.CBState(lambda _userdata: Ends.DONE, outcomes=[Ends.DONE]))
+    assert machine.execute() == "end"
+    assert clock.now() == 0.0
