@@ -77,7 +77,9 @@ class Reply:
     def __post_init__(self) -> None:
         problems = Problems("reply")
         for name in ("duration", "accept_after", "die_after", "back_after"):
-            problems.seconds(name, getattr(self, name), optional=name != "duration")
+            seconds = problems.seconds(name, getattr(self, name), optional=name != "duration")
+            if seconds is not None:  # else None, which stays, or infinity
+                setattr(self, name, seconds)
         problems.raise_all()
 
 
@@ -376,8 +378,9 @@ class ScriptedActionServer(ScriptedEnd):
 
     def accept_late(self, after: float, **reply: Any) -> Reply:
         """Accept the next goal `after` this long [s], then answer as `reply`."""
+        checked = Reply(accept_after=after)
         made = self.reply(**reply)
-        made.accept_after = after
+        made.accept_after = checked.accept_after
         return made
 
     def reject(self, text: str = "rejected by the test") -> Reply:

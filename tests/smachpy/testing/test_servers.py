@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from actionlib_core import Duration
 from actionlib_core.interfaces.move_base_msgs.msg import (
     MoveBaseAction,
     MoveBaseFeedback,
@@ -49,10 +50,16 @@ SCRIPTS = [
     (lambda server: server.reply(duration="5"), "Try 5"),
     (lambda server: server.die(after=-1), "die_after: got -1"),
 ]
-CONDITION = (lambda server: server.reply_conditionally(waits), r"predicate\(goal\), not an async")
+OF_ACTIONS = [
+    (
+        lambda server: server.reply_conditionally(waits),
+        r"predicate\(goal\), not an async",
+    ),
+    (lambda server: server.accept_late("5"), "accept_after: got '5'"),
+]
 
 
-@pytest.mark.parametrize(("script", "problem"), [*SCRIPTS, CONDITION])
+@pytest.mark.parametrize(("script", "problem"), [*SCRIPTS, *OF_ACTIONS])
 def test_a_script_that_could_not_work_is_refused(mission, script, problem):
     """A function whose body nothing would run was called, and the goal left without an answer."""
     server = mission.action_server("move_base", MoveBaseAction)
@@ -65,6 +72,16 @@ def test_a_script_of_a_service_that_could_not_work_is_refused(mission, script, p
     service = mission.service_server("dock", Trigger)
     with pytest.raises(InvalidStateError, match=problem):
         script(service)
+
+
+def test_durations_of_a_script_may_be_durations_of_ros(mission):
+    """They were accepted and then ended the server with a TypeError."""
+    server = mission.action_server("move_base", MoveBaseAction)
+    server.accept_late(Duration(2), duration=Duration(1))
+    server.reply(duration=Duration(1))
+    run = mission(drive_twice())
+    assert run.outcome == "succeeded"
+    assert mission.clock.now() == pytest.approx(4.0, abs=0.5)  # and the way of the messages
 
 
 def drive_twice():
