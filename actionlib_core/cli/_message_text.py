@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.interfaces import Message
 
-_STEP = re.compile(r"\.?(?P<field>[A-Za-z_]\w*)|\[(?P<index>-?\d+)\]")
+_STEP = re.compile(r"\.?(?P<field>[A-Za-z_]\w*)|\[(?P<index>-?[0-9]{1,9})\]")
 
 
 class FieldPathError(ActionlibError, ValueError):

@@ -136,6 +136,9 @@ def test_echo_of_a_field_that_is_not_there(cli, robot, capsys):
     assert "'q' is not there; there are ['x', 'y', 'z']" in capsys.readouterr().err
     assert cli("echo", "pose", "--once", "--field", "pose..x") == 2
     assert "field path: malformed at 4" in capsys.readouterr().err
+    long = f"data[{'1' * 5000}]"  # Python converts no integer of so many digits
+    assert cli("echo", "chatter", "--field", long, "--once") == 2
+    assert "field path: malformed at 4" in capsys.readouterr().err
 
 
 def test_echo_shortens_long_arrays_unless_told_not_to(cli, robot, capsys):
