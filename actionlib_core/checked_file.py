@@ -83,6 +83,7 @@ class Limits:
 
 
 ANY_NUMBER: Final = Limits()
+MAX_BYTES: Final = 16 << 20  # far more than people write; a device such as /dev/zero never ends
 _MAPPING: Final = "a mapping of names to values"
 
 
@@ -158,7 +159,13 @@ class CheckedFile:
         self._lines: dict[str, int] = {}
         try:
             # Not `read_text`, which changes line ends, also those inside the cells of a CSV file.
-            data, self._lines = parse(self, path.read_bytes().decode("utf-8-sig"))
+            with path.open("rb") as opened:
+                content = opened.read(MAX_BYTES + 1)
+            if len(content) > MAX_BYTES:
+                size = f"{MAX_BYTES >> 20} MiB"
+                self.report("", f"got more than {size}; expected a file that people write.", 0)
+                raise error(self.problems)
+            data, self._lines = parse(self, content.decode("utf-8-sig"))
         except (OSError, UnicodeDecodeError) as reason:
             got = repr(reason.strerror) if isinstance(reason, OSError) else "no UTF-8"
             self.report("", f"got {got}; expected a readable text.", 0)

@@ -282,6 +282,14 @@ def test_unreadable_files_are_refused(tmp_path):
         assert error.value.__cause__ is not None
 
 
+def test_a_file_that_never_ends_is_refused(tmp_path):
+    path = tmp_path / "zeros.yaml"
+    path.symlink_to("/dev/zero")
+    with pytest.raises(WrongFileError, match="16 MiB") as error:
+        CheckedFile(path, WrongFileError)
+    assert error.value.problems[0].file == str(path)
+
+
 def test_lines_are_those_of_merged_and_repeated_parts(read):
     file = read("base: &b\n  x: no\nrobot:\n  <<: *b\n  y: 1\ncopy: *b\n")
     for name in ("robot", "copy"):
