@@ -127,7 +127,7 @@ robots:
 - {x: 4, y: 7.7, config: 7}           #! robots[0].config
 - {y: far}                            #! robots[1].x robots[1].y
 - {x: 99, y: 1}                       #! robots[2].x
-- x: 4
+- x: 4                                #! robots[3].x
   y: 7.7
   name: my robot                      #! robots[3].name
   charge: 3                           #! robots[3].charge
