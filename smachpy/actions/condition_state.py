@@ -74,6 +74,8 @@ class ConditionState(State):
         for topic in self.__wake_on:
             if not (isinstance(topic, (tuple, list)) and len(topic) == 2):  # noqa: PLR2004  a pair
                 problems.add(f"wake_on: got {topic!r} in it; expected (topic, message class).")
+            else:
+                problems.network_name("wake_on", topic[0])
         if poll_rate is None and not self.__wake_on:
             problems.add(
                 "poll_rate: got None without topics; expected seconds between two checks. Try "

@@ -121,6 +121,9 @@ def test_arguments_without_a_meaning_are_refused():
         ConditionState(Answers(True), poll_rate=None)
     with pytest.raises(InvalidStateError, match="cond_cb: got 3"):
         ConditionState(3)
+    for topic in ("two words", "", 3, None):
+        with pytest.raises(InvalidStateError, match="wake_on"):
+            ConditionState(Answers(True), wake_on=[(topic, Bool)])
 
 
 def test_it_describes_itself():
