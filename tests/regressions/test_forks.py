@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 
 import pytest
 
@@ -58,6 +59,10 @@ def machine_of(kind, work):
 @pytest.mark.parametrize("kind", [StateMachine, Concurrence])
 def test_a_signal_ends_a_process_that_a_state_has_forked(kind, number):
     """`multiprocessing.Process.terminate` did nothing, so that its `join` waited for ever."""
+    if sys.version_info[:2] == (3, 13) and kind is Concurrence and number == signal.SIGINT:
+        pytest.skip(
+            "Python 3.13 runs no signal handler in a process forked outside the main thread"
+        )
     ends = []
 
     def work(userdata):
