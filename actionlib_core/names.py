@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/~]")
-_mender: list[Callable[[str, str], str]] = []
+_replacement: list[Callable[[str, str], str]] = []
 _EMPTY: Mapping[str, str] = MappingProxyType({})
 
 
-def set_mender(mender: Callable[[str, str], str] | None) -> None:
-    """Let `mender(name, kind)` replace names that the ROS rules forbid; None: refuse them.
+def set_name_replacement(replace: Callable[[str, str], str] | None) -> None:
+    """Let `replace(name, kind)` replace names that the ROS rules forbid; None: refuse them.
 
     The rules were only a warning in rospy, so programs for ROS 1 have such names.
     """
-    _mender[:] = [] if mender is None else [mender]
+    _replacement[:] = [] if replace is None else [replace]
 
 
 def check_name(name: str, kind: str = "name") -> str:
-    """Return `name` if the ROS rules allow it; see also `set_mender`.
+    """Return `name` if the ROS rules allow it; see also `set_name_replacement`.
 
     Args:
         name: Relative (`move_base`), absolute (`/robot_1/move_base`) or private (`~goal`).
@@ -44,8 +44,8 @@ def check_name(name: str, kind: str = "name") -> str:
         InvalidNameError: a rule is broken; the text marks the first offending character.
     """
     made, problem = name, _find_problem(name)
-    if problem is not None and _mender:
-        made = _mender[0](name, kind)
+    if problem is not None and _replacement:
+        made = _replacement[0](name, kind)
         problem = None if _find_problem(made) is None else problem
     if problem is not None:
         reason, index = problem

@@ -272,9 +272,11 @@ def _after_fork() -> None:
 
 
 def _after_fork_in_child() -> None:
-    for restore in restorers:
-        restore()
-    _after_fork()
+    try:
+        for restore in restorers:
+            restore()
+    finally:
+        _after_fork()  # or the process could not be ended by a signal
 
 
 if hasattr(os, "register_at_fork"):

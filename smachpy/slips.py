@@ -12,7 +12,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actionlib_core.names import set_mender
+from actionlib_core.names import set_name_replacement
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -42,11 +42,11 @@ def accepting() -> bool:
 def set_accepting(on: bool) -> None:
     """Accept slips from now on, or refuse them, and warn of each one again."""
     ACCEPTING[0] = on
-    set_mender(_mend_name if on else None)
+    set_name_replacement(_allowed_name if on else None)
     _warned.clear()
 
 
-def _mend_name(name: str, kind: str) -> str:
+def _allowed_name(name: str, kind: str) -> str:
     """Return a name that the network allows for one that rospy allowed."""
     single = re.sub("//+", "/", name)
     single = single.rstrip("/") or single

@@ -391,7 +391,7 @@ def serve(args: argparse.Namespace) -> int:
     """
     with shutdown.handle_signals() as ending, contextlib.ExitStack() as stack:
         if args.child:
-            current_clock().spawn(lambda: end_with_stdin(ending), name="lifeline")
+            current_clock().spawn(lambda: end_with_stdin(ending), name="end with parent")
         body = (
             make_body(args.site, Pose2D(*args.pose) if args.pose else None) if args.body else None
         )

@@ -123,7 +123,7 @@ def serve(args: argparse.Namespace) -> int:
 
     with shutdown.handle_signals() as ending:
         if args.child:
-            current_clock().spawn(lambda: end_with_stdin(ending), name="lifeline")
+            current_clock().spawn(lambda: end_with_stdin(ending), name="end with parent")
         alone = args.world is None and not args.robots
         served = make_robot(args.map, args.config, args.pose or ()) if alone else None
         spec = _world(args) if served is None else None

@@ -111,3 +111,12 @@ def test_a_signal_just_after_the_fork_is_not_lost(monkeypatch):
 
     assert machine_of(StateMachine, work).execute() == "done"
     assert ends == [-signal.SIGTERM]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_signals_are_not_blocked_in_a_child_where_a_restorer_has_raised(monkeypatch):
+    def fail():
+        raise RuntimeError
+
+    monkeypatch.setattr(shutdown, "restorers", [fail, *shutdown.restorers])
+    assert end_of_child(signal.SIGTERM) == signal.SIGTERM

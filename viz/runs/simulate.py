@@ -16,7 +16,7 @@ from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock import current_clock
+from actionlib_core.clock import RealClock, current_clock
 from smachpy.command.arguments import Text, parameters_of
 from smachpy.command.extras import advice
 from smachpy.command.runner import NO_NAMES, build, needed_servers
@@ -331,7 +331,7 @@ def _end_with_parent() -> None:
         parent.join()
         os._exit(1)  # from this thread, `sys.exit` would end only the thread
 
-    threading.Thread(target=wait, name="lifeline", daemon=True).start()
+    RealClock().spawn(wait, name="end with parent")
 
 
 def _words(error: BaseException) -> str:
