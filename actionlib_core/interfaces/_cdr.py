@@ -192,7 +192,7 @@ def _write_loop(output: _Output, kind: FieldType, values: str, resolve: Resolve)
 # --- reading -----------------------------------------------------------------------------------
 
 
-class _Cursor(Cursor):
+class _AlignedCursor(Cursor):
     """Reads aligned values; the position is known to be `_at` modulo `_modulus`."""
 
     def __init__(self, source: Source, offset: str) -> None:
@@ -249,7 +249,7 @@ def _make_reader(
     source.add(f"d = bytes(memoryview(d)[{len(_HEADER)}:])")
     source.add("try:")
     source.indent += 1
-    cursor = _Cursor(source, "0")
+    cursor = _AlignedCursor(source, "0")
     result = read_message(cursor, cls, definition.fields, resolve)
     cursor.flush()
     end = cursor.position()

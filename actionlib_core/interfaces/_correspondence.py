@@ -11,9 +11,9 @@ import contextlib
 from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core.exceptions import CorrespondenceError, FieldError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces._definition import FLOATS, INTEGERS, OCTETS
 from actionlib_core.interfaces._values import coerced
-from actionlib_core.suggest import did_you_mean
 from actionlib_core.time import Duration, Time
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces._arrays import STRUCT_CODES
-from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -57,7 +57,7 @@ RESERVED = frozenset(
 )
 
 _LENGTH_DIGITS = 18  # of an array's length; with more, any array is too large
-_LONGEST_SHOWN = 40
+_MAX_SHOWN_LENGTH = 40
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _TYPE = re.compile(r"([A-Za-z0-9_/]+?)(\[(\d*)\])?\Z")
@@ -66,7 +66,7 @@ _TYPE_PATH = re.compile(r"([a-zA-Z][A-Za-z0-9_]*/)?[A-Za-z][A-Za-z0-9_]*\Z")
 
 
 @dataclass(frozen=True, slots=True)
-class Position:
+class TextPosition:
     """A position in a definition, for error messages."""
 
     source: str
@@ -134,7 +134,7 @@ class Field:
 
     name: str
     type: FieldType
-    position: Position = field(compare=False, repr=False)
+    position: TextPosition = field(compare=False, repr=False)
     comment: str = ""
     default: Any = None
 
@@ -209,11 +209,11 @@ def parse(name: str, text: str, *, source: str = "", first_line: int = 1) -> Def
     Raises:
         InterfaceError: Malformed lines; the error lists all of them.
     """
-    reader = _Ros2Reader if name.count("/") > 1 else _Reader
+    reader = _Ros2Reader if name.count("/") > 1 else _DefinitionParser
     return reader(name, source or name, first_line).read(text)
 
 
-class _Reader:
+class _DefinitionParser:
     """Collects fields, constants and problems of one message text, line by line."""
 
     def __init__(self, name: str, source: str, first_line: int) -> None:
@@ -239,7 +239,7 @@ class _Reader:
                 head = head or ([] if self.seen else block)
                 block = []
                 continue
-            at = Position(self.source, number, len(code) - len(code.lstrip()), line)
+            at = TextPosition(self.source, number, len(code) - len(code.lstrip()), line)
             self._line(at, code, " ".join(filter(None, [*block, comment.strip()])))
             block = []
         if self.problems:
@@ -254,7 +254,7 @@ class _Reader:
         code, _, comment = line.partition("#")
         return code, comment
 
-    def _line(self, at: Position, code: str, comment: str) -> None:
+    def _line(self, at: TextPosition, code: str, comment: str) -> None:
         words = code.split(None, 1)
         kind = self._type(at, words[0])
         if kind is None:
@@ -269,14 +269,14 @@ class _Reader:
         else:
             self._field(at, column, kind, words[1].strip(), comment)
 
-    def _type(self, at: Position, text: str) -> FieldType | None:
+    def _type(self, at: TextPosition, text: str) -> FieldType | None:
         match = _TYPE.match(text)
         if match is None or not _TYPE_PATH.match(match[1]):
             self._bad_type(at, text)
             return None
         base, is_array, length = match[1], match[2] is not None, (match[3] or "").lstrip("0")
         if len(length) > _LENGTH_DIGITS:
-            shown = text if len(text) < _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+            shown = text if len(text) < _MAX_SHOWN_LENGTH else f"{text[:_MAX_SHOWN_LENGTH]}..."
             self._problem(at, at.column, f"{shown}: {too_large(f'10^{len(length) - 1} bytes')}")
             return None
         if base == "Header":
@@ -285,7 +285,7 @@ class _Reader:
             base = f"{self.package}/{base}"
         return FieldType(base, is_array, int(length or 0) if match[3] else None)
 
-    def _bad_type(self, at: Position, text: str) -> None:
+    def _bad_type(self, at: TextPosition, text: str) -> None:
         if "<=" in text:
             what = (
                 f"bounded type {text!r} is ROS 2's; expected ROS 1's `string`, `type[]`, "
@@ -300,7 +300,9 @@ class _Reader:
             what = f"malformed type {text!r}; expected a built-in type or `package/Name`.{hint}"
         self._problem(at, at.column, what)
 
-    def _field(self, at: Position, column: int, kind: FieldType, name: str, comment: str) -> None:
+    def _field(
+        self, at: TextPosition, column: int, kind: FieldType, name: str, comment: str
+    ) -> None:
         words = name.split()
         if len(words) > 1 and _NAME.match(words[0]):
             what = f"unexpected {words[1]!r} behind the field name; expected `type name`"
@@ -308,11 +310,11 @@ class _Reader:
             self._problem(at, column + name.index(words[1], len(words[0])), what + hint)
             return
         if self._check_name(at, column, name, "field"):
-            where = Position(at.source, at.line, at.column, at.text)
+            where = TextPosition(at.source, at.line, at.column, at.text)
             self.fields.append(Field(name, kind, where, comment))
 
     def _constant(
-        self, at: Position, column: int, kind: FieldType, code: str, comment: str
+        self, at: TextPosition, column: int, kind: FieldType, code: str, comment: str
     ) -> None:
         name = code.split("=", 1)[0].strip()
         if kind.is_array or not kind.is_builtin or kind.base in TIMES:
@@ -333,7 +335,7 @@ class _Reader:
             return
         self.constants.append(Constant(name, kind.base, value, raw.strip(), comment))
 
-    def _check_name(self, at: Position, column: int, name: str, what: str) -> bool:
+    def _check_name(self, at: TextPosition, column: int, name: str, what: str) -> bool:
         if not _NAME.match(name):
             rule = "a letter, then letters, digits and underscores"
             self._problem(at, column, f"invalid {what} name: got {name!r}; expected {rule}")
@@ -345,8 +347,8 @@ class _Reader:
         self.seen[name] = at.line
         return True
 
-    def _problem(self, at: Position, column: int, what: str) -> None:
-        where = Position(at.source, at.line, column, at.text)
+    def _problem(self, at: TextPosition, column: int, what: str) -> None:
+        where = TextPosition(at.source, at.line, column, at.text)
         self.problems.append(where.problem(what))
 
 
@@ -356,7 +358,7 @@ _ROS2_TYPE = re.compile(
 )
 
 
-class _Ros2Reader(_Reader):
+class _Ros2Reader(_DefinitionParser):
     """The parser of ROS 2's dialect.
 
     Source: https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
@@ -376,7 +378,7 @@ class _Ros2Reader(_Reader):
                 quote = character
         return line, ""
 
-    def _type(self, at: Position, text: str) -> FieldType | None:
+    def _type(self, at: TextPosition, text: str) -> FieldType | None:
         match = _ROS2_TYPE.match(text)
         if (
             match is None
@@ -421,7 +423,9 @@ class _Ros2Reader(_Reader):
             "has it"
         )
 
-    def _field(self, at: Position, column: int, kind: FieldType, name: str, comment: str) -> None:
+    def _field(
+        self, at: TextPosition, column: int, kind: FieldType, name: str, comment: str
+    ) -> None:
         name, _, value = name.partition(" ")
         if not self._check_name(at, column, name, "field"):
             return
@@ -436,7 +440,7 @@ class _Ros2Reader(_Reader):
         self.fields.append(Field(name, kind, at, comment, default))
 
     def _constant(
-        self, at: Position, column: int, kind: FieldType, code: str, comment: str
+        self, at: TextPosition, column: int, kind: FieldType, code: str, comment: str
     ) -> None:
         name, _, raw = (part.strip() for part in code.partition("="))
         if kind.is_array or not kind.is_builtin:
@@ -504,10 +508,12 @@ def _constant_value(kind: str, text: str) -> bool | int | float | str:
 # --- size and depth: types that no computer could handle are refused at their definition --------
 
 LARGEST = 100_000_000  # size of a message with its default values [bytes]
-MOST_FIELDS = 50_000  # the generated code has a line for each field
-DEEPEST = 50  # nested types: checking and printing values is recursive
+MAX_FIELDS = 10_000  # the generated code has a line for each field; those of ROS have some hundreds
+MAX_TYPE_NESTING = 50  # nested types: checking and printing values is recursive
 NESTED = "types in one another"
-MOST_LOOPS = 19  # nested arrays: CPython allows 20 nested blocks, and the code's `try` is one
+MAX_ARRAY_NESTING = (
+    19  # nested arrays: CPython allows 20 nested blocks, and the code's `try` is one
+)
 
 _SIZES = {base: struct.calcsize(f"<{code}") for base, code in STRUCT_CODES.items()}
 _SIZES |= {"string": 4, "time": 8, "duration": 8}
@@ -554,9 +560,9 @@ def message_extent(fields: Iterable[Extent]) -> Extent:
 def find_excess(extent: Extent) -> tuple[str, str] | None:
     """Return the attribute of a message's extent that is too large, and the problem, or None."""
     problems = {
-        "fields": (MOST_FIELDS, "fields, nested ones counted"),
-        "depth": (DEEPEST, NESTED),
-        "loops": (MOST_LOOPS, "arrays in one another"),
+        "fields": (MAX_FIELDS, "fields, nested ones counted"),
+        "depth": (MAX_TYPE_NESTING, NESTED),
+        "loops": (MAX_ARRAY_NESTING, "arrays in one another"),
     }
     for attribute, (most, what) in problems.items():
         if (value := getattr(extent, attribute)) > most:

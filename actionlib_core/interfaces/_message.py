@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 
 from actionlib_core.exceptions import FieldError, InterfaceError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces import _arrays
 from actionlib_core.interfaces._codegen import make_codecs
 from actionlib_core.interfaces._definition import attribute_of
@@ -20,7 +22,6 @@ from actionlib_core.interfaces._values import (
     to_time,
 )
 from actionlib_core.interfaces._yaml import dump, load
-from actionlib_core.suggest import did_you_mean
 from actionlib_core.time import Duration, Time
 
 if TYPE_CHECKING:
@@ -54,6 +55,8 @@ class Message:
 
     __slots__: ClassVar[Any] = ()
     __hash__ = None  # type: ignore[assignment] # mutable
+    __test__: ClassVar[bool] = False
+    """For pytest, which takes an imported class `TestGoal` for tests."""
 
     _wire: ClassVar[str] = "ros1"
     """The serialisation: "ros1", also used by smachpy's own wire, or "ros2"."""
@@ -226,7 +229,7 @@ def make_class(
     """
     slots = [field.attribute for field in definition.fields]
     names = [*slots, *(constant.attribute for constant in definition.constants)]
-    if twice := {name for name in names if names.count(name) > 1}:
+    if twice := [name for name, count in Counter(names).items() if count > 1]:
         raise InterfaceError(f"{definition.source}: Python names used twice: {sorted(twice)}")
     namespace: dict[str, Any] = {
         "__slots__": slots,

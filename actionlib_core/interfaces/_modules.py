@@ -11,9 +11,9 @@ from importlib.machinery import ModuleSpec
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces._registry import ROOT, Registry, registry
 from actionlib_core.interfaces._ros2 import is_only_ros2, ros2_registry
-from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _SECTIONS: dict[str, Kind] = {"msg": "msg", "srv": "srv", "action": "action"}
 
 
-class _Section(types.ModuleType):
+class _SectionModule(types.ModuleType):
     """The module `pkg.msg`, `pkg.srv` or `pkg.action`; its classes are made on first use."""
 
     def __init__(self, name: str, package: str, kind: Kind, source: Registry) -> None:
@@ -111,7 +111,7 @@ class _Finder(MetaPathFinder, Loader):
             return _Package(spec.name, package)
         source = self._choose(package, section)
         assert source is not None
-        return _Section(spec.name, package, _SECTIONS[section], source)
+        return _SectionModule(spec.name, package, _SECTIONS[section], source)
 
     def exec_module(self, module: types.ModuleType) -> None:
         """Do nothing: there is no code to run, the module looks its classes up."""

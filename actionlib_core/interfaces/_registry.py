@@ -8,9 +8,10 @@ import threading
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces._definition import (
     BUILTINS,
-    DEEPEST,
+    MAX_TYPE_NESTING,
     NESTED,
     Definition,
     Extent,
@@ -22,7 +23,6 @@ from actionlib_core.interfaces._definition import (
 )
 from actionlib_core.interfaces._message import Message, make_class
 from actionlib_core.interfaces._sources import PATH_VARIABLE, Kind, Source, Sources
-from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
     import os
@@ -37,17 +37,27 @@ class ServiceType:
     """Base of all service classes; a class is a pair of message classes, never instantiated."""
 
     __slots__: ClassVar[Any] = ()
+    __test__: ClassVar[bool] = False  # for pytest, as in `Message`
     _wire: ClassVar[str] = "ros1"
     _type: ClassVar[str]
     """ROS name, "pkg/Name"."""
     _md5sum: ClassVar[str]
     """ROS 1 checksum over request and response."""
-    _request_class: ClassVar[type[Message]]
-    _response_class: ClassVar[type[Message]]
+    _request_class: ClassVar[Any]  # the stubs of the services say which
+    _response_class: ClassVar[Any]
+
+    if TYPE_CHECKING:
+
+        @staticmethod
+        def _call(*args: Any, **kwargs: Any) -> tuple[Any, Any]:
+            """Only in the stubs: arguments of the request; the request and the response."""
 
 
 class UnknownTypeError(InterfaceError):
-    """There is no definition of the type `name`."""
+    """There is no definition of the type `name`.
+
+    Try: check the spelling; `SMACHPY_INTERFACE_PATH` names folders with definitions.
+    """
 
     def __init__(self, text: str, name: str) -> None:
         self.name = name
@@ -216,9 +226,11 @@ class Registry:
         for field in definition.fields:
             if field.type.is_builtin or field.type.base in self._messages:
                 continue
-            if len(self._building) >= DEEPEST:
+            if len(self._building) >= MAX_TYPE_NESTING:
                 problems.append(
-                    field.position.problem(too_many(f"over {DEEPEST}", NESTED, DEEPEST))
+                    field.position.problem(
+                        too_many(f"over {MAX_TYPE_NESTING}", NESTED, MAX_TYPE_NESTING)
+                    )
                 )
                 continue
             try:

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces._cdr import make_cdr_codecs
 from actionlib_core.interfaces._definition import parse
 from actionlib_core.interfaces._message import Message, Ros2Message, make_class
 from actionlib_core.interfaces._registry import ROOT, Registry, UnknownTypeError, registry
+from actionlib_core.interfaces._rihs01 import rihs01_of
 from actionlib_core.interfaces._sources import (
     ACTION_PARTS,
     BUNDLED,
@@ -27,7 +29,6 @@ from actionlib_core.interfaces._sources import (
     Sources,
     action_messages,
 )
-from actionlib_core.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from actionlib_core.interfaces._definition import Definition
@@ -66,6 +67,7 @@ class Ros2Service:
     """Base of ROS 2's service classes; a class is a pair of message classes, never instantiated."""
 
     __slots__: ClassVar[Any] = ()
+    __test__: ClassVar[bool] = False  # for pytest, as in `Message`
     _wire: ClassVar[str] = "ros2"
     _type: ClassVar[str]
     """ROS name, "pkg/srv/Name"."""
@@ -85,6 +87,7 @@ class Ros2Action:
     actionlib's goal id or status. These three are never sent.
     """
 
+    __test__: ClassVar[bool] = False  # for pytest, as in `Message`
     _wire: ClassVar[str] = "ros2"
     _type: ClassVar[str]
     """ROS name, "pkg/action/Name"."""
@@ -147,17 +150,17 @@ class ActionParts(NamedTuple):
     status: TopicParts
 
 
-class _Entry(NamedTuple):
+class _RosType(NamedTuple):
     distros: tuple[str, ...]
     source: Source
     first_line: int
 
 
 @functools.cache
-def _entries(package: str) -> dict[tuple[str, str], list[_Entry]]:
+def _entries(package: str) -> dict[tuple[str, str], list[_RosType]]:
     """Read the bundled definitions of a package, by kind and name."""
     path = _DEFINITIONS / f"{package}.txt"
-    found: dict[tuple[str, str], list[_Entry]] = {}
+    found: dict[tuple[str, str], list[_RosType]] = {}
     # Unlike `Path.is_file`, this is False also for a name that no file can have.
     if not package.isidentifier() or not os.path.isfile(path):  # noqa: PTH113
         return found
@@ -168,7 +171,7 @@ def _entries(package: str) -> dict[tuple[str, str], list[_Entry]]:
         assert heading is not None
         distros = tuple((heading[3] or " ".join(DISTROS)).split())
         source = Source("\n".join(lines[start + 1 : end]).rstrip() + "\n", str(path))
-        entry = _Entry(distros, source, start + 2)
+        entry = _RosType(distros, source, start + 2)
         found.setdefault((heading[1], heading[2]), []).append(entry)
     return found
 
@@ -212,7 +215,7 @@ class Ros2Sources(Sources):
         ours = {name for found, name in self._bundled(package) if found == kind}
         return sorted({*super().names(kind, package), *ours})
 
-    def _bundled(self, package: str) -> dict[tuple[str, str], list[_Entry]]:
+    def _bundled(self, package: str) -> dict[tuple[str, str], list[_RosType]]:
         fitting = {
             key: [entry for entry in entries if self._distro in entry.distros]
             for key, entries in _entries(package).items()
@@ -327,9 +330,7 @@ class Ros2Registry(Registry):
                 raise InterfaceError(
                     f"interface name: got {full!r}; expected 'package/msg/Name' (or srv, action)"
                 )
-            from actionlib_core.interfaces import _typesys
-
-            self._hashes[full] = _typesys.ros2_hash(full, self.fields)
+            self._hashes[full] = rihs01_of(full, self.fields)
         return self._hashes[full]
 
     def fields(self, full: str) -> list[tuple[str, str]]:

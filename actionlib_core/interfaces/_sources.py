@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from actionlib_core.exceptions import InterfaceError, InterfaceWarning
-from actionlib_core.interfaces._definition import Position
+from actionlib_core.inputs.checked_file import read_limited
+from actionlib_core.interfaces._definition import TextPosition
 
 Kind = Literal["msg", "srv", "action"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -21,6 +22,9 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 PATH_VARIABLE = "SMACHPY_INTERFACE_PATH"
 BUNDLED = Path(__file__).parent / "share"
 """The folder of the definitions that come with this package."""
+
+LARGEST_FILE = 1_000_000
+"""Largest file of a definition [bytes]."""
 
 _SEPARATOR = "---"
 # Text copied from printed course notes may have an en or em dash for the three hyphens.
@@ -40,14 +44,14 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class DefinitionSection:
     """One part of a definition, and the number of its first line."""
 
     text: str
     first_line: int
 
 
-def split(text: str, parts: tuple[str, ...], source: str) -> tuple[Section, ...]:
+def split(text: str, parts: tuple[str, ...], source: str) -> tuple[DefinitionSection, ...]:
     """Split a definition at its separators.
 
     Args:
@@ -71,7 +75,7 @@ def split(text: str, parts: tuple[str, ...], source: str) -> tuple[Section, ...]
         if match is None:
             sections[-1].append(line)
             continue
-        at = Position(source, number, line.index(match[1]), line)
+        at = TextPosition(source, number, line.index(match[1]), line)
         if len(starts) > wanted:
             raise InterfaceError(at.problem(f"one separator too many; {expected}"))
         if match[1] != _SEPARATOR:
@@ -80,10 +84,10 @@ def split(text: str, parts: tuple[str, ...], source: str) -> tuple[Section, ...]
         sections.append([])
         starts.append(number + 1)
     if len(starts) <= wanted:
-        at = Position(source, len(lines) or 1, 0, lines[-1] if lines else "")
+        at = TextPosition(source, len(lines) or 1, 0, lines[-1] if lines else "")
         raise InterfaceError(at.problem(f"got {len(starts) - 1} separators; {expected}"))
     return tuple(
-        Section("\n".join(part) + "\n" if part else "", start)
+        DefinitionSection("\n".join(part) + "\n" if part else "", start)
         for part, start in zip(sections, starts, strict=True)
     )
 
@@ -166,7 +170,7 @@ class Sources:
                     return Source(_text_of(path), str(path))
         return None
 
-    def sections(self, kind: Kind, package: str, name: str) -> dict[str, Section]:
+    def sections(self, kind: Kind, package: str, name: str) -> dict[str, DefinitionSection]:
         """Return the sections of a service or action by part name; {} when it is unknown."""
         source = self.find(kind, package, name)
         if source is None:
@@ -230,9 +234,11 @@ class Sources:
 
 def _text_of(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_limited(path, LARGEST_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InterfaceError(f"{path}: got a byte that is no UTF-8: {error}") from error
+    except OSError as error:
+        raise InterfaceError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def _is_package(folder: Path) -> bool:

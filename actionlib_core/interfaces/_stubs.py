@@ -151,11 +151,30 @@ class _Stub:
     def _service(self, cls: type[ServiceType]) -> str:
         self._needs |= {"_ServiceType", "_ClassVar"}
         request, response = cls._request_class.__name__, cls._response_class.__name__
+        return f"class {cls.__name__}(_ServiceType):\n{self._call(cls, request, response)}"
+
+    def _call(self, cls: Any, request: str, response: str) -> str:
+        """Return the classes of a service, and the call from which checkers know a proxy's."""
+        arguments = [argument for _, argument in self._arguments(cls._request_class._definition)]
+        inner = "".join(f"        {argument},\n" for argument in arguments)
+        inside = f"\n{inner}    " if inner else ""
         return (
-            f"class {cls.__name__}(_ServiceType):\n"
             f"    _request_class: _ClassVar[type[{request}]]\n"
             f"    _response_class: _ClassVar[type[{response}]]\n"
+            "    @staticmethod\n"
+            f"    def _call({inside}) -> tuple[{request}, {response}]: ...\n"
         )
+
+    def _arguments(self, definition: Definition) -> Iterator[tuple[str, str]]:
+        """Yield the type of each field, and the argument of the constructor for it."""
+        names = {f.attribute for f in definition.fields} | {
+            c.attribute for c in definition.constants
+        }
+        # A field called `int` hides the type of that name in its class.
+        shadowed = names & _BUILTIN_NAMES
+        for field in definition.fields:
+            held, taken = self._types(field.type, shadowed)
+            yield held, f"{field.attribute}: {taken} | None = None"
 
     def _message(self, definition: Definition) -> Iterator[str]:
         self._needs.add(self._base)
@@ -163,19 +182,15 @@ class _Stub:
         if definition.comment:
             yield f'    """{_escaped(definition.comment)}"""'
             yield ""
-        names = {f.attribute for f in definition.fields} | {
-            c.attribute for c in definition.constants
-        }
-        # A field called `int` hides the type of that name in its class.
-        shadowed = names & _BUILTIN_NAMES
         for constant in definition.constants:
             yield self._constant(constant)
         arguments = []
-        for field in definition.fields:
-            held, taken = self._types(field.type, shadowed)
+        for field, (held, argument) in zip(
+            definition.fields, self._arguments(definition), strict=True
+        ):
             comment = f"  # {field.comment}" if field.comment else ""
             yield f"    {field.attribute}: {held}{comment}"
-            arguments.append(f"{field.attribute}: {taken} | None = None")
+            arguments.append(argument)
         inner = "".join(f"        {argument},\n" for argument in arguments)
         if inner:
             yield f"    def __init__(\n        self,\n{inner}    ) -> None: ..."
@@ -231,7 +246,7 @@ class _Stub:
 
 
 class _Ros2Stub(_Stub):
-    """As `_Stub`, for a module of ROS 2's classes."""
+    """Writes the stub of a module of ROS 2's classes."""
 
     _base = "_Ros2Message"
 
@@ -243,8 +258,7 @@ class _Ros2Stub(_Stub):
                 f"class {name}(_Ros2Service):\n"
                 f"    Request: _TypeAlias = {name}_Request\n"
                 f"    Response: _TypeAlias = {name}_Response\n"
-                f"    _request_class: _ClassVar[type[{name}_Request]]\n"
-                f"    _response_class: _ClassVar[type[{name}_Response]]\n"
+                f"{self._call(cls, f'{name}_Request', f'{name}_Response')}"
             )
         if issubclass(cls, Ros2Action):
             self._needs |= {"_Ros2Action", "_TypeAlias", *_PARTS.values()}

@@ -1,4 +1,4 @@
-"""Type hashes and CDR of messages, through `rosbags`, which no other module imports.
+"""ROS 1's messages as CDR, with their type hashes, through `rosbags` (extra `cdr`), only here.
 
 Types that ROS 2 has itself (std_msgs, geometry_msgs, ...) are used as ROS 2 defines them, your own
 types as they are defined here. One difference is bridged: the `seq` of a `std_msgs/Header`, which
@@ -8,7 +8,6 @@ ROS 2 does not have, is left out, and is 0 on the way back.
 from __future__ import annotations
 
 import functools
-import re
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,6 @@ from actionlib_core.exceptions import DeserializationError, InterfaceError
 from actionlib_core.interfaces._registry import registry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rosbags.typesys.store import Typestore
 
     from actionlib_core.interfaces._definition import Definition, Field
@@ -35,47 +32,6 @@ def rihs01(cls: type[Message]) -> str:
         store = _store()
         name = _added(store, cls)
         return store.hash_rihs01(name)
-
-
-def ros2_hash(name: str, fields_of: Callable[[str], list[tuple[str, str]]]) -> str:
-    """Return the type hash of a ROS 2 type, "pkg/kind/Name".
-
-    Args:
-        name: Its name.
-        fields_of: Returns (type, name) of each field of a type, message types as "pkg/kind/Name".
-
-    Source: ROS 2 REP 2016; the description and the digest are those of `rosbags`.
-    """
-    from rosbags.typesys.store import Typestore
-
-    # The hash needs only the fields, so no classes are made.
-    store = Typestore()
-    waiting = [name]
-    while waiting:
-        current = waiting.pop()
-        if current in store.fielddefs:
-            continue
-        described = [(field, _described(kind)) for kind, field in fields_of(current)]
-        store.fielddefs[current] = ([], [(field, node) for field, (node, _) in described])
-        waiting += [used for _, (_, used) in described if used]
-    return store.hash_rihs01(name)
-
-
-_SPELT = re.compile(r"([\w/]+)(?:<=(\d+))?(?:\[(<=)?(\d*)\])?")
-
-
-def _described(kind: str) -> tuple[Any, str]:
-    """Return a field's type as in rosbags, and the message type that it uses, or ""."""
-    from rosbags.interfaces import Nodetype
-
-    match = _SPELT.fullmatch(kind)
-    assert match is not None
-    base, used = match[1], match[1] if "/" in match[1] else ""
-    inner: Any = (Nodetype.NAME, base) if used else (Nodetype.BASE, (base, int(match[2] or 0)))
-    if not kind.endswith("]"):
-        return inner, used
-    fixed = match[4] and not match[3]
-    return (Nodetype.ARRAY if fixed else Nodetype.SEQUENCE, (inner, int(match[4] or 0))), used
 
 
 def to_cdr(message: Message) -> bytes:
@@ -113,7 +69,13 @@ def from_cdr(cls: type[Message], data: bytes) -> Message:
 @functools.cache
 def _store() -> Typestore:
     """Return the types of ROS 2 Jazzy, to which ours are added."""
-    from rosbags.typesys import Stores, get_typestore
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ModuleNotFoundError as error:
+        raise InterfaceError(
+            f"a message of ROS 1 as CDR: package {error.name!r} is missing. "
+            "Try: pip install 'smachpy[cdr]'"
+        ) from error
 
     return get_typestore(Stores.ROS2_JAZZY)
 

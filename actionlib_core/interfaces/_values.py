@@ -6,6 +6,7 @@ import operator
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.exceptions import FieldError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces._definition import (
     FLOATS,
     INTEGERS,
@@ -13,7 +14,6 @@ from actionlib_core.interfaces._definition import (
     Field,
     FieldType,
 )
-from actionlib_core.suggest import did_you_mean
 from actionlib_core.time import Duration, Time, TimeValue
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ ROS2_TIMES: dict[str, type[Time | Duration]] = {
 }
 """ROS 2's messages that accept the same values as our `Time` and `Duration` fields."""
 HEADERS = ("std_msgs/Header", "std_msgs/msg/Header")
-_LONGEST_SHOWN = 8  # array elements in a repr
+_MAX_SHOWN_ITEMS = 8  # array elements in a repr
 _LARGEST_FLOAT32 = 3.4028235677973366e38  # rounds to infinity from here on
 _DEFAULTS = {
     **dict.fromkeys(INTEGERS, "0"),
@@ -341,10 +341,10 @@ def short(message: Message) -> str:
 
 def _short_value(value: Any) -> str:
     if isinstance(value, bytes):
-        if len(value) <= _LONGEST_SHOWN:
+        if len(value) <= _MAX_SHOWN_ITEMS:
             return repr(value)
-        return f"<{len(value)} bytes {value[:_LONGEST_SHOWN].hex(' ')} ...>"
-    if isinstance(value, (list, tuple)) and len(value) > _LONGEST_SHOWN:
+        return f"<{len(value)} bytes {value[:_MAX_SHOWN_ITEMS].hex(' ')} ...>"
+    if isinstance(value, (list, tuple)) and len(value) > _MAX_SHOWN_ITEMS:
         head = ", ".join(repr(item) for item in value[:3])
         return f"[{head}, ... {len(value)} elements]"
     return repr(value)

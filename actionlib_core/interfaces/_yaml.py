@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import FieldError
+from actionlib_core.inputs.yaml_text import YamlTextError, load_yaml
 from actionlib_core.time import TimeValue
-from actionlib_core.yaml_text import YamlTextError, load_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

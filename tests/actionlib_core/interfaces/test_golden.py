@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import io
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from actionlib_core import interfaces
 from actionlib_core.time import Duration, Time
+from tests.places import DATA
 
-DATA = json.loads((Path(__file__).parents[2] / "data" / "ros1_messages.json").read_text())
-MESSAGES = DATA["messages"] + [
-    s[part] for s in DATA["services"] for part in ("request", "response")
+GOLDEN = json.loads((DATA / "ros1_messages.json").read_text())
+MESSAGES = GOLDEN["messages"] + [
+    s[part] for s in GOLDEN["services"] for part in ("request", "response")
 ]
 
 
@@ -65,7 +65,7 @@ def test_message_is_that_of_ros1(row: dict[str, Any]) -> None:
         assert cls.from_yaml(message.to_yaml()) == message
 
 
-@pytest.mark.parametrize("row", DATA["services"], ids=lambda row: row["type"])
+@pytest.mark.parametrize("row", GOLDEN["services"], ids=lambda row: row["type"])
 def test_service_is_that_of_ros1(row: dict[str, Any]) -> None:
     service = interfaces.get_service(row["type"])
     assert service._type == row["type"]

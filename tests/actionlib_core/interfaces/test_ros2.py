@@ -22,12 +22,11 @@ from actionlib_core.exceptions import DeserializationError, FieldError, Interfac
 from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces._ros2 import Ros2Registry, ros2_registry
 from actionlib_core.time import Duration, Time
+from tests.places import DATA
 
 LINES = [
     json.loads(line)
-    for line in (Path(__file__).parents[2] / "data" / "ros2_golden.jsonl")
-    .read_text(encoding="utf-8")
-    .splitlines()
+    for line in (DATA / "ros2_golden.jsonl").read_text(encoding="utf-8").splitlines()
 ]
 HASHES = [line for line in LINES if line["kind"] == "hash"]
 MESSAGES = [line for line in LINES if line["kind"] in {"message", "request"}]
