@@ -15,6 +15,7 @@ from actionlib_core.clock._real import RealClock as RealClock
 from actionlib_core.clock._real import current_clock as current_clock
 from actionlib_core.clock._real import use_clock as use_clock
 from actionlib_core.clock._serial import SerialExecutor as SerialExecutor
+from actionlib_core.clock._wall import wall_time as wall_time
 
 if TYPE_CHECKING:
     from actionlib_core.clock._virtual import VirtualClock as VirtualClock
@@ -36,6 +37,7 @@ __all__ = [
     "VirtualClock",
     "current_clock",
     "use_clock",
+    "wall_time",
 ]
 
 

@@ -46,7 +46,7 @@ REAL_TIME = (
     "pytest_timeout",
 )
 # Packages whose locks guard a few lines that never wait: real locks do, and are faster.
-SHORT_LOCKS = ("actionlib_core", "smachpy", "viz", "logging")
+SHORT_LOCKS = ("actionlib_core", "smachpy", "smachpy_viz", "logging")
 
 # The originals, for use in this module. (`_getframe`: some callers keep real time.)
 _getframe = sys._getframe

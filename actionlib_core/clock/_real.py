@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import _thread
 import contextlib
-import heapq
 import itertools
 import math
 import os
@@ -18,8 +17,10 @@ from contextvars import Context, ContextVar, copy_context
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
+from actionlib_core.clock._deadlines import Deadlines
 from actionlib_core.clock._protocol import check_seconds
 from actionlib_core.clock._serial import report_callback, report_thread_exception
+from actionlib_core.clock.forks import end_copy, is_copy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator
@@ -73,14 +74,14 @@ class RealEvent:
                 return True
             if threading.get_ident() == threading.main_thread().ident:
                 return _acquire_in_main(waiter, timeout) or self._flag
-            longest = -1 if timeout is None else min(timeout, _LONGEST_S)
+            longest = -1 if timeout is None else min(timeout, _MAX_WAIT_S)
             return waiter.acquire(timeout=longest) or self._flag
         finally:
             with contextlib.suppress(ValueError):  # `set` has already removed it
                 self._waiters.remove(waiter)
 
 
-_LONGEST_S = threading.TIMEOUT_MAX
+_MAX_WAIT_S = threading.TIMEOUT_MAX
 _SIGNAL_S = 0.5
 
 
@@ -108,6 +109,7 @@ class RealTask:
     name: str
     _context: Context = field(default_factory=copy_context, init=False)
     _done: RealEvent = field(default_factory=RealEvent, init=False)
+    _pid: int = field(default_factory=os.getpid, init=False)
     ident: int | None = field(default=None, init=False)
     error: BaseException | None = field(default=None, init=False)
 
@@ -116,20 +118,24 @@ class RealTask:
         try:
             self._context.run(self._target)
         except BaseException as error:  # noqa: BLE001  end of the thread's stack: reported
+            if is_copy(self._pid):
+                end_copy(error)
             self.error = error
             if not isinstance(error, SystemExit):  # which ends a thread silently, as in threading
                 report_thread_exception()
         finally:
+            if is_copy(self._pid):
+                end_copy(None)
             self.ident = None
             del self._target, self._context  # what they refer to must not live as long as the task
             threading.current_thread().name = IDLE_NAME  # before `join` returns in other threads
             self._done.set()
 
     def is_alive(self) -> bool:
-        return not self._done.is_set()
+        return not (self._done.is_set() or is_copy(self._pid))
 
     def join(self, timeout: float | None = None) -> bool:
-        return self._done.wait(timeout)
+        return is_copy(self._pid) or self._done.wait(timeout)
 
 
 class _Worker:
@@ -242,6 +248,10 @@ class RealTimer:
         self.callback = None
 
 
+def _is_set(_number: int, timer: RealTimer) -> bool:
+    return timer.callback is not None
+
+
 class RealClock:
     """Monotonic and wall time of the computer, real threads.
 
@@ -258,9 +268,7 @@ class RealClock:
         self._cache = _ThreadCache()
         # Reentrant: a signal handler that sets a timer may interrupt the code that holds the lock.
         self._timer_lock = threading.RLock()
-        # A heap. The number keeps the order of timers that are due at the same time, and keeps
-        # heapq from comparing the timers themselves.
-        self._timers: list[tuple[float, int, RealTimer]] = []
+        self._timers: Deadlines[RealTimer] = Deadlines(_is_set)
         self._timer_count = itertools.count()
         self._timers_run = False
         self._timers_changed = RealEvent()
@@ -298,10 +306,12 @@ class RealClock:
             return timer
         with self._timer_lock:
             due = self.now() + delay
-            heapq.heappush(self._timers, (due, next(self._timer_count), timer))
+            self._timers.push(due, next(self._timer_count), timer)
             if not self._timers_run:
                 self._start_timers()
-            elif self._timers[0][2] is timer:  # due before the one that the thread waits for
+                return timer
+            first = self._timers.first()
+            if first is not None and first[2] is timer:  # before the one that the thread waits for
                 self._timers_changed.set()
         return timer
 
@@ -331,18 +341,16 @@ class RealClock:
 
     def _next_timer(self) -> RealTimer | None:
         """Wait until a timer is due, remove and return it; None when there are no more timers."""
-        heap = self._timers
         while True:
             with self._timer_lock:
                 self._timers_changed.clear()
-                while heap and heap[0][2].callback is None:
-                    heapq.heappop(heap)
-                if not heap:
+                first = self._timers.first()
+                if first is None:
                     self._timers_run = False
                     return None
-                wait = heap[0][0] - self.now()
+                wait = first[0] - self.now()
                 if wait <= 0:
-                    return heapq.heappop(heap)[2]
+                    return self._timers.pop()
             self._timers_changed.wait(wait)
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
@@ -358,10 +366,10 @@ def _begin_again() -> None:
 
 
 _clocks: weakref.WeakSet[RealClock] = weakref.WeakSet()
-_REAL = RealClock()
+REAL = RealClock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_begin_again)
-_clock: ContextVar[Clock] = ContextVar("clock", default=_REAL)
+_clock: ContextVar[Clock] = ContextVar("clock", default=REAL)
 
 
 def current_clock() -> Clock:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import _thread
+import os
 import threading
 from collections import deque
 from typing import TYPE_CHECKING
+
+from actionlib_core.clock.forks import is_copy
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,9 +39,12 @@ class SerialExecutor:
         # Held while a task runs the queue. It is never waited for: a signal handler that submits
         # may have interrupted a `submit` of the same thread at any line.
         self._busy = _thread.allocate_lock()
+        self._pid = os.getpid()
 
     def submit(self, function: Callable[[], object]) -> None:
-        """Run `function` after everything submitted before it."""
+        """Run `function` after everything submitted before it; in a forked process do nothing."""
+        if is_copy(self._pid):
+            return
         self._queue.append(function)
         self._start()
 
@@ -51,7 +57,7 @@ class SerialExecutor:
         Blocks: until then or `timeout` [s] has passed. Not to be called from a submitted callable.
         """
         # In this order: a callable that has left the queue runs while `_busy` is held.
-        if not self._queue and not self._busy.locked():
+        if is_copy(self._pid) or (not self._queue and not self._busy.locked()):
             return True
         reached = self._clock.event()
         self.submit(reached.set)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
-import heapq
 import itertools
 import math
 import operator
@@ -23,9 +22,10 @@ import time
 import weakref
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from actionlib_core.clock._deadlines import Deadlines
 from actionlib_core.clock._gates import LockGate, make_gate
 from actionlib_core.clock._protocol import check_seconds
-from actionlib_core.clock._real import RealEvent
+from actionlib_core.clock._real import REAL, RealEvent
 from actionlib_core.clock._serial import report_callback
 from actionlib_core.clock._virtual_parts import (
     Deadlock,
@@ -39,7 +39,7 @@ from actionlib_core.clock._virtual_parts import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterable, Iterator
+    from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
     from typing import Self
 
 T = TypeVar("T")
@@ -67,6 +67,7 @@ class VirtualClock:
         rate: Virtual seconds per real second, for watching a run; None: time jumps at once.
         choose: Called with the names of the participants and callbacks that can go on, at least
             two; returns the index of the next one. For going through interleavings one by one.
+        begin_ns: The wall time at its begin [ns since the epoch].
 
     Attributes:
         limit: When time would pass this [s], the wait of the thread that made the clock raises
@@ -74,7 +75,9 @@ class VirtualClock:
         most_turns: After more turns than this at one time, that wait raises it too; None: no limit.
         numbers: A counter for ids that are to be the same in every run.
 
-    Threads: only participants may wait; `Event.set` and `call_later` may come from any thread.
+    Threads: only participants may wait; `Event.set` and `call_later` may come from any thread. What
+        another thread calls later is called after that many real seconds if that is earlier, in
+        another thread: a program that is busy lets no virtual time pass.
 
     Raises:
         ValueError: `rate` is not above 0.
@@ -86,11 +89,13 @@ class VirtualClock:
         *,
         rate: float | None = None,
         choose: Callable[[list[str]], int] | None = None,
+        begin_ns: int = START_TIME_NS,
     ) -> None:
         if rate is not None and not rate > 0:
             raise ValueError(f"virtual clock: rate: got {rate!r}; expected a number over 0.")
         self.seed = seed
         self.rate = rate
+        self._begin_ns = begin_ns
         self._pick = _picker(seed, choose)
         self.limit: float | None = None
         self.most_turns: int | None = None
@@ -104,14 +109,14 @@ class VirtualClock:
         self._lock = threading.RLock()
         # Every other participant and timer is in exactly one place: ready to go on, or waiting.
         self._ready: list[Participant | VirtualTimer] = []
-        # A heap: when, a number, which. Entries of waits that have ended stay until they are next.
-        self._deadlines: list[tuple[float, int, Participant | VirtualTimer]] = []
         self._count = itertools.count()
         self._waits: dict[Participant, int] = {}  # with the numbers of their waits
+        self._deadlines: Deadlines[Participant | VirtualTimer] = Deadlines(_counting(self._waits))
         self._owner = Participant(threading.current_thread().name)
         self._owner.gate = make_gate()
         self._participants: dict[int, Participant] = {threading.get_ident(): self._owner}
         self._in_callback = False
+        self._caller: int | None = None  # the thread of the callback
         self._closed = False
         _clocks.add(self)
 
@@ -121,7 +126,7 @@ class VirtualClock:
         return self._now
 
     def time_ns(self) -> int:
-        return START_TIME_NS + round(self._now * 1e9)
+        return self._begin_ns + round(self._now * 1e9)
 
     def sleep(self, seconds: float) -> None:
         if seconds > 0:
@@ -147,10 +152,20 @@ class VirtualClock:
             if delay <= 0:
                 self._ready.append(timer)
             elif delay < math.inf:
-                heapq.heappush(self._deadlines, (self._now + delay, next(self._count), timer))
+                self._deadlines.push(self._now + delay, next(self._count), timer)
         if self.rate is not None:  # a running pause may now be too long
             self._poke.set()
+        me = threading.get_ident()
+        if me not in self._participants and me != self._caller:
+            timer.real = REAL.call_later(delay, lambda: self._call_from_outside(timer))
         return timer
+
+    def _call_from_outside(self, timer: VirtualTimer) -> None:
+        """Call a timer that a signal has led to: time may stand still, as a participant is busy."""
+        with self._lock:
+            callback, timer.callback = timer.callback, None
+        if callback is not None and not self._closed:
+            callback()
 
     def run_async(self, main: Coroutine[object, object, T]) -> T:
         import asyncio  # here: it takes 60 ms, and most programs never need it
@@ -367,6 +382,8 @@ class VirtualClock:
                         self._note(me)
                     return chosen
                 callback, chosen.callback = chosen.callback, None
+                if chosen.real is not None:
+                    chosen.real.cancel()
             if callback is not None:
                 self._call(callback)
 
@@ -374,7 +391,7 @@ class VirtualClock:
         """Put the deadline of `me`, who waits, into the heap, where others see it."""
         if me is not None and me.deadline is not None and not me.noted:
             me.noted = True
-            heapq.heappush(self._deadlines, (me.deadline, me.turn, me))
+            self._deadlines.push(me.deadline, me.turn, me)
 
     def _pause(self, me: Participant | None) -> float:
         """Return the real seconds to wait before the next jump."""
@@ -443,18 +460,8 @@ class VirtualClock:
         return self.limit is not None and due > self.limit
 
     def _next_due(self) -> float | None:
-        """Return the next deadline; entries of waits that have ended are removed on the way."""
-        deadlines = self._deadlines
-        while deadlines:
-            due, turn, what = deadlines[0]
-            if (
-                what.callback is not None
-                if isinstance(what, VirtualTimer)
-                else self._waits.get(what) == turn
-            ):
-                return due
-            heapq.heappop(deadlines)
-        return None
+        first = self._deadlines.first()
+        return None if first is None else first[0]
 
     def _jump(self) -> None:
         """Advance to the next deadline; everything that is due then becomes ready."""
@@ -464,14 +471,15 @@ class VirtualClock:
         self._now = max(due, self._now)
         self._stepped = time.monotonic() if self.rate is not None else 0.0
         while self._next_due() == due:
-            what = heapq.heappop(self._deadlines)[2]
+            what = self._deadlines.pop()
             if isinstance(what, VirtualTimer):
                 self._ready.append(what)
             else:
                 self._end_wait(what, woken=False)
 
     def _call(self, callback: Callable[[], object]) -> None:
-        self._in_callback = True
+        # The thread may be one that is just leaving, so that it is no participant any more.
+        self._in_callback, self._caller = True, threading.get_ident()
         try:
             contextvars.Context().run(callback)
         except Stopped:
@@ -482,7 +490,7 @@ class VirtualClock:
                 raise
             report_callback("clock-timers")
         finally:
-            self._in_callback = False
+            self._in_callback, self._caller = False, None
 
     def set_event(self, event: VirtualEvent) -> None:
         """Set `event`; the participants that wait for it can go on."""
@@ -508,6 +516,19 @@ class VirtualClock:
             event.waiters.remove(participant)
         participant.noted = True
         participant.woken = woken
+
+
+def _counting(
+    waits: Mapping[Participant, int],
+) -> Callable[[int, Participant | VirtualTimer], bool]:
+    """Return a function that tells timers that were not cancelled and waits that have not ended."""
+
+    def counts(number: int, what: Participant | VirtualTimer) -> bool:
+        if isinstance(what, VirtualTimer):
+            return what.callback is not None
+        return waits.get(what) == number
+
+    return counts
 
 
 def _refusal(*, in_callback: bool) -> RuntimeError:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from actionlib_core.clock._gates import Gate
+    from actionlib_core.clock._real import RealTimer
     from actionlib_core.clock._turns import Worker
     from actionlib_core.clock._virtual import VirtualClock
 
@@ -201,12 +202,18 @@ class VirtualTask:
 
 
 class VirtualTimer:
-    """A scheduled callback."""
+    """A scheduled callback.
 
-    __slots__ = ("callback",)
+    Attributes:
+        callback: It; None once it was called or cancelled.
+        real: Its timer in real time, if it was scheduled by a thread that is no participant.
+    """
+
+    __slots__ = ("callback", "real")
 
     def __init__(self, callback: Callable[[], object]) -> None:
         self.callback: Callable[[], object] | None = callback
+        self.real: RealTimer | None = None
 
     @property
     def name(self) -> str:
@@ -216,6 +223,8 @@ class VirtualTimer:
 
     def cancel(self) -> None:
         self.callback = None
+        if self.real is not None:
+            self.real.cancel()
 
 
 def name_waits(

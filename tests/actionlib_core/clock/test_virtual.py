@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actionlib_core.clock import Deadlock, TimeLimit, VirtualClock, use_clock
+from actionlib_core.clock import Deadlock, RealClock, TimeLimit, VirtualClock, use_clock
 
 
 def test_time_jumps_to_the_next_deadline(clock):
@@ -144,6 +144,38 @@ def test_a_callback_may_not_wait(clock, monkeypatch):
     clock.call_later(1, lambda: clock.sleep(1))
     clock.sleep(2)
     assert "a callback may not wait" in reported[0]
+
+
+def test_a_callback_on_a_leaving_thread_schedules_in_virtual_time_only(clock):
+    made = []
+
+    def tick():
+        made.append(clock.call_later(1.0, lambda: None))
+
+    clock.call_later(0.5, tick)
+    clock.spawn(lambda: clock.sleep(0.1), name="leaves")  # its thread calls `tick`
+    clock.spawn(lambda: clock.sleep(5.0), name="waits")
+    clock.sleep(2.0)
+    assert [timer.real for timer in made] == [None]
+
+
+def test_what_another_thread_calls_later_is_called_in_real_time_if_the_program_is_busy(clock):
+    called = threading.Event()
+    outside = RealClock().spawn(lambda: clock.call_later(0.01, called.set), name="outside")
+    assert called.wait(10)  # this participant does not wait on its clock
+    assert outside.join(10)
+    assert clock.now() == 0.0
+
+
+def test_what_another_thread_calls_later_is_called_once(clock):
+    called = []
+    outside = RealClock().spawn(
+        lambda: clock.call_later(0.001, lambda: called.append(clock.now())), name="outside"
+    )
+    assert outside.join(10)
+    clock.sleep(1.0)
+    threading.Event().wait(0.01)
+    assert len(called) == 1
 
 
 def test_ctrl_c_in_a_callback_is_the_main_thread_s(clock):

@@ -9,6 +9,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Final
 
 from actionlib_core.clock import RealClock
+from actionlib_core.clock.forks import is_copy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +19,24 @@ if TYPE_CHECKING:
 
 GRACE_S: Final = 1.5  # from the end of its standard input to SIGTERM
 LAST_GRACE_S: Final = 1.0  # from then to SIGKILL
-KEPT_LINES: Final = 40  # last lines of its standard error
+MAX_ERROR_LINES: Final = 40  # last lines of its standard error
+
+
+def python_command(*arguments: str) -> list[str]:
+    """Return the command for another Python like this one, with these arguments.
+
+    It imports nothing from its current folder (-P): a file there, whose code nobody has asked for,
+    must not take the place of a module of ours or of Python's. Options of this Python that would
+    change what it imports and how it reads texts are handed on.
+    """
+    flags = ["-P", *("-O" for _ in range(sys.flags.optimize))]
+    for flag, is_set in (
+        ("-I", sys.flags.isolated),
+        ("-E", sys.flags.ignore_environment),
+        ("-s", sys.flags.no_user_site),
+    ):
+        flags += [flag] if is_set else []
+    return [sys.executable, *flags, "-X", f"utf8={sys.flags.utf8_mode}", *arguments]
 
 
 class ChildProcess:
@@ -48,16 +66,16 @@ class ChildProcess:
         environment: Mapping[str, str] | None = None,
     ) -> None:
         self.module = module
-        # -P, so that a user's module in the current folder does not hide one of ours.
-        self._command = [sys.executable, "-P", "-m", module, *arguments]
+        self._command = python_command("-m", module, *arguments)
         self._environment = dict(environment or {})
         self.on_change = on_change
         self._clock = RealClock()  # other processes have no virtual time
-        self._said: deque[str] = deque(maxlen=KEPT_LINES)
+        self._said: deque[str] = deque(maxlen=MAX_ERROR_LINES)
         self._changed = self._clock.event()
         self._ended = self._clock.event()
         self._first_line: str | None = None
         self._process: subprocess.Popen[str] | None = None
+        self._parent = os.getpid()
 
     def __enter__(self) -> Self:
         self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
@@ -125,7 +143,7 @@ class ChildProcess:
         Blocks: until it has ended, 3.5 s at most.
         """
         process = self._process
-        if process is None:
+        if process is None or is_copy(self._parent):
             return
         # First the request, by closing its standard input; then SIGTERM; then SIGKILL.
         self.let_go()

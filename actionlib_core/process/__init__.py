@@ -1,0 +1,1 @@
+"""The standard streams and the private files of a program."""
