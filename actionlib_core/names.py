@@ -138,7 +138,7 @@ def resolve_name(
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class RemapRule:
     """One `from:=to` of a command line.
 
     Attributes:
@@ -162,7 +162,7 @@ class NameArguments:
         parameters: The arguments `_name:=value` of ROS 1, unchanged.
     """
 
-    rules: tuple[Rule, ...] = ()
+    rules: tuple[RemapRule, ...] = ()
     rest: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
 
@@ -198,7 +198,7 @@ class NameArguments:
 class _Collected:
     """The parts of the command line read so far."""
 
-    rules: list[Rule] = field(default_factory=list)
+    rules: list[RemapRule] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     parameters: list[str] = field(default_factory=list)
@@ -221,7 +221,7 @@ class _Collected:
         except NameSetupError as error:
             self.problems.append(f"argument {text!r}: {error}")
         else:
-            self.rules.append(Rule(old, new, node))
+            self.rules.append(RemapRule(old, new, node))
 
     def take_ros_args(self, arguments: Sequence[str]) -> None:
         """Read the arguments between `--ros-args` and `--`."""
@@ -276,7 +276,7 @@ def parse_arguments(argv: Sequence[str]) -> NameArguments:
             end = _find(argv, "--", position)
             collected.take_ros_args(argv[position:end])
             position = end + 1
-        elif _is_rule(argument):
+        elif is_rule(argument):
             collected.take_rule(argument)
         else:
             collected.rest.append(argument)
@@ -285,7 +285,7 @@ def parse_arguments(argv: Sequence[str]) -> NameArguments:
     return NameArguments(tuple(collected.rules), tuple(collected.rest), tuple(collected.parameters))
 
 
-def _is_rule(argument: str) -> bool:
+def is_rule(argument: str) -> bool:
     """Return whether an argument is a rule `a:=b`, not a text with `:=` such as YAML."""
     old, sign, _ = argument.partition(":=")
     return bool(sign) and not re.search(r"[\s{}\[\]\"'=]|^-", old)

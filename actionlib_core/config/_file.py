@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from actionlib_core.checked_file import REQUIRED, CheckedFile
 from actionlib_core.config import ALL_NAMES, AccessRule, Config, Mapped, Ros2, Tls
 from actionlib_core.exceptions import ConfigError
+from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from actionlib_core.checked_file import Problem, Section
+    from actionlib_core.inputs.checked_file import Problem, Section
 
 T = TypeVar("T")
 
@@ -86,7 +86,13 @@ def _add_wire(top: Section, networks: tuple[Ros2, ...]) -> tuple[Ros2, ...]:
         return networks
     if len(networks) > 1:
         got = f"got {len(networks)} networks of ROS 2"
-        top.report("wire", f"{got}; expected one. Try 'names' or 'robot' in each.")
+        chosen = all(network.names or network.robot for network in networks)
+        way_out = (
+            "Try without 'wire': 'names' and 'robot' say already what is on each."
+            if chosen
+            else "Try 'names' or 'robot' in each instead of 'wire'."
+        )
+        top.report("wire", f"{got}; expected one. {way_out}")
         return networks
     network = networks[0] if networks else Ros2()
     try:

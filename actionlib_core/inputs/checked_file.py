@@ -25,6 +25,7 @@ Other files have their own readers, for these reasons:
 from __future__ import annotations
 
 import dataclasses
+import errno
 import sys
 from dataclasses import MISSING, dataclass
 from functools import partial
@@ -39,8 +40,8 @@ from typing import (
     get_type_hints,
 )
 
-from actionlib_core.suggest import did_you_mean, nearest
-from actionlib_core.yaml_text import YamlTextError, load_with_lines
+from actionlib_core.inputs.suggest import did_you_mean, nearest
+from actionlib_core.inputs.yaml_text import YamlTextError, load_with_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -84,6 +85,7 @@ class Limits:
 
 ANY_NUMBER: Final = Limits()
 MAX_BYTES: Final = 16 << 20  # far more than people write; a device such as /dev/zero never ends
+MAX_PROBLEMS: Final = 100  # of one file; the rest is mostly the same again
 _MAPPING: Final = "a mapping of names to values"
 
 
@@ -110,6 +112,19 @@ class Problem:
 
 Parsed: TypeAlias = "tuple[object, dict[str, int]]"
 """The data in a text, and the line of each field by its path."""
+
+
+def read_limited(path: str | Path, most: int = MAX_BYTES) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        OSError: it cannot be read, or has more than `most` bytes, as a device that never ends.
+    """
+    with open(path, "rb") as opened:  # noqa: PTH123  `path` may be a text
+        content = opened.read(most + 1)
+    if len(content) > most:
+        raise OSError(errno.EFBIG, f"more than {most:,} bytes", str(path))
+    return content
 
 
 def parse_yaml(file: CheckedFile, text: str) -> Parsed:
@@ -159,12 +174,7 @@ class CheckedFile:
         self._lines: dict[str, int] = {}
         try:
             # Not `read_text`, which changes line ends, also those inside the cells of a CSV file.
-            with path.open("rb") as opened:
-                content = opened.read(MAX_BYTES + 1)
-            if len(content) > MAX_BYTES:
-                size = f"{MAX_BYTES >> 20} MiB"
-                self.report("", f"got more than {size}; expected a file that people write.", 0)
-                raise error(self.problems)
+            content = read_limited(path)
             data, self._lines = parse(self, content.decode("utf-8-sig"))
         except (OSError, UnicodeDecodeError) as reason:
             got = repr(reason.strerror) if isinstance(reason, OSError) else "no UTF-8"
@@ -182,6 +192,10 @@ class CheckedFile:
     def report(self, field: str, text: str, line: int | None = None) -> None:
         """Add a problem; `line` is that of the field unless it is given."""
         line = self.line(field) if line is None else line
+        if len(self.problems) >= MAX_PROBLEMS:
+            text, field = f"more than {MAX_PROBLEMS} problems; the rest is not listed.", ""
+            self.problems.append(Problem(self.name, line, field, text))
+            self.check()
         self.problems.append(Problem(self.name, line, field, text))
         self.bad_fields.add(field)
 
@@ -209,8 +223,8 @@ class CheckedFile:
 class Section:
     """A mapping in a file.
 
-    Its getters never raise: they report a problem and return a harmless value, so that one pass
-    finds all problems.
+    Its getters report a problem and return a harmless value, so that one pass finds all problems;
+    they raise only when there are more than `MAX_PROBLEMS`.
 
     Attributes:
         file: The file.

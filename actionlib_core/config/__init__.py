@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from actionlib_core.exceptions import ConfigError, NameSetupError
+from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.names import clean_namespace
 
 if TYPE_CHECKING:
@@ -30,7 +31,10 @@ ROS2_DOMAIN_VARIABLE = "SMACHPY_ROS2_DOMAIN"
 ROS2_DISTRO_VARIABLE = "SMACHPY_ROS2_DISTRO"
 ALL_NAMES = "**"
 LAST_DOMAIN = 9999
-MOST_DIGITS = 9  # of a number in the environment or command line
+LARGEST_SECRET = 10_000
+"""Largest file with a password [bytes]."""
+
+MAX_DIGITS = 9  # of a number in the environment or command line
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 
 PROBE_S = 5.0  # interval of the probes of a ROS 2 server with running goals
@@ -241,8 +245,9 @@ class Config:
         if not self.password_file:
             return self.password
         try:
-            return Path(self.password_file).read_text(encoding="utf-8").splitlines()[0].strip()
-        except (OSError, IndexError) as error:
+            text = read_limited(self.password_file, LARGEST_SECRET).decode("utf-8")
+            return text.splitlines()[0].strip()
+        except (OSError, IndexError, UnicodeDecodeError) as error:
             raise ConfigError(
                 "configuration",
                 f"password_file: cannot be read: got {self.password_file!r} ({error}); expected a "
@@ -413,7 +418,7 @@ def load_config(source: Config | str | Path | None = None) -> Config:
     if source is None:
         config = Config(domain=_number_of_environment(DOMAIN_VARIABLE, LAST_DOMAIN))
     else:
-        from actionlib_core._config_file import read_config_file
+        from actionlib_core.config._file import read_config_file
 
         config = read_config_file(Path(source))
     return _with_ros2_of_environment(config)
@@ -445,7 +450,7 @@ def _with_ros2_of_environment(config: Config) -> Config:
 
 def _number_of_environment(variable: str, last: int) -> int:
     text = os.environ.get(variable) or "0"
-    if not (text.isascii() and text.isdigit() and len(text) <= MOST_DIGITS):
+    if not (text.isascii() and text.isdigit() and len(text) <= MAX_DIGITS):
         raise ConfigError(
             "environment",
             f"{variable}: not a number: got {text!r}; expected 0 to {last}.",

@@ -47,6 +47,16 @@ def check_function(where: str, argument: str, value: object) -> None:
         )
 
 
+def is_async(function: object) -> bool:
+    """Return whether a call of a function makes a coroutine."""
+    made: Any = function
+    while isinstance(made, partial):
+        made = made.func
+    return inspect.iscoroutinefunction(made) or (
+        callable(made) and inspect.iscoroutinefunction(type(made).__call__)
+    )
+
+
 def _runs(function: Any) -> bool:
     """Return whether a call runs the body: that of a coroutine or generator only makes an object.
 
@@ -137,7 +147,7 @@ def check_limit(where: str, argument: str, value: object) -> float | None:
 
 
 def check_delay(where: str, argument: str, value: object) -> float | None:
-    """As `check_limit`, but for a wait, where a negative time counts as 0.
+    """Return the length of a wait in seconds: a negative one is 0, None and infinity: no limit.
 
     Programs often pass the rest of a time, which may be negative by then.
 
@@ -163,6 +173,6 @@ def _check_number(where: str, argument: str, value: object) -> float | None:
 
 
 def check_wait(where: str, argument: str, value: object) -> float | None:
-    """As `check_delay`, but by actionlib's rule that 0 sets no limit either."""
+    """Return the length of a wait as `check_delay`, but 0 sets no limit either, as in actionlib."""
     seconds = _check_number(where, argument, value)
     return max(seconds, 0.0) if seconds else None
