@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from importlib.abc import Loader
     from types import ModuleType
 
 MODULES: Final = {
@@ -25,13 +25,18 @@ MODULES: Final = {
     "actionlib_core.server_goal_handle": "actionlib_core.action.server",
     "actionlib_core.simple_action_client": "actionlib_core.action.simple_client",
     "actionlib_core.simple_action_server": "actionlib_core.action.simple_server",
+    "actionlib_core.tools": "actionlib_core.action.tools",
     "actionlib_core.status_tracker": "actionlib_core.action.compat",
 }
 """actionlib's module names, under this package's name -> module here."""
 
 
-class _Aliases(MetaPathFinder, Loader):
-    """Finds modules by other names."""
+class _Aliases:
+    """Finds modules by other names.
+
+    A finder and a loader by its methods: their classes in `importlib.abc` would import tempfile,
+    shutil and a dozen more, a fifth of `import smachpy`.
+    """
 
     def __init__(self) -> None:
         self.homes: dict[str, str] = {}
@@ -41,7 +46,10 @@ class _Aliases(MetaPathFinder, Loader):
     ) -> ModuleSpec | None:
         """Return a spec for an alias; None for any other name."""
         del path, target
-        return ModuleSpec(fullname, self) if fullname in self.homes else None
+        return ModuleSpec(fullname, cast("Loader", self)) if fullname in self.homes else None
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Let Python make the module."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Replace the empty module by the real one."""

@@ -27,12 +27,14 @@ Exception
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 MD5_DIGITS = 32
+ERRORS_PAGE: Final = "https://smachpy.github.io/smachpy/reference/errors/"
+_PACKAGES: Final = ("actionlib_core", "smachpy", "smachpy_viz")
 
 
 def text_of(error: BaseException, form: Callable[[object], str] = str) -> str:
@@ -48,12 +50,44 @@ def text_of(error: BaseException, form: Callable[[object], str] = str) -> str:
         return f"<{type(error).__name__}: its text raised {type(broken).__name__}>"
 
 
-class ActionlibError(Exception):
-    """Root of all errors that actionlib_core raises on purpose."""
+class Documented(Exception):  # noqa: N818  the part that all our errors share
+    """An error that a page describes: a traceback ends with the page's address."""
+
+    @property
+    def __notes__(self) -> list[str]:
+        """The notes of the error; the first is the address. `add_note` adds others.
+
+        Made only for those who look, as programs catch errors more often than they print them.
+        """
+        kept: list[str] = self.__dict__.setdefault("__notes__", [more_about(type(self))])
+        return kept
+
+    @__notes__.setter
+    def __notes__(self, notes: list[str]) -> None:
+        self.__dict__["__notes__"] = notes
+
+
+def more_about(kind: type[Documented]) -> str:
+    """Return "More: " and the address of an error's description; of a user's, that of its base."""
+    ours = (
+        one.__name__
+        for one in kind.__mro__
+        if one.__module__.partition(".")[0] in _PACKAGES and not one.__name__.startswith("_")
+    )
+    return f"More: {ERRORS_PAGE}#{next(ours).lower()}"
+
+
+class ActionlibError(Documented):
+    """Root of all errors that actionlib_core raises on purpose.
+
+    Try: see the error's own class; `except ActionlibError` catches them all.
+    """
 
 
 class InvalidDurationError(ActionlibError, ValueError):
     """A duration that is negative, not a number, or infinite where it may not be.
+
+    Try: pass seconds that are positive and finite; None where no limit is meant.
 
     Attributes:
         argument: Name of the argument.
@@ -67,11 +101,16 @@ class InvalidDurationError(ActionlibError, ValueError):
 
 
 class DurationTypeError(InvalidDurationError, TypeError):
-    """A value that is neither a number nor a `Duration`, for example a text."""
+    """A value that is neither a number nor a `Duration`, for example a text.
+
+    Try: pass seconds as a number, or a `Duration`.
+    """
 
 
 class NameSetupError(ActionlibError, ValueError):
     """Names or command-line arguments that cannot be used.
+
+    Try: correct each name that is listed; remappings are `old:=new`.
 
     Attributes:
         problems: One text per problem.
@@ -84,6 +123,8 @@ class NameSetupError(ActionlibError, ValueError):
 
 class InvalidNameError(NameSetupError):
     """A name breaks the ROS name rules.
+
+    Try: use letters, digits, `_` and `/`, with a letter in front, as in ROS.
 
     Attributes:
         name: The name.
@@ -104,6 +145,8 @@ class InvalidNameError(NameSetupError):
 class ConfigError(ActionlibError, ValueError):
     """A configuration that cannot be used.
 
+    Try: correct each line that is named; docs/configuration.md lists all fields.
+
     Attributes:
         where: The file, or "configuration".
         problems: One text per problem.
@@ -120,15 +163,23 @@ class ConfigError(ActionlibError, ValueError):
 
 
 class NodeError(ActionlibError, RuntimeError):
-    """A node is closed, missing or was made twice."""
+    """A node is closed, missing or was made twice.
+
+    Try: make one node per process with `init_node`, and use it before it is closed.
+    """
 
 
 class TransportError(ActionlibError, ConnectionError):
-    """The network session is closed, or could not be opened."""
+    """The network session is closed, or could not be opened.
+
+    Try: check the address and whether the router runs; do not use a node after its end.
+    """
 
 
 class AccessDeniedError(TransportError):
     """A name that the access rules of the other side forbid.
+
+    Try: use a name that is allowed, or extend the `access` section of the router's configuration.
 
     Attributes:
         key: The forbidden key.
@@ -148,11 +199,16 @@ class AccessDeniedError(TransportError):
 
 
 class WaitTimeoutError(ActionlibError, TimeoutError):
-    """A wait has timed out."""
+    """A wait has timed out.
+
+    Try: start what was waited for; `actionlib list` shows who is there.
+    """
 
 
 class ServiceException(ActionlibError):  # noqa: N818  rospy's name
     """A service call failed.
+
+    Try: read the text: it holds the error that the handler raised, if it raised one.
 
     Attributes:
         name: The service.
@@ -172,23 +228,37 @@ class ServiceException(ActionlibError):  # noqa: N818  rospy's name
 
 
 class ServiceUnavailableError(ServiceException):
-    """There is no server."""
+    """There is no server.
+
+    Try: start the server; `actionlib service list` shows those that run.
+    """
 
 
 class ServiceTimeoutError(ServiceException, TimeoutError):
-    """The server did not answer in time."""
+    """The server did not answer in time.
+
+    Try: allow more time with `timeout`, or look at what the handler waits for.
+    """
 
 
 class ServiceLostError(ServiceException):
-    """The server died or left during the call."""
+    """The server died or left during the call.
+
+    Try: call again if the call may be done twice; `retry=` of `ServiceState` does.
+    """
 
 
 class ServiceBusyError(ServiceException):
-    """The server runs its largest number of calls already."""
+    """The server runs its largest number of calls already.
+
+    Try: wait for answers before calling again, and do not call a service from its own handler.
+    """
 
 
 class ServiceConflictError(ServiceException):
     """Two servers have one name; this one has stopped, so that no call is executed twice.
+
+    Try: end the other server, or give this one another name.
 
     Attributes:
         mine: (node, session) of the server that stopped.
@@ -203,6 +273,8 @@ class ServiceConflictError(ServiceException):
 
 class TypeMismatchError(ActionlibError, TypeError):
     """Two ends of a name have different types.
+
+    Try: use the same definition on both sides, or give the two ends different names.
 
     Attributes:
         name: The name.
@@ -235,6 +307,8 @@ class TypeMismatchError(ActionlibError, TypeError):
 class RemoteNodeError(ActionlibError):
     """A node of a ROS 2 robot refused requests.
 
+    Try: correct each name or value that is listed; docs/ros2_nodes.md tells how to read them.
+
     Attributes:
         node: Its full name.
         problems: Name of a parameter or transition -> reason.
@@ -249,6 +323,8 @@ class RemoteNodeError(ActionlibError):
 class InterfaceError(ActionlibError):
     """A `.msg`, `.srv` or `.action` definition, or the name of one, cannot be used.
 
+    Try: correct the line that is shown; `actionlib interface list` shows what is known.
+
     Attributes:
         problems: One text per problem, each with file, line, caret and what was expected.
     """
@@ -261,6 +337,8 @@ class InterfaceError(ActionlibError):
 class FieldError(InterfaceError, TypeError):
     """Values do not fit the fields of a message that is written or filled.
 
+    Try: correct each field that is named; `actionlib interface show TYPE` shows their types.
+
     Attributes:
         problems: One text per bad field, "pkg/Type: $.path.of.field: expected X, got Y".
     """
@@ -269,6 +347,8 @@ class FieldError(InterfaceError, TypeError):
 class CorrespondenceError(InterfaceError):
     """Fields of a message have no counterpart in the message that it is converted to.
 
+    Try: convert only messages whose fields match, or fill the other message field by field.
+
     Attributes:
         problems: One text per field, "pkg/Type -> pkg/msg/Type: field: ...".
     """
@@ -276,6 +356,8 @@ class CorrespondenceError(InterfaceError):
 
 class DeserializationError(ActionlibError, ValueError):
     """Received bytes are not a message of the expected type.
+
+    Try: use the same version of the interface on both sides; `actionlib info NAME` shows the types.
 
     Attributes:
         type_name: The type that was expected, "pkg/Type"; of ROS 2 "pkg/msg/Type".
@@ -302,6 +384,8 @@ class DeserializationError(ActionlibError, ValueError):
 class Ros1Error(ActionlibError):
     """A ROS 1 master or node does not answer, refuses, or answers wrongly.
 
+    Try: check `ROS_MASTER_URI` and `ROS_IP` of both computers; `smachpy bridge` prints its links.
+
     Attributes:
         peer: The address of the master or node, or the node's name.
         reason: The problem.
@@ -314,11 +398,16 @@ class Ros1Error(ActionlibError):
 
 
 class ActionException(ActionlibError):  # noqa: N818  actionlib's name
-    """Base class of the errors about actions."""
+    """Base class of the errors about actions.
+
+    Try: see the error's own class.
+    """
 
 
 class IllegalTransitionError(ActionException):
     """A goal's state does not allow a transition.
+
+    Try: call it in one of the states that are named; a goal ends once.
 
     Attributes:
         goal: The goal and its action, as text.
@@ -342,6 +431,8 @@ class IllegalTransitionError(ActionException):
 class DurableGoalsError(ActionException):
     """The file of a durable action server cannot be used; nothing in it was changed.
 
+    Try: read the reason; move the file away if its goals no longer matter.
+
     Attributes:
         file: The file.
     """
@@ -353,6 +444,8 @@ class DurableGoalsError(ActionException):
 
 class ServerConflictError(ActionException):
     """Two action servers have one name; this one has stopped, so that no goal runs twice.
+
+    Try: end the other server, or give this one another name.
 
     Attributes:
         name: The action's name.
@@ -376,7 +469,9 @@ def _two_servers(mine: tuple[str, str], other: tuple[str, str]) -> str:
 
 
 class GoalFailedError(ActionException):
-    """The end of a goal was not SUCCEEDED.
+    """The end of a goal was not SUCCEEDED, or its result is no longer known.
+
+    Try: look at `status` and `text`: the server says why. `retry=` tries again.
 
     Attributes:
         name: The action's name.
@@ -391,9 +486,13 @@ class GoalFailedError(ActionException):
         self.status = status
         self.text = text
         self.result = result
-        super().__init__(
-            f"goal {goal_id} on '{name}': got {status}: {text or 'no text'}; expected SUCCEEDED."
-        )
+        # A server forgets results in time, so that a goal may have succeeded and have none.
+        got, expected = status, "SUCCEEDED"
+        if status == expected:
+            got, expected = f"{status} without a result", "its result"
+        # The text is the server's own, and may be a sentence with its own "got" and "expected".
+        said = f"Its text: {text}" if text else "It has no text."
+        super().__init__(f"goal {goal_id} on '{name}': got {got}; expected {expected}. {said}")
 
 
 class InterfaceWarning(UserWarning):
@@ -402,6 +501,8 @@ class InterfaceWarning(UserWarning):
 
 class GoalTimeoutError(GoalFailedError, TimeoutError):
     """A goal took longer than the caller allowed, and was cancelled.
+
+    Try: allow more time, or look at what the server does: `actionlib goal list`.
 
     Attributes:
         timeout: The allowed time [s].

@@ -18,14 +18,14 @@ from contextvars import ContextVar
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actionlib_core.clock import RealClock, current_clock
+from actionlib_core.clock import RealClock, current_clock, wall_time
 from actionlib_core.clock._ending import ending
 from actionlib_core.clock._serial import report_thread_exception
 from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import NodeError, TransportError
 from actionlib_core.names import check_base_name, clean_namespace, parse_arguments, resolve_name
 from actionlib_core.shutdown import current_shutdown
-from actionlib_core.wire.presence import Endpoint, Kind, token_key
+from actionlib_core.transport.tokens import Endpoint, Kind, token_key
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+BRIEF_S = 3.0  # a program that ends sooner after it has joined the network has waited for nobody
 CLOSE_S = 0.8  # total time for closing everything on a node
 
 _NO_ZENOH = (
@@ -45,6 +46,17 @@ _NO_ZENOH = (
     "the same clock. Try use_node(Node(..., clock=clock, "
     "transport=MemoryNetwork(clock).session()))."
 )
+
+
+class _Shared:
+    """An object that `Node.shared` makes on first use, with a lock of its own.
+
+    So one that takes long to make, as its network cannot be reached, holds up no other one.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()  # a signal handler may ask for an object that is being made
+        self.made: list[Any] = []
 
 
 class Node:
@@ -80,6 +92,7 @@ class Node:
         config: Config | None = None,
     ) -> None:
         self.clock = clock if clock is not None else current_clock()
+        wall_time(self.clock).check()  # from now on, steps of its wall time are reported
         self.arguments = arguments if arguments is not None else parse_arguments(())
         self._set_name(name, namespace)
         if transport is None and not isinstance(self.clock, RealClock):
@@ -92,9 +105,9 @@ class Node:
         self.transport: Transport = transport if transport is not None else open_zenoh(config)
         self._lock = threading.Lock()  # guards `_closers`, `_asks` and `_closed`
         self._entities = itertools.count(1)
-        # Reentrant: making one shared object may need another one.
-        self._shared_lock = threading.RLock()
-        self._shared: dict[Hashable, Any] = {}
+        self._shared: dict[Hashable, _Shared] = {}
+        self._unused: dict[int, str] = {}  # what it offers and nobody has used
+        self._made_at = self.clock.now()
         self._closers: dict[int, Callable[[], object]] = {}
         self._asks: dict[int, Callable[[], object]] = {}
         self._closed = False
@@ -109,7 +122,7 @@ class Node:
             name, namespace=self.namespace, node=self.full_name
         )
 
-    def rename(self, name: str) -> None:
+    def rename(self, name: str, *, namespace: str | None = None) -> None:
         """Give the node a name when the program says it only after something has used the network.
 
         What was made before stays announced under the old name; private names and remappings follow
@@ -117,11 +130,12 @@ class Node:
 
         Args:
             name: As for a new node; a name on the command line still wins.
+            namespace: As for a new node; None: it stays.
 
         Raises:
             InvalidNameError: the name breaks the ROS rules.
         """
-        self._set_name(name, self.namespace)
+        self._set_name(name, self.namespace if namespace is None else namespace)
 
     def __repr__(self) -> str:
         state = " closed" if self._closed else ""
@@ -180,11 +194,18 @@ class Node:
             key: Identifies the object.
             make: Makes it, at most once per key and node.
         """
-        with self._shared_lock:
-            if key not in self._shared:
-                self._shared[key] = make()
-            made: T = self._shared[key]
+        shared = self._shared.get(key) or self._shared.setdefault(key, _Shared())
+        with shared.lock:
+            if not shared.made:
+                shared.made.append(make())
+            made: T = shared.made[0]
             return made
+
+    def unshare(self, key: Hashable, made: object) -> None:
+        """Forget a shared object, which is closed; the next `shared` makes another one."""
+        shared = self._shared.get(key)
+        if shared is not None and shared.made and shared.made[0] is made:
+            self._shared.pop(key, None)
 
     def on_close(
         self, closer: Callable[[], object], *, ask: Callable[[], object] | None = None
@@ -220,6 +241,22 @@ class Node:
 
         return forget
 
+    def offer(self, what: str) -> Callable[[], None]:
+        """Note that others are to use something of this node: "action server '/dig'".
+
+        A program that ends at once, and lets nobody use it, has probably forgotten to wait.
+
+        Returns:
+            A function to be called when it is used, waited for or closed.
+        """
+        number = next(self._entities)
+        self._unused[number] = what
+
+        def used() -> None:
+            self._unused.pop(number, None)
+
+        return used
+
     def let_go(self, closer: Callable[[], object]) -> None:
         """Call `closer` soon, in another thread, because the program has dropped its owner.
 
@@ -247,6 +284,19 @@ class Node:
         if self._leave_by is None:
             return longest
         return max(0.0, min(longest, self._leave_by - self.clock.now()))
+
+    def warn_of_early_end(self) -> None:
+        """Log what the node offers if it was open so briefly that nobody can have used it."""
+        if not self._unused or self._closed or self.clock.now() > self._made_at + BRIEF_S:
+            return
+        import logging  # here: it takes 4 ms
+
+        logging.getLogger(__name__).warning(
+            "the program ends at once, and with it %s, which nobody has used. Try wait() of an "
+            "action server, or spin() of a service, as its last line: they wait for others, as "
+            "rospy.spin() does in ROS.",
+            " and ".join(self._unused.values()),
+        )
 
     def close(self) -> None:
         """Close everything on this node, then its session; a second call does nothing.
@@ -343,11 +393,19 @@ def _leave(node: Node, pid: int) -> None:
     if os.getpid() != pid:
         return
     ending.begin()
+    if not hasattr(sys, "last_value"):  # else an exception has ended the program
+        node.warn_of_early_end()
     current_shutdown().leave()
     node.close()
 
 
 _default = _Default()
+
+
+def known_node() -> Node | None:
+    """Return what `get_node` would return, without making it: None if it would be made."""
+    given = _current.get()
+    return given if given is not None or not _default.exists else _default.get()
 
 
 def has_node() -> bool:

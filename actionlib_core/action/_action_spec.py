@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from typing import Protocol, TypeVar
 
-Goal_co = TypeVar("Goal_co", covariant=True)
+Goal = TypeVar("Goal")  # invariant: a result must not pass as a goal
 Result_co = TypeVar("Result_co", covariant=True)
 Feedback_co = TypeVar("Feedback_co", covariant=True)
 
 
-class HasGoal(Protocol[Goal_co]):
-    """An XActionGoal."""
+class HasGoal(Protocol[Goal]):
+    """An XActionGoal.
 
-    @property
-    def goal(self) -> Goal_co:
-        """The XGoal."""
+    Attributes:
+        goal: The XGoal.
+    """
+
+    goal: Goal
 
 
 class HasResult(Protocol[Result_co]):
@@ -36,11 +38,11 @@ class HasFeedback(Protocol[Feedback_co]):
         """The XFeedback."""
 
 
-class ActionSpec(Protocol[Goal_co, Result_co, Feedback_co]):
+class ActionSpec(Protocol[Goal, Result_co, Feedback_co]):
     """An XAction. `type[ActionSpec[G, R, F]]` accepts every action class and yields its types."""
 
     @property
-    def action_goal(self) -> HasGoal[Goal_co]:
+    def action_goal(self) -> HasGoal[Goal]:
         """The XActionGoal."""
 
     @property

@@ -53,7 +53,7 @@ class CallbackQueue:
         self._executor.submit(partial(function, *args) if args else function)
 
     def call_urgently(self, function: Callable[..., object], *args: object) -> None:
-        """As `call`; but if other callbacks delay it, run it beside them in another thread."""
+        """Call a callback in its turn; if others delay it, beside them in another thread."""
         once = _Once(partial(function, *args))
         # Both the timer and the queue get it; the first of them runs it.
         once.timer = self._clock.call_later(PATIENCE_S, partial(self._overtake, once))

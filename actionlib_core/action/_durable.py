@@ -1,11 +1,13 @@
 """The file of a durable action server: its goals with their statuses and results.
 
-Every change is written before it is sent to clients. After a result was acknowledged, its row stays
-without goal and result, so that a late copy of the goal is not run as a new one.
+Every change is written before it is sent to clients. When a result is no longer kept, because it
+was acknowledged or nobody came for it, its row stays for a while without goal and result, so that a
+late copy of the goal is not run as a new one.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import sqlite3
 import threading
@@ -14,8 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.exceptions import ActionlibError, DurableGoalsError
-from actionlib_core.goal.server import MEMORY_S, ServerGoal
+from actionlib_core.goal.server import MEMORY_GOALS, ServerGoal
 from actionlib_core.goal.states import Status
+from actionlib_core.process.private_files import make_private_file, make_private_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -27,6 +30,11 @@ log = logging.getLogger(__name__)
 VERSION: Final = 1
 _APPLICATION: Final = 0x736D6767  # marks the file ("smgg", `PRAGMA application_id`)
 _PATIENCE_S: Final = 2.0  # how long SQLite waits for other servers that write to the file
+_DELETE: Final = "DELETE FROM goals WHERE action = ? AND id = ?"
+_FORGET: Final = (
+    "UPDATE goals SET goal = NULL, result = NULL, status = ?, changed = ? "
+    "WHERE action = ? AND id = ?"
+)
 _TABLE: Final = """CREATE TABLE goals (
     action TEXT NOT NULL, id TEXT NOT NULL, type TEXT NOT NULL,
     stamp_ns INTEGER NOT NULL, client TEXT NOT NULL, status INTEGER NOT NULL, text TEXT NOT NULL,
@@ -75,7 +83,9 @@ class GoalFile:
         self._type = f"{goal._type} {getattr(goal, '_rihs01', None) or goal._md5sum}"
         self._lock = threading.Lock()
         try:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            make_private_folder(Path(path).parent)
+            # An empty file is an empty database for SQLite, which gives its log the same mode.
+            make_private_file(Path(path))
             self._connection = sqlite3.connect(
                 path, timeout=_PATIENCE_S, isolation_level=None, check_same_thread=False
             )
@@ -110,11 +120,11 @@ class GoalFile:
         run("PRAGMA journal_mode = WAL")
         run("PRAGMA synchronous = FULL")
 
-    def load(self, now: float) -> tuple[list[KeptGoal], dict[str, int]]:
-        """Return the goals whose ends are not acknowledged, and the statuses of the other goals.
+    def load(self) -> tuple[list[KeptGoal], dict[str, int]]:
+        """Return the goals with their results, and the statuses of those without, by id.
 
-        Args:
-            now: Seconds since the Unix epoch; goals that ended long before are deleted.
+        Of the second, only the newest `MEMORY_GOALS` stay in the file. Their ages do not count:
+        between two processes only the wall clock could tell them, which may be set.
 
         Raises:
             DurableGoalsError: a goal cannot be read, or has another definition.
@@ -124,8 +134,10 @@ class GoalFile:
         try:
             with self._lock:
                 self._connection.execute(
-                    "DELETE FROM goals WHERE action = ? AND goal IS NULL AND changed < ?",
-                    (self._action, now - MEMORY_S),
+                    "DELETE FROM goals WHERE action = ? AND goal IS NULL AND rowid NOT IN "
+                    "(SELECT rowid FROM goals WHERE action = ? AND goal IS NULL "
+                    "ORDER BY rowid DESC LIMIT ?)",
+                    (self._action, self._action, MEMORY_GOALS),
                 )
                 # By rowid: in the order in which the goals arrived.
                 rows = self._connection.execute(
@@ -179,14 +191,27 @@ class GoalFile:
                 *(record.id, self._action, record.status.name, problem),
             )
 
-    def forget(self, goal_ids: Iterable[str], now: float) -> None:
-        """Delete goals and results, but not the statuses, as the clients have the results."""
-        for goal_id in goal_ids:
-            self._write(
-                "UPDATE goals SET goal = NULL, result = NULL, changed = ? "
-                "WHERE action = ? AND id = ? AND result IS NOT NULL",
-                lambda goal_id=goal_id: (now, self._action, goal_id),
-            )
+    def forget(self, goals: Iterable[tuple[str, Status | None]], now: float) -> None:
+        """Delete goals and results, but not the statuses; a failure is logged.
+
+        Args:
+            goals: Id and status of each; None instead of a status: the row is deleted too.
+            now: Seconds since the Unix epoch.
+        """
+        execute = self._connection.execute
+        try:
+            with self._lock:
+                execute("BEGIN IMMEDIATE")
+                for goal_id, status in goals:
+                    if status is None:
+                        execute(_DELETE, (self._action, goal_id))
+                    else:
+                        execute(_FORGET, (int(status), now, self._action, goal_id))
+                execute("COMMIT")
+        except sqlite3.Error as error:
+            with contextlib.suppress(sqlite3.Error):
+                self._connection.rollback()
+            log.error("goals on '%s' cannot be removed: %s", self._action, self._error(error))  # noqa: TRY400
 
     def close(self) -> None:
         """Close the file."""

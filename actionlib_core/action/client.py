@@ -1,8 +1,9 @@
 """`ActionClient`: any number of goals at once, each followed through its handle.
 
 Three objects follow a goal at its client. `ClientGoal` (`actionlib_core.goal.client`) makes the
-decisions, `ClientGoalHandle` is the program's view of it, and `GoalManager`, one per client,
-connects them with the network, the clock and the callbacks, under one lock.
+decisions, `ClientGoalHandle` is the program's view of it, and `GoalManager` connects them with the
+network, the clock and the callbacks, under one lock. All clients of an action on one node share a
+manager: each result and status list is read once, however many clients there are.
 
 The lock is held neither while user callbacks run nor while messages are sent: both may block, or
 lead back into the client.
@@ -11,6 +12,7 @@ lead back into the client.
 from __future__ import annotations
 
 import contextlib
+import heapq
 import itertools
 import logging
 import math
@@ -21,17 +23,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import (
-    check_delay,
-    check_function,
-    check_limit,
-    check_seconds,
-    check_wait,
-    is_goal_id,
-)
+from actionlib_core import border
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.action.sent_goal import SentGoal
-from actionlib_core.clock import current_clock
+from actionlib_core.clock import current_clock, wall_time
 from actionlib_core.exceptions import ActionException, ActionlibError, TransportError
 from actionlib_core.goal.bounded import Backlog, Recent
 from actionlib_core.goal.client import (
@@ -50,10 +45,19 @@ from actionlib_core.goal.states import (
     Status,
     TerminalState,
 )
+from actionlib_core.inputs.arguments import (
+    check_delay,
+    check_function,
+    check_limit,
+    check_seconds,
+    check_wait,
+    is_goal_id,
+)
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
 from actionlib_core.time import Time
+from actionlib_core.wire.absence import ABSENT_S
 from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ports import make_client_port
 
@@ -84,11 +88,13 @@ __all__ = [
 MISMATCH_S = 0.2
 TICK_S = 0.05  # repetitions and acknowledgements due within this time are sent together
 ACK_AT = 64  # this number of waiting acknowledgements is sent at once
+REPEATED_AT_ONCE = 100  # goals for which something is sent again in one tick
+LOOKS = 256  # planned looks at goals that may belong to ended ones
 REMEMBERED = 1024  # ids of ended goals whose result may arrive again
 FEEDBACK_S = 0.5  # a feedback callback slower than this after the goal's end is the last one
-ABSENT_S = 3.0  # after this time without a server, log where it was looked for
 CALLBACKS_S = 1.0  # `wait` gives callbacks this time to return after the goal's end
 
+STOPPED = "the action client was stopped"
 UNSURE = " and had not acknowledged the goal, which may or may not have begun"
 
 A_co = TypeVar("A_co", covariant=True)
@@ -126,9 +132,9 @@ class GoalIDGenerator:
         self.name = name
 
     def generate(self) -> tuple[str, int]:
-        """Return a new id and its stamp [ns since the epoch]."""
+        """Return a new id and its stamp [ns since the epoch], later than those before."""
         clock = self._clock if self._clock is not None else current_clock()
-        stamp_ns = clock.time_ns()
+        stamp_ns = wall_time(clock).stamp_ns()
         secs, nsecs = divmod(stamp_ns, 1_000_000_000)
         # A virtual clock counts by itself, so that repeated runs of a test have the same ids.
         count = getattr(clock, "numbers", _count)
@@ -169,35 +175,39 @@ class ClientGoalHandle:
     `comm_state_machine` is the handle itself.
 
     Attributes:
-        manager: The client's goals.
+        owner: The client that follows it.
         goal: The goal's life cycle.
         body: The packed goal message.
         on_state: Called under the manager's lock with each state passed; must not block.
         on_feedback: The same, for feedback; None when no feedback is wanted.
         feedback: Feedback that was not taken yet, None before the first; guarded by the manager's
             lock.
+        wants_feedback: Feedback reaches code of the program; else it is only shown.
         keeps_result: The server is to keep the result until `acknowledge` is called.
         calls_back: The goal has callbacks, which `wait` waits for.
         settled: The goal is over and its last callback has returned, or it is no longer followed.
         ended_at: When the goal ended [s, clock]; None before.
         last_call: The callback that reports the goal's end has started.
         asking: A query about the goal is pending.
+        look_at: When the manager's timer looks at the goal [s, clock].
 
     Threads: every method may be called from any thread and any callback.
     """
 
-    manager: GoalManager
+    owner: Owner
     goal: ClientGoal
     body: bytes = b""
     on_state: Callable[[CommState], object] | None = None
     on_feedback: Callable[[], object] | None = None
     feedback: Backlog[Any] | None = None
+    wants_feedback: bool = True
     keeps_result: bool = False
     calls_back: bool = False
     settled: bool = False
     ended_at: float | None = None
     last_call: bool = False
     asking: bool = False
+    look_at: float = math.inf
     # Made by the first thread that waits: most goals need neither of them.
     _ended: Event | None = None
     _settled: Event | None = None
@@ -205,6 +215,11 @@ class ClientGoalHandle:
     # threads see the goal's present state.
     _shown: CommState | None = None
     _shown_to: int = 0
+
+    @property
+    def manager(self) -> GoalManager:
+        """The goals of all clients of the action."""
+        return self.owner.manager
 
     # -- for programs --------------------------------------------------------------------------
 
@@ -276,7 +291,7 @@ class ClientGoalHandle:
 
     @property
     def state(self) -> CommState:
-        """As `get_comm_state`."""
+        """Where the goal is in its life at the client."""
         return self.get_comm_state()
 
     def __eq__(self, other: object) -> bool:
@@ -332,7 +347,7 @@ class ClientGoalHandle:
 
     def call(self, state: CommState, callback: Callable[..., object], *args: object) -> None:
         """Queue a user callback in which `get_comm_state` returns `state`."""
-        self.manager.callbacks.call(self._show, state, callback, *args)
+        self.owner.callbacks.call(self._show, state, callback, *args)
 
     def _show(self, state: CommState, callback: Callable[..., object], *args: object) -> None:
         # The thread first: in the other order, another thread could read this state in between.
@@ -345,7 +360,7 @@ class ClientGoalHandle:
 
     def call_with_feedback(self, callback: Callable[[Any], object]) -> None:
         """Queue a user callback that is called with the next feedback."""
-        self.manager.callbacks.call(self._deliver_feedback, callback)
+        self.owner.callbacks.call(self._deliver_feedback, callback)
 
     def _deliver_feedback(self, callback: Callable[[Any], object]) -> None:
         feedback = self.take_feedback()
@@ -376,8 +391,10 @@ class ClientGoalHandle:
 
     def take_feedback(self) -> Any:
         """Remove and return the oldest feedback; None when there is none."""
+        if self.feedback is None:  # the usual case of a goal without feedback, without the lock
+            return None
         with self.manager.lock:
-            return None if self.feedback is None else self.feedback.take()
+            return self.feedback.take()
 
     def drop_feedback_after(self, started: float, limit: float = FEEDBACK_S) -> None:
         """Drop the remaining feedback if the goal is over and a callback was too slow.
@@ -418,20 +435,56 @@ def _renew_locks() -> None:
 os.register_at_fork(after_in_child=_renew_locks)
 
 
+class Owner:
+    """One client among those that share a manager. It outlives a dropped `ActionClient`.
+
+    Attributes:
+        manager: The goals of all of them.
+        callbacks: Runs the user callbacks of this client.
+        running: Number of its goals that are not over; guarded by the manager's lock.
+        closed: It was stopped.
+        dropped: By the program: the end of its last goal stops it.
+    """
+
+    __slots__ = ("__weakref__", "callbacks", "closed", "dropped", "manager", "running")
+    manager: GoalManager
+
+    def __init__(self, callbacks: CallbackQueue) -> None:
+        self.callbacks = callbacks
+        self.running = 0
+        self.closed = self.dropped = False
+
+    def let_go(self) -> None:
+        """Close as soon as no goal runs any more; called when the program has dropped the client.
+
+        Threads: any, at any moment: also in a garbage collection, where this thread may hold the
+            lock halfway through a change. So another thread does the work.
+        """
+        self.manager.node.let_go(self._close_when_idle)
+
+    def _close_when_idle(self) -> None:
+        with self.manager.lock:
+            self.dropped = True
+            idle = not self.running
+        if idle:
+            self.manager.leave(self)
+
+
 class GoalManager:
-    """The goals of one client. It outlives a dropped `ActionClient` until its goals are over.
+    """The goals of all clients of an action on one node.
 
     Args:
-        node: The client's node, whose clock counts.
+        node: The clients' node, whose clock counts.
         name: The action's full name.
-        port: The client's connection to the network.
-        callbacks: Runs the user callbacks.
+        port: Their connection to the network.
+        spawn: Starts a named thread.
+        key: Under which the node shares it (see `Node.shared`); None if it does not.
         server_lost_timeout: How long a server may be away before its goals are LOST [s].
         status_list_timeout: How long a server without a token may be silent before its goals are
             LOST [s].
 
     Attributes:
-        lock: Guards the goals. User callbacks run without it, in `callbacks`.
+        lock: Guards the goals. User callbacks run without it, in the clients' queues.
 
     Threads: every method may be called from any thread.
     """
@@ -441,68 +494,94 @@ class GoalManager:
         node: Node,
         name: str,
         port: ClientPort,
-        callbacks: CallbackQueue,
+        spawn: Callable[[Callable[[], object], str], object],
         *,
+        key: tuple[Any, ...] | None = None,
         server_lost_timeout: float,
         status_list_timeout: float = STATUS_LIST_TIMEOUT_S,
     ) -> None:
         self.node = node
         self.name = name
         self.port = port
-        self.callbacks = callbacks
+        self._spawn = spawn
+        self._key = key
         self.clock = node.clock
         self.lock = threading.RLock()
+        self._owners: set[Owner] = set()
         _managers.add(self)
         self._server_lost_timeout = server_lost_timeout
         self._status_list_timeout = status_list_timeout
         self._servers = KnownServers(status_list_timeout)
+        self._gone: dict[Server, str] = {}  # servers that are away -> what has happened to them
         self._goals: dict[str, ClientGoalHandle] = {}  # by id, those that are not over
         self._ended: dict[str, None] = {}  # ids of ended ones: a `Recent`, written out for speed
         self._strangers = Recent(REMEMBERED)  # sessions that were reported
         self._acks: list[str] = []  # goal ids for the next acknowledgement message
         self._ack_timer: Timer | None = None
+        self._absence_told = False
+        self._absence_timer: Timer | None = None
         self._waiters: list[Event] = []  # of `wait_for_server`; each waking removes them
+        # When to look at which goal, a heap; the number decides between equal times.
+        self._looks: list[tuple[float, int, ClientGoalHandle]] = []
+        self._numbers = itertools.count()
         self._timer: Timer | None = None
         self._due = math.inf  # when the timer runs [s, clock]; without one, never
         self._closed = False
-        self._dropped = False  # by the program: the end of the last goal closes this
+        self._open = True  # to more clients
         port.open(self)  # last, as it already reports the servers that are there
         self._forget_on_close = node.on_close(self.close)
 
-    def close(self) -> None:
-        """Withdraw from the network; goals that still run are LOST for this client."""
+    def join(self, owner: Owner) -> bool:
+        """Add a client; return whether that was possible: not if this is closed already."""
+        with self.lock:
+            if self._open:
+                self._owners.add(owner)
+            return self._open
+
+    def _tell(self, what: border.What, key: str, value: Any = None, *said: str) -> None:
+        """Tell the listeners of the border; call it if there are any."""
+        border.tell(what, self.node, self.name, "", key, value, *said)
+
+    def leave(self, owner: Owner) -> None:
+        """Stop a client: its goals are LOST. The last one withdraws from the network."""
+        with self.lock:
+            if owner.closed:
+                return
+            for handle in list(self._goals.values()) if owner.running else ():
+                if handle.owner is owner:
+                    self._pass(handle, handle.goal.lose(STOPPED))
+            owner.closed = True
+            self._owners.discard(owner)
+            last = not self._owners
+            self._open = self._open and not last  # a new client gets a new manager
+            self._wake()
+        if last:
+            self.close()
+
+    def close(self, why: str = STOPPED) -> None:
+        """Withdraw from the network; goals that still run are LOST for all clients."""
         with self.lock:
             if self._closed:
                 return
             for handle in list(self._goals.values()):
-                self._pass(handle, handle.goal.lose("the action client was stopped"))
-            self._closed = True
+                self._pass(handle, handle.goal.lose(why))
+            self._closed, self._open = True, False
+            for owner in self._owners:
+                owner.closed = True
             self._forget_on_close()
-            if self._timer is not None:
-                self._timer.cancel()
+            if self._key is not None:
+                self.node.unshare(self._key, self)
+            for timer in (self._timer, self._absence_timer):
+                if timer is not None:
+                    timer.cancel()
             self._wake()
         # Without the lock: closing waits for the network's callbacks, which may wait for the lock.
         self._send_acks()
         self.port.close()
 
-    def let_go(self) -> None:
-        """Close as soon as no goal runs any more; called when the program has dropped the client.
-
-        Threads: any, at any moment: also in a garbage collection, where this thread may hold the
-            lock halfway through a change. So another thread does the work.
-        """
-        self.node.let_go(self._close_when_idle)
-
-    def _close_when_idle(self) -> None:
-        with self.lock:
-            self._dropped = True
-            idle = not self._goals
-        if idle:
-            self.close()
-
     # -- calls of the program ------------------------------------------------------------------
 
-    def wait_for_server(self, timeout: float | None) -> bool:
+    def wait_for_server(self, owner: Owner, timeout: float | None) -> bool:
         """Wait for a server; return whether there is one.
 
         Raises:
@@ -514,14 +593,14 @@ class GoalManager:
         started = self.clock.now()
         # Only if there is time for `explain_absence`, which takes up to 1 s.
         if timeout is None or timeout > ABSENT_S + 1.0:
-            if self._await_server(started + ABSENT_S, ends=timeout is None):
+            if self._await_server(owner, started + ABSENT_S, ends=timeout is None):
                 return True
-            if not (self._closed or (timeout is None and current_shutdown().requested())):
-                self._log_absence()
+            if not (owner.closed or (timeout is None and current_shutdown().requested())):
+                self._tell_absence()
         deadline = None if timeout is None else started + timeout
-        return self._await_server(deadline, ends=timeout is None)
+        return self._await_server(owner, deadline, ends=timeout is None)
 
-    def _await_server(self, deadline: float | None, *, ends: bool) -> bool:
+    def _await_server(self, owner: Owner, deadline: float | None, *, ends: bool) -> bool:
         """Wait for a server until `deadline` [s, clock]; `ends`: or until shutdown is requested."""
         changed = self.clock.event()
         ending = current_shutdown()
@@ -529,7 +608,7 @@ class GoalManager:
         try:
             while True:
                 with self.lock:
-                    if self._closed:
+                    if owner.closed:
                         return False
                     if self._servers.is_there:
                         return True
@@ -551,12 +630,32 @@ class GoalManager:
             if forget is not None:
                 forget()
 
-    def _log_absence(self) -> None:
-        """Log why there may be no server, if the network knows a reason."""
+    def _tell_absence(self) -> None:
+        """Log, once until there is a server, where it was looked for and what there is.
+
+        Blocks: as `ClientPort.explain_absence`.
+        """
+        with self.lock:
+            if self._absence_told or self._closed or self._servers.is_there:
+                return
+            self._absence_told = True
         with contextlib.suppress(TransportError):  # the session is closed: the wait ends with it
-            why = self.port.explain_absence()
-            if why:
-                log.warning("action '%s': no server after %g s: %s", self.name, ABSENT_S, why)
+            why = self._lost_with("all servers") or self.port.explain_absence()
+            log.warning("action '%s': no server after %g s: %s", self.name, ABSENT_S, why)
+
+    def _tell_absence_later(self) -> None:
+        """Tell of a missing server when a goal has waited for it for some time. Needs the lock."""
+        told = self._absence_told or self._absence_timer is not None
+        if not told and not self._servers.is_there:
+            self._absence_timer = self.clock.call_later(ABSENT_S, self._on_absent)
+
+    def _on_absent(self) -> None:
+        """Tell of a missing server, in another thread, if a goal waits for one."""
+        with self.lock:
+            self._absence_timer = None
+            waits = any(not handle.goal.acknowledged for handle in self._goals.values())
+        if waits:
+            self._spawn(self._tell_absence, f"{self.name} absence")
 
     def begin(self, handle: ClientGoalHandle) -> None:
         """Follow a goal: send it, or query the server for one that was sent before.
@@ -568,7 +667,7 @@ class GoalManager:
         """
         heard = self.port.is_heard()  # without the lock, for which the network's threads may wait
         with self.lock:
-            if self._closed:
+            if handle.owner.closed:
                 raise self._stopped()
             goal, now = handle.goal, self.clock.now()
             if goal.over:  # cancelled before it was sent, by another thread or a signal handler
@@ -583,16 +682,31 @@ class GoalManager:
             duty, receiver = goal.begin(now), None
             if heard and duty is Duty.GOAL:
                 receiver = self._servers.find_receiver(goal, now)
+            # Before the goal is registered: starting a timer raises when no thread can be started.
             if receiver is not None:
                 goal.on_offered(*receiver)
-            # Before the goal is registered: starting a timer raises when no thread can be started.
-            if goal.due < self._due:
-                self._arm(goal.due)
+            else:
+                self._tell_absence_later()
+            self._look(handle)
             self._goals[goal.id] = handle  # before sending: the answer may arrive at once
+            self._count(handle.owner, 1)
         if receiver is not None:
-            self.port.send_goal(goal.id, goal.stamp_ns, handle.body, receiver.server)
+            self.port.send_goal(
+                goal.id, goal.stamp_ns, handle.body, receiver.server, age=now - goal.made_at
+            )
         elif duty is Duty.ASK:
             self._fulfil(handle, duty)
+
+    def _count(self, owner: Owner, more: int) -> None:
+        """Count the goals of a client; a dropped one ends with the last. Needs the lock."""
+        owner.running += more
+        if owner.dropped and not owner.running:
+            owner.let_go()
+
+    def follows_for_another(self, owner: Owner, goal_id: str) -> bool:
+        """Return whether another client than `owner` follows a goal."""
+        handle = self._goals.get(goal_id)
+        return handle is not None and not handle.forgotten and handle.owner is not owner
 
     def _take_over(self, known: ClientGoalHandle, handle: ClientGoalHandle) -> None:
         """Let a new handle follow a forgotten goal that still runs. Needs the lock."""
@@ -605,7 +719,9 @@ class GoalManager:
         handle.body, handle.asking = known.body, known.asking
         goal.limit_ack(ack_timeout, self.clock.now())
         self._goals[goal.id] = handle
-        self._arm(goal.due)
+        self._count(handle.owner, 1)
+        self._count(known.owner, -1)
+        self._look(handle)
         if goal.comm is not CommState.WAITING_FOR_GOAL_ACK:
             self._pass(handle, (goal.comm,))
 
@@ -617,9 +733,11 @@ class GoalManager:
 
     def _cancel(self, handle: ClientGoalHandle) -> Duty:
         """Mark a goal as cancelled; return what to send. Needs the lock."""
+        if border.listeners:
+            self._tell("cancel", handle.goal.id)
         path, duty = handle.goal.cancel(self.clock.now())
         self._pass(handle, path)
-        self._arm(handle.goal.due)
+        self._look(handle)
         return duty
 
     def cancel_many(self, stamp_ns: int) -> None:
@@ -631,13 +749,14 @@ class GoalManager:
         Raises:
             TransportError: the client is stopped.
         """
+        now, now_ns = self.clock.now(), self.clock.time_ns()
         with self.lock:
             if self._closed:
                 raise self._stopped()
             meant = [
                 handle
                 for handle in list(self._goals.values())
-                if not stamp_ns or 0 < handle.goal.stamp_ns <= stamp_ns
+                if not stamp_ns or handle.goal.is_before(stamp_ns, now, now_ns)
             ]
             duties = [(handle, self._cancel(handle)) for handle in meant]
         self.port.send_cancel("", stamp_ns)
@@ -660,7 +779,7 @@ class GoalManager:
         deadline = None if timeout is None else self.clock.now() + timeout
         handle.wait_ended(timeout)
         # Inside a callback, waiting for callbacks would wait for itself.
-        if not goal.over or self.callbacks.is_inside():
+        if not goal.over or handle.owner.callbacks.is_inside():
             return goal.over
         # The callbacks have until `CALLBACKS_S` after the goal's end, within the timeout.
         now = self.clock.now()
@@ -698,6 +817,10 @@ class GoalManager:
         with self.lock:
             returned, replaced = self._servers.appear(server, error, now)
             if error is None:
+                if border.listeners:
+                    self._tell("server", server.session)
+                for old in (server, *replaced):
+                    self._gone.pop(old, None)
                 for old in replaced:
                     self._lose_goals_of(old, f"restarted as session {server.session}")
                 self._hurry(now, every=returned)
@@ -718,11 +841,16 @@ class GoalManager:
         with self.lock:
             if not self._servers.vanish(server):
                 return  # unknown, or of another type
-            # A server that has said farewell does not come back: its goals are lost now.
-            if self._servers.has_said_farewell(server) or self._server_lost_timeout <= 0:
+            if border.listeners:
+                self._tell("gone", server.session, None, "", why)
+            # A server that has said farewell does not come back: its goals are lost now. Of others
+            # it is known a moment later whether only the link to them is lost.
+            wait = max(self._server_lost_timeout, self.port.link_delay)
+            if self._servers.has_said_farewell(server) or wait <= 0:
                 self._lose_goals_of(server, why)
             else:
-                until = self.clock.now() + self._server_lost_timeout
+                until = self.clock.now() + wait
+                self._gone[server] = why
                 self._servers.expect_back(server, until)
                 self._arm(until)
 
@@ -762,7 +890,9 @@ class GoalManager:
             )
 
     def _wake(self) -> None:
-        """Wake the threads that wait for a server. Needs the lock."""
+        """Wake the threads that wait for a server, as there may be one. Needs the lock."""
+        if self._servers.is_there:
+            self._absence_told = False
         waiters, self._waiters = self._waiters, []
         for event in waiters:
             event.set()
@@ -775,12 +905,17 @@ class GoalManager:
         for handle in self._goals.values():
             if every or not handle.goal.acknowledged:
                 handle.goal.hurry(now)
-        self._arm(now)
+                self._look(handle)
 
     def _lose_goals_of(self, server: Server, what: str) -> None:
         """Lose the goals that a server has, or may have. Needs the lock."""
-        reason = f"the action server of node '{server.node}' (session {server.session}) {what}"
-        self._lose_goals(self._servers.forget(server), reason)
+        who = f"the action server of node '{server.node}' (session {server.session})"
+        self._lose_goals(self._servers.forget(server), self._lost_with(who) or f"{who} {what}")
+
+    def _lost_with(self, who: str) -> str:
+        """Return that the link to all servers is lost, and so are they; "" if it is not lost."""
+        link = self.port.lost_link
+        return link and f"the link to {link} is lost, and with it {who}, which may still be running"
 
     def _lose_goals(self, sessions: Collection[str], reason: str) -> None:
         """Lose the goals that these sessions have, or may have. Needs the lock."""
@@ -807,7 +942,8 @@ class GoalManager:
                 if handle is not None and (speaks or self._believes(session, handle)):
                     goal = handle.goal
                     path = goal.on_entry(entry, session, now)
-                    if path and handle.on_state is None and not goal.over and goal.due >= self._due:
+                    quiet = path and handle.on_state is None and not goal.over
+                    if quiet and goal.due >= handle.look_at:
                         continue  # what `_pass` would do here is nothing: saves the call
                     if path != ():
                         self._pass(handle, path, entry)
@@ -816,7 +952,7 @@ class GoalManager:
                 for handle in list(goals.values()):
                     if handle.goal.id not in listed and handle.goal.server in {"", session}:
                         self._pass(handle, handle.goal.on_unlisted(now, answers=answers))
-                        self._arm(handle.goal.due)
+                        self._look(handle)
 
     def _on_foreign_list(self, session: str, now: float) -> None:
         """Handle a status list of a session that may be a server without a token."""
@@ -850,6 +986,8 @@ class GoalManager:
             except (ValueError, ActionlibError) as error:
                 log.error("action '%s': feedback cannot be read: %s", self.name, error)  # noqa: TRY400
                 return
+            if border.listeners and handle.wants_feedback:
+                self._tell("feedback", entry.id, feedback)
         with self.lock:
             goal, now = handle.goal, self.clock.now()
             if goal.over:
@@ -929,7 +1067,9 @@ class GoalManager:
             if self._ack_timer is not None:
                 self._ack_timer.cancel()
         if acks:
-            self.port.acknowledge(acks)
+            # Without the session, the server keeps the results until their time is over.
+            with contextlib.suppress(TransportError):
+                self.port.acknowledge(acks)
 
     def _pass(
         self, handle: ClientGoalHandle, path: Path | None, entry: StatusEntry | None = None
@@ -943,29 +1083,32 @@ class GoalManager:
         if goal.over:
             self._finish(handle, path)
             return
+        if border.listeners:
+            self._tell("status", goal.id, None, goal.status.name, goal.text)
         if handle.on_state is not None:
             for state in path:
                 handle.on_state(state)
-        if goal.due < self._due:
-            self._arm(goal.due)
+        self._look(handle)
 
     def _finish(self, handle: ClientGoalHandle, path: Path) -> None:
         """Stop following a goal that has ended, and report its end. Needs the lock."""
         now = self.clock.now()
-        self._goals.pop(handle.goal.id, None)
+        if border.listeners:
+            goal = handle.goal
+            self._tell("end", goal.id, goal.result, goal.status.name, goal.text)
+        if self._goals.pop(handle.goal.id, None) is not None:  # else it was never sent
+            self._count(handle.owner, -1)
         self._ended[handle.goal.id] = None
         if len(self._ended) > REMEMBERED:
             del self._ended[next(iter(self._ended))]
         handle.ended_at = now
-        if self._dropped and not self._goals:
-            self.let_go()
         # Without callbacks, the goal is settled at once, without a thread.
         if handle.on_state is None and handle.on_feedback is None:
             handle.settle()
             return
         handle.note_ended()
         if handle.on_state is None:
-            self.callbacks.call(handle.settle)  # queued behind the last feedback
+            handle.owner.callbacks.call(handle.settle)  # queued behind the last feedback
         else:
             for state in path:
                 handle.on_state(state)  # queues the callbacks and behind them `settle`
@@ -973,6 +1116,20 @@ class GoalManager:
         handle.on_state = handle.on_feedback = None
 
     # -- time and sending ----------------------------------------------------------------------
+
+    def _look(self, handle: ClientGoalHandle) -> None:
+        """Let the timer look at a goal when that is due. Needs the lock."""
+        due = handle.goal.due
+        if due >= handle.look_at:  # it looks earlier anyway, and then again
+            return
+        handle.look_at = due
+        looks = self._looks
+        heapq.heappush(looks, (due, next(self._numbers), handle))
+        if len(looks) > LOOKS + 4 * len(self._goals):  # most of them belong to ended goals
+            self._looks = [(at, n, h) for at, n, h in looks if at == h.look_at and not h.goal.over]
+            heapq.heapify(self._looks)
+        if due < self._due:
+            self._arm(due)
 
     def _arm(self, due: float) -> None:
         """Let the timer run at `due` at the latest. Needs the lock."""
@@ -984,33 +1141,53 @@ class GoalManager:
         self._due = due
         self._timer = self.clock.call_later(due - self.clock.now(), self._on_timer)
 
+    def _look_at_goals(self, now: float) -> list[tuple[ClientGoalHandle, Duty]]:
+        """Look at the goals that are due; return what to send for them. Needs the lock."""
+        duties: list[tuple[ClientGoalHandle, Duty]] = []
+        # The rest is for the next tick: repetitions for thousands of goals at once would keep a
+        # busy server from the goals themselves.
+        while self._looks and self._looks[0][0] <= now and len(duties) < REPEATED_AT_ONCE:
+            at, _, handle = heapq.heappop(self._looks)
+            if at != handle.look_at or self._goals.get(handle.goal.id) is not handle:
+                continue  # it has ended, or there was an earlier look
+            handle.look_at = math.inf
+            path, duty = handle.goal.tick(now, self.port.lost_link)
+            self._pass(handle, path)
+            if duty:
+                duties.append((handle, duty))
+            if not handle.goal.over:
+                self._look(handle)
+        return duties
+
     def _on_timer(self) -> None:
         now = self.clock.now()
-        duties = []  # sent without the lock, for which the network's threads may wait
         with self.lock:
             self._timer, self._due = None, math.inf
             if self._closed:
                 return
             for server in self._servers.take_overdue(now):
-                self._lose_goals_of(server, "is gone")
+                self._lose_goals_of(server, self._gone.pop(server, "is gone"))
             for session in self._servers.take_silent(now):
+                who = f"the action server without a token (session {session or 'unknown'})"
                 self._lose_goals(
                     {session},
-                    f"the action server without a token (session {session or 'unknown'}) has sent "
-                    f"no status list for {self._status_list_timeout:g} s",
+                    self._lost_with(who)
+                    or f"{who} has sent no status list for {self._status_list_timeout:g} s",
                 )
-            for handle in list(self._goals.values()):
-                path, duty = handle.goal.tick(now)
-                self._pass(handle, path)
-                if duty:
-                    duties.append((handle, duty))
-            dues = [handle.goal.due for handle in self._goals.values()]
+            duties = self._look_at_goals(now)
+            dues = [self._looks[0][0]] if self._looks else []
             dues.extend(self._servers.away.values())
             dues.extend(self._servers.foreign.values())
             if dues:
                 self._arm(max(min(dues), now + TICK_S))
-        for handle, duty in duties:
-            self._fulfil(handle, duty, wait=False)  # a full link must not delay other timers
+        try:
+            # Sent without the lock, for which the network's threads may wait.
+            for handle, duty in duties:
+                self._fulfil(handle, duty, wait=False)  # a full link must not delay other timers
+        except TransportError as error:  # the program has closed the session, not the client
+            if not self._closed:
+                log.warning("action '%s': its goals are LOST: %s", self.name, error)
+                self.close(str(error))
 
     def _fulfil(self, handle: ClientGoalHandle, duty: Duty, *, wait: bool = True) -> None:
         """Send what a goal needs; without `wait`, drop it when the link is full.
@@ -1030,7 +1207,10 @@ class GoalManager:
                 if receiver is not None:
                     goal.on_offered(*receiver)
             if receiver is not None:
-                self.port.send_goal(goal.id, goal.stamp_ns, handle.body, receiver.server, wait=wait)
+                age = now - goal.made_at
+                self.port.send_goal(
+                    goal.id, goal.stamp_ns, handle.body, receiver.server, age=age, wait=wait
+                )
         if Duty.ASK in duty and not handle.asking:
             handle.asking = True
             self.port.ask(goal.id, partial(self._on_answered, goal.id))
@@ -1044,6 +1224,9 @@ class GoalManager:
 
 class ActionClient(Generic[A_co]):
     """Sends goals to an action server and follows each of them to its end.
+
+    `send` is for scripts and tests, `send_goal` for many goals at once; other ways:
+    docs/howto/which_way.md.
 
     Args:
         ns: The action's name.
@@ -1082,6 +1265,9 @@ class ActionClient(Generic[A_co]):
         self.node = node if node is not None else get_node()
         self.types = ActionTypes.of(ActionSpec)
         self.ns = self.node.resolve(ns, "action name")
+        if border.listeners:
+            session = self.node.transport.session_id
+            border.tell("client", self.node, self.ns, self.types.action._type, session)
         if 0 < grace < self.node.transport.rediscovery:
             log.warning(
                 "action '%s': server_lost_timeout: got %g; on this network it takes up to %g s to "
@@ -1090,18 +1276,45 @@ class ActionClient(Generic[A_co]):
                 grace,
                 self.node.transport.rediscovery,
             )
-        callbacks = CallbackQueue(self.node, f"{self.ns} client callbacks")
-        self.manager = GoalManager(
+        self._owner = Owner(CallbackQueue(self.node, f"{self.ns} client callbacks"))
+        self._limits = grace, silence
+        key = ("goals", self.ns, self.types.action, *self._limits, self.node.full_name)
+        while True:
+            manager = self.node.shared(key, partial(self._make_manager, key))
+            if manager.join(self._owner):
+                break
+            self.node.unshare(key, manager)  # its last client has just left
+        self.manager = self._owner.manager = manager
+        self._apart: Owner | None = None
+        self._ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self.node.clock)
+        self._let_go = weakref.finalize(self, self._owner.let_go)
+        self._let_go.atexit = False  # there the node closes its clients itself
+
+    def _owner_apart(self) -> Owner:
+        """Return an owner for goals that another client of this node follows already.
+
+        It has a manager of its own, as a manager follows a goal once.
+        """
+        if self._apart is None:
+            apart = Owner(self._owner.callbacks)
+            apart.manager = self._make_manager(None)
+            apart.manager.join(apart)
+            self._apart = apart
+            weakref.finalize(self, apart.let_go).atexit = False
+        return self._apart
+
+    def _make_manager(self, key: tuple[Any, ...] | None) -> GoalManager:
+        spawn = CallbackQueue(self.node, f"{self.ns} client").spawn
+        grace, silence = self._limits
+        return GoalManager(
             self.node,
             self.ns,
-            make_client_port(self.node, self.ns, self.types, callbacks.spawn),
-            callbacks,
+            make_client_port(self.node, self.ns, self.types, spawn),
+            spawn,
+            key=key,
             server_lost_timeout=grace,
             status_list_timeout=silence,
         )
-        self._ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self.node.clock)
-        self._let_go = weakref.finalize(self, self.manager.let_go)
-        self._let_go.atexit = False  # there the node closes its clients itself
 
     @property
     def ActionSpec(self) -> Any:  # noqa: N802  actionlib's name
@@ -1115,7 +1328,9 @@ class ActionClient(Generic[A_co]):
         client of the action.
         """
         self._let_go.detach()
-        self.manager.close()
+        for owner in (self._owner, self._apart):
+            if owner is not None:
+                owner.manager.leave(owner)
 
     def wait_for_action_server_to_start(self, timeout: float | Duration | None = 0.0) -> bool:
         """Wait until the action has a server; see `wait_for_server`."""
@@ -1137,7 +1352,9 @@ class ActionClient(Generic[A_co]):
 
         Blocks: until then.
         """
-        return self.manager.wait_for_server(check_wait(f"action '{self.ns}'", "timeout", timeout))
+        return self.manager.wait_for_server(
+            self._owner, check_wait(f"action '{self.ns}'", "timeout", timeout)
+        )
 
     def send_goal(
         self,
@@ -1199,13 +1416,13 @@ class ActionClient(Generic[A_co]):
             def on_state(state: CommState) -> None:
                 handle.call(state, transition_cb, handle)
                 if state in OVER:
-                    handle.manager.callbacks.call(handle.settle)
+                    handle.owner.callbacks.call(handle.settle)
 
             handle.on_state = on_state
         if feedback_cb is not None:
             handle.on_feedback = partial(handle.call_with_feedback, partial(feedback_cb, handle))
         handle.calls_back = transition_cb is not None or feedback_cb is not None
-        self.manager.begin(handle)
+        handle.manager.begin(handle)
         return handle
 
     def send(
@@ -1235,7 +1452,7 @@ class ActionClient(Generic[A_co]):
 
     def _send(self, handle: ClientGoalHandle, timeout: float | None) -> SentGoal[Any, Any]:
         sent: SentGoal[Any, Any] = SentGoal(handle, timeout)
-        self.manager.begin(handle)
+        handle.manager.begin(handle)
         return sent
 
     def cancel_all_goals(self) -> None:
@@ -1268,8 +1485,11 @@ class ActionClient(Generic[A_co]):
                 f"{self.types.goal._type}."
             )
         goal_id, stamp_ns = self._ids.generate()
-        life = ClientGoal(goal_id, stamp_ns, ack_timeout=ack_timeout)
-        return ClientGoalHandle(self.manager, life, self.manager.port.pack_goal(goal))
+        made_at = self.manager.clock.now()
+        life = ClientGoal(goal_id, stamp_ns, made_at=made_at, ack_timeout=ack_timeout)
+        if border.listeners:
+            border.tell("goal", self.node, self.ns, self.types.action._type, goal_id, goal)
+        return ClientGoalHandle(self._owner, life, self.manager.port.pack_goal(goal))
 
     def find_goal(self, goal_id: str, ack_timeout: float | None = None) -> ClientGoalHandle:
         """Return a handle for a goal sent earlier, for which `manager.begin` queries the server.
@@ -1283,4 +1503,5 @@ class ActionClient(Generic[A_co]):
                 "was sent, SentGoal.id for example."
             )
         life = ClientGoal(goal_id, attached=True, ack_timeout=ack_timeout)
-        return ClientGoalHandle(self.manager, life)
+        other = self.manager.follows_for_another(self._owner, goal_id)
+        return ClientGoalHandle(self._owner_apart() if other else self._owner, life)

@@ -13,20 +13,21 @@
     with dock.start() as running:
         running.wait()
 
-The function can still be called directly, which is how to test it.
+The function can still be called directly, which is how to test it. It may be `async`: a cancel or a
+newer goal then cancels its task.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
-from actionlib_core._arguments import check_function
 from actionlib_core.action.simple_server import TEXT_ACCEPTED, SimpleActionServer
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.goal.states import Status
+from actionlib_core.inputs.arguments import check_function, is_async
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Coroutine
     from typing import Self
 
     from actionlib_core.action._action_spec import ActionSpec
@@ -79,6 +80,9 @@ class Reject(GoalEnd):
 class GoalContext(Generic[F]):
     """The second argument of a `server` function: feedback and preempts of its goal.
 
+    In an `async` function, wait with `await` instead of `sleep` and `wait_preempt`, which would
+    hold up its loop; a preempt cancels its task.
+
     The goal is accepted when the function first uses the context, at the latest when it returns.
     Until then the function can still reject it.
 
@@ -86,7 +90,7 @@ class GoalContext(Generic[F]):
         goal_id: The goal's id.
     """
 
-    def __init__(self, runner: _Runner, handle: ServerGoalHandle) -> None:
+    def __init__(self, runner: _DecoratedServer, handle: ServerGoalHandle) -> None:
         self._runner = runner
         self._handle = handle
         self.goal_id: str = handle.record.id
@@ -131,19 +135,60 @@ class GoalContext(Generic[F]):
         return self.wait_preempt(seconds)
 
 
-class _Runner(SimpleActionServer):
+class _DecoratedServer(SimpleActionServer):
     """A simple action server whose goals are accepted by their function (`GoalContext.accept`)."""
 
     _accepts = False
 
     def __init__(self, function: Any, **kwargs: Any) -> None:
         self._function = function
-        super().__init__(execute_cb=function, **kwargs)
+        self._is_async = is_async(function)
+        self._cancel_task: Callable[[], object] = bool  # cancels the task of an async function
+        super().__init__(execute_cb=lambda _goal: None, **kwargs)
+
+    def _tell_preempt(self) -> None:
+        super()._tell_preempt()
+        self._cancel_task()
+
+    def _run(self, goal: Any, context: GoalContext[Any]) -> Any:
+        """Call the function; one that is `async` runs in a loop of its own.
+
+        Raises:
+            Preempted: it was asked to stop, and has let that end it.
+        """
+        made = self._function(goal, context)
+        if not self._is_async:
+            return made
+        import asyncio  # here, as it slows down the start of programs that do not use it
+
+        async def main() -> Any:
+            loop, task = asyncio.get_running_loop(), asyncio.ensure_future(made)
+
+            def cancel() -> None:
+                self._cancel_task = bool  # once: what it does after that is its clean-up
+                loop.call_soon_threadsafe(task.cancel)
+
+            with self.lock:
+                self._cancel_task = cancel
+                if self.is_preempt_requested():
+                    cancel()
+            try:
+                return await task
+            finally:
+                with self.lock:  # nobody calls it after the loop is closed
+                    self._cancel_task = bool
+
+        try:
+            return self._clock.run_async(main())
+        except asyncio.CancelledError as error:
+            if not self.is_preempt_requested():
+                raise ActionlibError("its task was cancelled, but not by a preempt") from error
+            raise Preempted("its task was cancelled") from error
 
     def _execute(self, handle: ServerGoalHandle) -> None:
         context: GoalContext[Any] = GoalContext(self, handle)
         try:
-            result = self._function(handle.get_goal(), context)
+            result = self._run(handle.get_goal(), context)
         except Reject as end:
             accepted = handle.record.status in {Status.ACTIVE, Status.PREEMPTING}
             self._end("raise Reject", "abort" if accepted else "reject", end.result, end.text)
@@ -164,7 +209,7 @@ class _Runner(SimpleActionServer):
 class RunningServer:
     """A started `GoalServer`; a context manager that stops it."""
 
-    def __init__(self, runner: _Runner) -> None:
+    def __init__(self, runner: _DecoratedServer) -> None:
         self._runner = runner
 
     @property
@@ -194,13 +239,16 @@ class RunningServer:
 
 
 class GoalServer(Generic[G, R, F]):
-    """A function that can be offered as an action. Made by `server`."""
+    """A function that can be offered as an action. Made by `server`.
+
+    `R` is what the function returns: the result message, or a coroutine of it.
+    """
 
     def __init__(
         self,
         function: Callable[[G, GoalContext[F]], R],
         name: str,
-        spec: type[ActionSpec[G, R, F]],
+        spec: type[ActionSpec[G, Any, F]],
         options: dict[str, Any],
     ) -> None:
         self._function = function
@@ -228,7 +276,7 @@ class GoalServer(Generic[G, R, F]):
         Blocks: until the network has listed the servers of the name, 1 s at most.
         """
         return RunningServer(
-            _Runner(
+            _DecoratedServer(
                 self._function,
                 name=name if name is not None else self.name,
                 ActionSpec=self.spec,
@@ -244,11 +292,17 @@ def server(
     *,
     policy: Policy = "preempt",
     on_client_lost: OnClientLost = "continue",
-) -> Callable[[Callable[[G, GoalContext[F]], R]], GoalServer[G, R, F]]:
+) -> _Decorator[G, R, F]:
     """Turn a function `execute(goal, ctx) -> result` into an action server.
+
+    The usual way to offer an action; others: docs/howto/which_way.md.
 
     The function returns the result (SUCCEEDED) or raises `Abort`, `Preempted` or `Reject`; any
     other exception aborts the goal with its text.
+
+    It may be `async`: it then runs in an event loop of its own, in the thread that runs the goals.
+    A preempt cancels its task, once; if it lets `asyncio.CancelledError` pass, the goal is
+    PREEMPTED, and if it catches that, it ends the goal as it likes.
 
     Args:
         name: The action's name.
@@ -259,12 +313,29 @@ def server(
     Returns:
         A decorator, which returns a `GoalServer`; `start` it.
     """
+    return _Decorator(name, ActionSpec, {"policy": policy, "on_client_lost": on_client_lost})
 
-    def decorate(function: Callable[[G, GoalContext[F]], R]) -> GoalServer[G, R, F]:
+
+class _Decorator(Generic[G, R, F]):
+    """What `server` returns."""
+
+    def __init__(self, name: str, spec: type[ActionSpec[G, R, F]], options: dict[str, Any]) -> None:
+        self._name = name
+        self._spec = spec
+        self._options = options
+
+    @overload
+    def __call__(
+        self, function: Callable[[G, GoalContext[F]], Coroutine[Any, Any, R]]
+    ) -> GoalServer[G, Coroutine[Any, Any, R], F]: ...
+
+    @overload
+    def __call__(self, function: Callable[[G, GoalContext[F]], R]) -> GoalServer[G, R, F]: ...
+
+    def __call__(self, function: Callable[[G, GoalContext[F]], Any]) -> GoalServer[G, Any, F]:
+        """Return the function as a server that can be started."""
         if function is None:
-            raise ActionlibError(f"action {name!r}: function: got None; expected a function.")
-        check_function(f"action {name!r}", "function", function)
-        options = {"policy": policy, "on_client_lost": on_client_lost}
-        return GoalServer(function, name, ActionSpec, options)
-
-    return decorate
+            raise ActionlibError(f"action {self._name!r}: function: got None; expected a function.")
+        if not is_async(function):
+            check_function(f"action {self._name!r}", "function", function)
+        return GoalServer(function, self._name, self._spec, self._options)

@@ -13,9 +13,9 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_delay
 from actionlib_core.exceptions import GoalFailedError, GoalTimeoutError
 from actionlib_core.goal.states import OVER, Status
+from actionlib_core.inputs.arguments import check_delay
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Generator, Iterator
@@ -209,7 +209,7 @@ class SentGoal(Generic[R, F]):
         result: Any = goal.result
         # The server no longer had the result when this client asked for it.
         if result is None:
-            raise GoalFailedError(self._name, goal.id, "SUCCEEDED without result", goal.text, None)
+            raise GoalFailedError(self._name, goal.id, goal.status.name, goal.text, None)
         return result  # type: ignore[no-any-return]
 
     def __enter__(self) -> Self:

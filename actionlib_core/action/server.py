@@ -16,8 +16,8 @@ import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from actionlib_core._arguments import check_delay, check_function, check_seconds
 from actionlib_core.action._callbacks import CallbackQueue
+from actionlib_core.clock import wall_time
 from actionlib_core.exceptions import (
     ActionException,
     IllegalTransitionError,
@@ -25,15 +25,16 @@ from actionlib_core.exceptions import (
     TransportError,
     text_of,
 )
+from actionlib_core.goal.bounded import Recent
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.server import (
-    FUTURE_NS,
     RESULT_TIMEOUT_S,
     Arrival,
     ServerGoal,
     ServerGoals,
 )
 from actionlib_core.goal.states import TERMINAL, Status
+from actionlib_core.inputs.arguments import check_delay, check_function, check_seconds
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.time import Time
@@ -41,7 +42,7 @@ from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ports import make_server_port
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from actionlib_core.action._durable import GoalFile
@@ -58,6 +59,8 @@ FAREWELL_S = 0.1  # interval of its farewells meanwhile, as each of them may get
 PERIOD_S = 1.0  # interval of the status lists while goals are listed
 GAP_S = 0.02  # shortest interval of lists: changes within it share one
 SHORT = 8  # goals; `hurry` sends only lists up to this length
+AHEAD_NS = 1_000_000_000  # a stamp later than this is reported: it comes from another clock
+REMEMBERED = 1024  # senders that were reported
 GAP_PER_GOAL_S = 100e-6  # added to `GAP_S` per tracked goal: long lists are sent less often
 
 TEXT_STOPPED = "The action server was stopped"
@@ -163,7 +166,7 @@ class ServerGoalHandle:
 
         Raises:
             FieldError: `feedback` does not fit the action.
-            TransportError: the server's node is closed.
+            TransportError: the server is stopped, or the session is closed.
         """
         self.keeper.send_feedback(self.record.entry(), feedback)
 
@@ -215,6 +218,7 @@ class StatusPublisher:
         lock: The server's lock, which guards `goals`.
         goals: The server's goals.
         port: The server's connection to the network; used without the lock.
+        on_expired: Called without the lock after goals may have expired; returns at once.
 
     Threads: any; the timer's calls come on the clock's thread.
     """
@@ -225,8 +229,10 @@ class StatusPublisher:
         lock: threading.RLock,
         goals: ServerGoals,
         port: ServerPort,
+        on_expired: Callable[[], object] = bool,
     ) -> None:
         self._clock = clock
+        self._on_expired = on_expired
         self._lock = lock
         self._goals = goals
         self._port = port
@@ -262,6 +268,21 @@ class StatusPublisher:
             listed = self._goals.list_statuses()
         self._send(listed)
 
+    def on_arrival(self) -> None:
+        """Send the list within `GAP_S`, as a goal has come.
+
+        Usually its code accepts it before that, which sends the list at once.
+        """
+        if self._change_waits:
+            return
+        with self._lock:
+            if self._closed or self._change_waits:
+                return
+            self._change_waits = True
+            due = self._clock.now() + GAP_S
+            if self._timer is None or due < self._due:
+                self._arm(due)
+
     def claim(self, now: float, *, at_once: bool = False) -> bool:
         """Prepare for a goal's change. The caller holds the lock until it has made the list.
 
@@ -283,6 +304,13 @@ class StatusPublisher:
             if self._timer is None or due < self._due:
                 self._arm(due)
         return False
+
+    def expire_later(self) -> None:
+        """Let goals expire when it is time, without sending a list."""
+        with self._lock:
+            soonest = self._goals.expire(self._clock.now())
+            if self._timer is None and soonest is not None:
+                self._arm(soonest)
 
     def _send(self, listed: list[StatusEntry]) -> None:
         try:
@@ -310,15 +338,18 @@ class StatusPublisher:
                 return
             now = self._clock.now()
             soonest = self._goals.expire(now)
-            if not self._change_waits:
+            due = self._change_waits
+            if not due:
                 repeated = self._published + PERIOD_S
                 if now < repeated:  # a list was sent after the timer was set
                     self._arm(repeated)
-                    return
-                if not self._goals.listed():  # an empty list is not repeated
-                    if soonest is not None:
-                        self._arm(soonest)
-                    return
+                elif self._goals.listed():
+                    due = True
+                elif soonest is not None:  # an empty list is not repeated
+                    self._arm(soonest)
+        self._on_expired()
+        if not due:
+            return
         try:
             self.publish()
         except TransportError as error:  # the program has closed the session, not the server
@@ -346,6 +377,7 @@ class GoalKeeper:
         error: Why the server has stopped by itself; None: it has not.
         stopped: The server has withdrawn from the network.
         left: Set after that.
+        used: Notes that the program does not end before anybody has used the server.
 
     Threads: every method may be called from any thread.
     """
@@ -372,9 +404,10 @@ class GoalKeeper:
         self.lock = threading.RLock()
         self.error: ServerConflictError | None = None
         self.stopped = False
+        self.used: Callable[[], object] = bool
         self.left: Event = node.clock.event(f"the end of action server {name}")
         self.goals = ServerGoals(name, result_timeout=result_timeout)
-        self.status = StatusPublisher(node.clock, self.lock, self.goals, port)
+        self.status = StatusPublisher(node.clock, self.lock, self.goals, port, self._tidy_file_soon)
         self._clock = node.clock
         self._cancels_lost = on_client_lost == "cancel"
         self._deliver_goal = deliver_goal
@@ -383,7 +416,9 @@ class GoalKeeper:
         self._drained: Event | None = None  # set when all clients have answered; made by `stop`
         self._durable = durable
         self._file: GoalFile | None = None
+        self._tidying = threading.Lock()  # held while a thread tidies the file
         self._resumes = resumes
+        self._ahead = Recent(REMEMBERED)  # senders whose stamps are in the future
 
     # -- goals of an earlier server ------------------------------------------------------------
 
@@ -398,7 +433,8 @@ class GoalKeeper:
         from actionlib_core.action._durable import GoalFile  # here: most servers need no SQLite
 
         self._file = GoalFile(self._durable, self.name, self.types)
-        goals, past = self._file.load(self._clock.time_ns() / 1e9)
+        self.goals.forgotten = []
+        goals, past = self._file.load()
         now = self._clock.now()
         handles = []
         with self.lock:
@@ -431,12 +467,29 @@ class GoalKeeper:
                 self._deliver_goal(handle)
         if handles:
             self.status.on_change()
+        elif self._file is not None:
+            self.status.expire_later()  # results that were kept once more
 
     def close_file(self) -> None:
         """Close the file, if there is one."""
+        self._tidy_file()
         file, self._file = self._file, None
         if file is not None:
             file.close()
+
+    def _tidy_file_soon(self) -> None:
+        """Remove from the file, in another thread, what the goals have forgotten."""
+        if self.goals.forgotten:
+            self._clock.spawn(self._tidy_file, name=f"{self.name} file")
+
+    def _tidy_file(self) -> None:
+        with self._tidying:  # in the order in which it was forgotten
+            with self.lock:
+                forgotten = self.goals.forgotten
+                if self._file is None or not forgotten:
+                    return
+                self.goals.forgotten = []
+            self._file.forget(forgotten, self._clock.time_ns() / 1e9)
 
     def _keep(self, record: ServerGoal) -> None:
         """Write a goal's status to the file, which comes before any message about it."""
@@ -509,25 +562,37 @@ class GoalKeeper:
             return
         # The result is sent before the list: a client that reads of an end without having its
         # result queries the server for it.
-        if body is not None:
-            self.port.send_result(entry, body, wait=wait)
-        elif self.port.send_accepted is not None:
-            self.port.send_accepted(entry)
-        if listed is not None:
-            self.port.send_status(listed)
+        with self._unless_stopped():
+            if body is not None:
+                self.port.send_result(entry, body, wait=wait)
+            elif self.port.send_accepted is not None:
+                self.port.send_accepted(entry)
+            if listed is not None:
+                self.port.send_status(listed)
+
+    @contextlib.contextmanager
+    def _unless_stopped(self) -> Iterator[None]:
+        """Send in the block; what cannot be sent because the server is being stopped is dropped.
+
+        Its clients learn from `stop` how their goals have ended.
+
+        Raises:
+            TransportError: the session is closed, but not the server.
+        """
+        try:
+            yield
+        except TransportError:
+            if not self.goals.closed:
+                raise
 
     def give_up(self, handle: ServerGoalHandle, text: str) -> None:
         """Abort or reject a goal, if its code has not ended it."""
         status = handle.record.status
         if status not in TERMINAL:
             event = "abort" if status in {Status.ACTIVE, Status.PREEMPTING} else "reject"
-            try:
+            # Another thread may have ended it in the meantime.
+            with contextlib.suppress(IllegalTransitionError):
                 self.step(handle, event, "the end of its callback", None, text)
-            except IllegalTransitionError:
-                return  # another thread has ended it in the meantime
-            except TransportError:
-                if not self.goals.closed:  # else the server is stopping, its session closed before
-                    raise
 
     def release(self, record: ServerGoal) -> None:
         """Abandon a goal that no code will end; its client learns that it is LOST."""
@@ -617,6 +682,7 @@ class GoalKeeper:
 
     def leave(self) -> None:
         """Withdraw from the network at once."""
+        self.used()
         with self.lock:
             self.stopped = True
             self.status.close()
@@ -628,10 +694,10 @@ class GoalKeeper:
 
     # -- messages (on the network's thread) ----------------------------------------------------
 
-    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> bool:
+    def on_goal(
+        self, goal_id: str, stamp_ns: int, content: Any, client: str, age: float = 0.0
+    ) -> bool:
         """Handle a goal: deliver a new one, answer a repetition with its status or result.
-
-        Returns whether it is new and has been taken.
 
         Nothing here waits while a link is full: a client that misses the answer asks again.
         """
@@ -640,13 +706,22 @@ class GoalKeeper:
 
             ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self._clock)
             goal_id, stamp_ns = ids.generate()
-        record = ServerGoal(goal_id, stamp_ns or self._clock.time_ns(), client=client)
+        self._check_clock(f"goal {goal_id}", stamp_ns, client)
+        now = self._clock.now()
+        record = ServerGoal(
+            goal_id,
+            stamp_ns or self._clock.time_ns(),
+            client=client,
+            made_at=now - age,
+            age=age,
+        )
         with self.lock:
             if self.stopped:
                 return False
-            arrival, known = self.goals.on_goal(record, self._clock.now())
+            arrival, known = self.goals.on_goal(record, now)
             if arrival is Arrival.LATE:
                 return False
+            self.used()
             # Under the lock, so that a cancel that follows at once finds the handle.
             handle = record.tag = ServerGoalHandle(self, record, content)
             if arrival is Arrival.RECALLED:
@@ -665,28 +740,38 @@ class GoalKeeper:
             self._deliver_goal(handle)
             return True
         # A repetition, or a goal that was recalled: send what its client has missed.
-        if known is None:
-            self.port.send_status([_past_entry(goal_id, past or Status.LOST)])
-        elif isinstance(known.result, bytes):
-            self.port.send_result(known.entry(), known.result, wait=False)
+        with self._unless_stopped():
+            if known is None:
+                self.port.send_status([_past_entry(goal_id, past or Status.LOST)])
+            elif isinstance(known.result, bytes):
+                self.port.send_result(known.entry(), known.result, wait=False)
         self.status.on_change()
         return False
 
     def on_cancel(self, goal_id: str, stamp_ns: int) -> list[StatusEntry]:
         """Handle a cancel; return the goals that it asks to stop."""
-        now_ns = self._clock.time_ns()
+        self._check_clock("a cancel", stamp_ns, "a cancel")
         with self.lock:
-            asked = self.goals.on_cancel(goal_id, stamp_ns, self._clock.now(), now_ns)
+            asked = self.goals.on_cancel(goal_id, stamp_ns, self._clock.now())
             entries = [goal.entry() for goal in asked]
-        if stamp_ns > now_ns + FUTURE_NS:
-            log.warning(
-                "action '%s': a cancel has a stamp %.1f s in the future and counts as sent now: "
-                "a clock is wrong. Try setting the clocks of all computers by NTP.",
-                self.name,
-                (stamp_ns - now_ns) / 1e9,
-            )
         self._cancel(asked)
         return entries
+
+    def _check_clock(self, what: str, stamp_ns: int, sender: str) -> None:
+        """Warn, once for each sender, of a stamp in the future; see `AHEAD_NS`."""
+        wall_time(self._clock).check()
+        ahead_ns = stamp_ns - self._clock.time_ns()
+        if ahead_ns <= AHEAD_NS or sender in self._ahead:
+            return
+        self._ahead.add(sender)
+        log.warning(
+            "action '%s': %s has a stamp %.1f s in the future: a clock was set, or the clocks of "
+            "two computers differ. Which goal runs does not depend on that, but which goals "
+            "cancel_goals_at_and_before_time() stops. Try setting all clocks by NTP.",
+            self.name,
+            what,
+            ahead_ns / 1e9,
+        )
 
     def on_client_lost(self, client: str) -> None:
         """Handle the death of a client."""
@@ -710,9 +795,7 @@ class GoalKeeper:
             self.goals.on_acknowledged(goal_ids, self._clock.now())
             if self._drained is not None and self._is_drained():
                 self._drained.set()
-        file = self._file
-        if file is not None:
-            file.forget(goal_ids, self._clock.time_ns() / 1e9)
+        self._tidy_file_soon()
 
     def on_conflict(self, error: ServerConflictError) -> None:
         """Stop, because an older server has the name."""
@@ -749,6 +832,8 @@ class GoalKeeper:
 
 class ActionServer:
     """Offers an action; every goal is a `ServerGoalHandle` that your callbacks accept and end.
+
+    For goals that run at the same time, or are accepted late; others: docs/howto/which_way.md.
 
     Args:
         ns: The action's name.
@@ -860,6 +945,7 @@ class ActionServer:
             self._started = True
         # Without the lock, as opening waits for the network.
         self._forget = self.node.on_close(self.stop)  # raises when the node is closed
+        self.keeper.used = self.node.offer(f"action server '/{self.ns}'")
         try:
             self.initialize()
         except BaseException:
@@ -906,6 +992,7 @@ class ActionServer:
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
         """
+        self.keeper.used()
         left = self.keeper.left.wait(check_delay(f"action '{self.ns}'", "timeout", timeout))
         if self.error is not None:
             raise self.error
@@ -1000,7 +1087,7 @@ class ActionServer:
 
     def _deliver_goal(self, handle: ServerGoalHandle) -> None:
         self.callback_queue.call(self._run_goal_callback, handle)
-        self.keeper.status.on_change()
+        self.keeper.status.on_arrival()
 
     def _run_goal_callback(self, handle: ServerGoalHandle) -> None:
         """Call the goal callback; if it raises, end the goal, which would otherwise stay."""

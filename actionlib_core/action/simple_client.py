@@ -7,21 +7,25 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from actionlib_core._arguments import check_functions, check_limit, check_wait
 from actionlib_core.action.client import ActionClient
 from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S
 from actionlib_core.goal.states import OVER, STARTED, CommState, SimpleGoalState, Status
+from actionlib_core.inputs.arguments import check_functions, check_limit, check_wait
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.action._action_spec import ActionSpec as Spec
     from actionlib_core.action.client import ClientGoalHandle
     from actionlib_core.node import Node
     from actionlib_core.time import Duration, Time
 
 __all__ = ["SimpleActionClient", "SimpleGoalState"]
 
-A = TypeVar("A")
+A_co = TypeVar("A_co", covariant=True)
+G = TypeVar("G")
+R = TypeVar("R")
+F = TypeVar("F")
 log = logging.getLogger(__name__)
 
 _SHOWN = {
@@ -33,8 +37,10 @@ _SHOWN = {
 }
 
 
-class SimpleActionClient(Generic[A]):
+class SimpleActionClient(Generic[A_co]):
     """Sends one goal at a time and waits for it.
+
+    For programs with actionlib's names; others: docs/howto/which_way.md.
 
     Args:
         ns: The action's name.
@@ -61,13 +67,13 @@ class SimpleActionClient(Generic[A]):
     def __init__(
         self,
         ns: str,
-        ActionSpec: type[A],  # noqa: N803  actionlib's name
+        ActionSpec: type[A_co],  # noqa: N803  actionlib's name
         *,
         node: Node | None = None,
         server_lost_timeout: float | Duration = 0.0,
         status_list_timeout: float | Duration = STATUS_LIST_TIMEOUT_S,
     ) -> None:
-        self.action_client: ActionClient[A] = ActionClient(
+        self.action_client: ActionClient[A_co] = ActionClient(
             ns,
             ActionSpec,
             node=node,
@@ -138,11 +144,11 @@ class SimpleActionClient(Generic[A]):
     # -- goals ---------------------------------------------------------------------------------
 
     def send_goal(
-        self,
-        goal: Any,
-        done_cb: Callable[[int, Any], object] | None = None,
+        self: SimpleActionClient[Spec[G, R, F]],
+        goal: G,
+        done_cb: Callable[[int, R | None], object] | None = None,
         active_cb: Callable[[], object] | None = None,
-        feedback_cb: Callable[[Any], object] | None = None,
+        feedback_cb: Callable[[F], object] | None = None,
         *,
         ack_timeout: float | Duration | None = None,
     ) -> None:
@@ -173,11 +179,11 @@ class SimpleActionClient(Generic[A]):
         self._begin(make, goal, done_cb, active_cb, feedback_cb, ack_timeout)
 
     def attach(
-        self,
+        self: SimpleActionClient[Spec[G, R, F]],
         goal_id: str,
-        done_cb: Callable[[int, Any], object] | None = None,
+        done_cb: Callable[[int, R | None], object] | None = None,
         active_cb: Callable[[], object] | None = None,
-        feedback_cb: Callable[[Any], object] | None = None,
+        feedback_cb: Callable[[F], object] | None = None,
         *,
         ack_timeout: float | Duration | None = None,
     ) -> None:
@@ -237,7 +243,7 @@ class SimpleActionClient(Generic[A]):
             elif state in OVER:
                 if done_cb is not None:
                     handle.call(state, done_cb, int(handle.goal.status), handle.goal.result)
-                handle.manager.callbacks.call(self._settle, handle)
+                handle.owner.callbacks.call(self._settle, handle)
 
         return on_state
 
@@ -249,8 +255,8 @@ class SimpleActionClient(Generic[A]):
                 self._condition.notify_all()
 
     def send_goal_and_wait(
-        self,
-        goal: Any,
+        self: SimpleActionClient[Spec[G, R, F]],
+        goal: G,
         execute_timeout: float | Duration = 0.0,
         preempt_timeout: float | Duration = 0.0,
     ) -> int:
@@ -322,10 +328,11 @@ class SimpleActionClient(Generic[A]):
         )
         return None
 
-    def get_result(self) -> Any:
+    def get_result(self: SimpleActionClient[Spec[G, R, F]]) -> R | None:
         """Return the result message, None while there is none."""
         handle = self.gh
-        return None if handle is None else handle.get_result()
+        result: R | None = None if handle is None else handle.get_result()
+        return result
 
     @property
     def dropped_feedback(self) -> int:

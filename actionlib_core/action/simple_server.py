@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import logging
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from actionlib_core._arguments import check_delay, check_function
 from actionlib_core.action.server import TEXT_STOPPED, ActionServer, OnClientLost, OnRestart
 from actionlib_core.exceptions import ActionException, text_of
-from actionlib_core.goal.server import FUTURE_NS, RESULT_TIMEOUT_S
+from actionlib_core.goal.server import RESULT_TIMEOUT_S
 from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
 from actionlib_core.goal.states import TERMINAL, Status
+from actionlib_core.inputs.arguments import check_delay, check_function
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from actionlib_core.action._action_spec import ActionSpec as Spec
     from actionlib_core.action.server import ServerGoalHandle
     from actionlib_core.clock import Event, Task
     from actionlib_core.goal.single import Decision
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
+
+G = TypeVar("G")
+R = TypeVar("R")
+F = TypeVar("F")
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +42,8 @@ TEXT_NO_STATUS = "No terminal state was set."
 
 class SimpleActionServer:
     """Offers an action whose goals run one at a time.
+
+    For programs with actionlib's names; others: docs/howto/which_way.md.
 
     With `execute_cb`, each goal is run by calling it, in a thread that exists only while there are
     goals. Without, register a goal callback and call `accept_new_goal` yourself.
@@ -80,8 +87,8 @@ class SimpleActionServer:
     def __init__(
         self,
         name: str,
-        ActionSpec: Any,  # noqa: N803  actionlib's name
-        execute_cb: Callable[[Any], object] | None = None,
+        ActionSpec: type[Spec[G, R, F]],  # noqa: N803  actionlib's name
+        execute_cb: Callable[[G], object] | None = None,
         auto_start: bool = True,
         *,
         node: Node | None = None,
@@ -100,6 +107,8 @@ class SimpleActionServer:
         self._task: Task | None = None  # the thread that runs goals, None while there is none
         self._idle = False  # it waits for `_come`
         self._stopping = False
+        self._making = auto_start
+        self._early: set[str] = set()  # ids of goals that came before the constructor had returned
         self._grace_ends: float | None = None
         # Our two callbacks return at once, so they may be called directly on the network's thread,
         # which saves each goal a change of threads.
@@ -132,6 +141,7 @@ class SimpleActionServer:
         self._forget: Callable[[], None] | None = None
         if auto_start:
             self.start()
+            self._making = False
 
     # -- life ----------------------------------------------------------------------------------
 
@@ -200,7 +210,7 @@ class SimpleActionServer:
             waiting = self._policy.on_stop()
             if self._idle:
                 self._come.set()
-        self._preempted.set()  # also wakes code that waits for a preempt without a running goal
+        self._tell_preempt()  # also wakes code that waits for a preempt without a running goal
         for handle in waiting:
             self._keeper.give_up(handle, TEXT_STOPPED)
 
@@ -246,7 +256,7 @@ class SimpleActionServer:
             if new is None:
                 return None
             if self._policy.preempt_requested:
-                self._preempted.set()
+                self._tell_preempt()
             elif asked:
                 self._preempted.clear()
         # Without the lock: sending the result blocks while a link is full.
@@ -392,26 +402,20 @@ class SimpleActionServer:
             self._turn_away(goal, "reject", TEXT_STOPPED)
             return
         with self.lock:
-            stamp_ns = goal.record.stamp_ns
-            now_ns = self._clock.time_ns()
-            if stamp_ns > now_ns + FUTURE_NS:  # else all later goals would count as older
-                log.warning(
-                    "action '%s': goal %s has a stamp %.1f s in the future and counts as sent now: "
-                    "a clock is wrong. Try setting the clocks of all computers by NTP.",
-                    self._name,
-                    goal.record.id,
-                    (stamp_ns - now_ns) / 1e9,
-                )
-                stamp_ns = now_ns
-            decision = self._policy.on_goal(goal, stamp_ns)
+            decision = self._policy.on_goal(goal)
             if decision.preempt:  # under the lock, as `_take_next` clears it for the next goal
-                self._preempted.set()
+                self._tell_preempt()
+            if self._making:
+                self._early.add(goal.record.id)
             # Wake the thread that runs goals, or start one. A busy thread looks for the next goal
             # by itself.
             if decision.announce and self._idle:
                 self._come.set()
             elif decision.announce and self.execute_callback is not None and self._task is None:
                 self._task = self._start()
+            waits = self._policy.running or self.execute_callback is None
+        if waits:  # else its acceptance, which follows at once, tells the client that it has come
+            self._keeper.status.on_arrival()
         # Without the lock, as this sends results. The usual decision needs nothing more.
         if decision is not ANNOUNCE or self.goal_callback is not None:
             self._carry_out(decision, TEXT_NEWER)
@@ -424,8 +428,12 @@ class SimpleActionServer:
                 goal, recall_waiting=self.execute_callback is not None
             )
             if decision.preempt:
-                self._preempted.set()
+                self._tell_preempt()
         self._carry_out(decision, TEXT_CANCELLED_WAITING)
+
+    def _tell_preempt(self) -> None:
+        """Wake the code of the running goal, which is asked to stop. Must not block."""
+        self._preempted.set()
 
     def _carry_out(self, decision: Decision[ServerGoalHandle], text: str) -> None:
         for older in decision.recall:
@@ -503,7 +511,7 @@ class SimpleActionServer:
         except Exception as error:  # noqa: BLE001  user code: sent to the client and logged
             if handle.record.text == TEXT_STOPPED:
                 return  # `stop` has ended the goal; the callback's own attempt has then failed
-            text = self._report(error)
+            text = self._report(handle, error)
         except BaseException as error:
             text = text_of(error, repr)
             self._keeper.give_up(handle, f"Exception in execute callback: {text}")
@@ -521,6 +529,12 @@ class SimpleActionServer:
         if self.execute_callback is not None:
             self.execute_callback(handle.content)
 
-    def _report(self, error: Exception) -> str:
-        log.error("action '%s': exception in execute callback", self._name, exc_info=error)
-        return f"Exception in execute callback: {text_of(error)}"
+    def _report(self, handle: ServerGoalHandle, error: Exception) -> str:
+        hint = ""
+        if handle.record.id in self._early:
+            hint = (
+                " (The goal came before the constructor of its server had returned: a callback "
+                "that uses the server needs auto_start=False, and start() afterwards.)"
+            )
+        log.error("action '%s': exception in execute callback%s", self._name, hint, exc_info=error)
+        return f"Exception in execute callback: {text_of(error)}{hint}"

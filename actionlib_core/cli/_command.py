@@ -1,17 +1,17 @@
-"""Common parts of the commands: parsers, checks of numbers, and output as YAML or JSON."""
+"""Common parts of the commands: parsers, and output as YAML or JSON."""
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import math
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.output import discard_output
+from actionlib_core.process.output import discard_output
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Callable, Iterator
 
 
@@ -23,48 +23,6 @@ def add_command(
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=run)
     return parser
-
-
-# -- numbers ---------------------------------------------------------------------------------------
-
-
-def seconds(text: str) -> float:
-    """Read a length of time [s], above 0."""
-    return _positive(text, "seconds above 0")
-
-
-def rate(text: str) -> float:
-    """Read a rate [Hz], above 0."""
-    return _positive(text, "a rate above 0 [Hz]")
-
-
-def count(text: str) -> int:
-    """Read a number of items, at least 1."""
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected a whole number above 0")
-    return number
-
-
-def size(text: str) -> int:
-    """Read a number of items, at least 0."""
-    return 0 if text == "0" else count(text)
-
-
-def _positive(text: str, wanted: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not (math.isfinite(number) and number > 0):
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected {wanted}")
-    return number
-
-
-# -- output ----------------------------------------------------------------------------------------
 
 
 def json_text(value: Any) -> str:

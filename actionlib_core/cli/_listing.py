@@ -6,14 +6,17 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.cli import EXIT_ERROR
 from actionlib_core.cli._command import add_command
 from actionlib_core.cli._network import find_ends, list_names, open_node, types_of
+from actionlib_core.process.output import tell
+from actionlib_core.wire.presence import SETTLE_MOST_S
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Collection
 
-    from actionlib_core.wire.presence import Endpoint, Kind
+    from actionlib_core.transport.tokens import Endpoint, Kind
 
 
 def add_list(
@@ -53,7 +56,14 @@ def _list(
     else:
         for name, ends in found.items():
             print(f"/{name} [{', '.join(types_of(ends))}]" if args.show_types else f"/{name}")
-    return 0
+    if getattr(args, "settled", True):
+        return 0
+    tell(
+        "actionlib",
+        f"more names were still found after {SETTLE_MOST_S:g} s: the list may be incomplete. Try "
+        "again, or a router (`actionlib router`) for a network with so many names.",
+    )
+    return EXIT_ERROR
 
 
 def add_type(verbs: Any, what: str, kinds: Collection[Kind]) -> None:

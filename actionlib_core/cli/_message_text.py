@@ -21,7 +21,10 @@ _STEP = re.compile(r"\.?(?P<field>[A-Za-z_]\w*)|\[(?P<index>-?[0-9]{1,9})\]")
 
 
 class FieldPathError(ActionlibError, ValueError):
-    """A path that does not lead to a field of a message."""
+    """A path that does not lead to a field of a message.
+
+    Try: `actionlib interface show TYPE` shows the fields; a path is `a.b[0].c`.
+    """
 
 
 class MessageText:

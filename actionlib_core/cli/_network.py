@@ -11,16 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from actionlib_core.cli import UsageError
 from actionlib_core.cli._ros2 import explain_absence, is_ros2, merged, typed, watching
 from actionlib_core.exceptions import InterfaceError
-from actionlib_core.output import tell
-from actionlib_core.suggest import did_you_mean
-from actionlib_core.wire.presence import (
-    SETTLE_S,
-    Kind,
-    list_endpoints,
-    parse_token,
-    settle_network,
-    token_pattern,
-)
+from actionlib_core.inputs.suggest import did_you_mean
+from actionlib_core.process.output import tell
+from actionlib_core.transport.tokens import Kind, parse_token, token_pattern
+from actionlib_core.wire.presence import SETTLE_MOST_S, SETTLE_S, list_endpoints, settle_network
 
 if TYPE_CHECKING:
     import argparse
@@ -28,7 +22,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Presence, Reply
-    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.transport.tokens import Endpoint
 
 ABSENT_S = 3.0  # after this time without an action server, print where it was looked for
 FIND_S = 2.0  # a missing name may still appear within this time, on a busy computer
@@ -55,7 +49,8 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
 
     Args:
         args: The parsed arguments.
-        settle: Wait until no new end was found for this time [s]; 0: do not wait.
+        settle: Wait until no new end was found for this time [s]; 0: do not wait. `args.settled`
+            tells afterwards whether it was so.
     """
     if args.node is not None:
         yield args.node
@@ -68,7 +63,7 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
         f"actionlib_{os.getpid()}", config=config, namespace=config.namespace, arguments=args.names
     ) as node:
         if settle:
-            settle_network(node.transport, node.clock, settle)
+            args.settled = settle_network(node.transport, node.clock, settle)
         yield node
 
 
@@ -78,10 +73,11 @@ def open_node(args: argparse.Namespace, *, settle: float = SETTLE_S) -> Iterator
 def list_names(node: Node, kinds: Collection[Kind]) -> dict[str, list[Endpoint]]:
     """Return the present ends of the given kinds, by full name.
 
-    Blocks: until the network has answered, a second at most.
+    Blocks: until the network has answered, `SETTLE_MOST_S` at most.
     """
     found: dict[str, list[Endpoint]] = {}
-    for end in merged(list_endpoints(node.transport), node, kinds):
+    ends = list_endpoints(node.transport, timeout=SETTLE_MOST_S)
+    for end in merged(ends, node, kinds):
         found.setdefault(end.name, []).append(end)
     return dict(sorted(found.items()))
 
@@ -107,7 +103,7 @@ def find_by_name(
             on_end(end)
 
     def there() -> list[Endpoint]:
-        ends = merged(list_endpoints(node.transport, name=full), node, kinds)
+        ends = merged(list_endpoints(node.transport, name=full), node, kinds, full)
         return [end for end in ends if end.name == full]
 
     found = there()
@@ -116,7 +112,7 @@ def find_by_name(
     # Not found at once: a program that has just joined may not have discovered all others.
     watch = node.transport.watch_alive(token_pattern(None, full), on_presence)
     try:
-        with watching(node, on_end):
+        with watching(node, full, on_end):
             if timeout is None and Kind.ACTION_SERVER in kinds and not came.wait(ABSENT_S):
                 _print_absence(node, full)
             came.wait(timeout)
@@ -126,8 +122,8 @@ def find_by_name(
 
 
 def _print_absence(node: Node, full: str) -> None:
-    if why := explain_absence(node, full):
-        print(f"actionlib: action '/{full}': no server yet: {why}", file=sys.stderr)
+    why = explain_absence(node, full)
+    print(f"actionlib: action '/{full}': no server yet: {why}", file=sys.stderr)
 
 
 def find_ends(
@@ -149,7 +145,8 @@ def find_ends(
             missing = "got no server" + ("" if timeout is None else f" within {timeout:g} s")
             way_out = f"Try 'actionlib {listing}', or start its server."
         there = which_there_are(full, list_names(node, kinds))
-        if what == "action" and (why := explain_absence(node, full)):
+        if what == "action" and node.config.ros2:
+            why = explain_absence(node, full)
             there, way_out = "expected one.", f"{why[0].upper()}{why[1:]}"
         raise UsageError(f"{what} '/{full}': {missing}; {there} {way_out}")
     return found

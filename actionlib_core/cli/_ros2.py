@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import UsageError
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.process.output import tell
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire import absence
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -15,8 +18,9 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces.ros2 import ServiceParts
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Sample
-    from actionlib_core.wire.presence import Endpoint, Kind
+    from actionlib_core.transport.tokens import Endpoint
     from actionlib_core.wire.ros2.action_messages import CancelResponse, GoalState
+    from actionlib_core.wire.ros2.network import RosNetwork
 
 ASK_S = 2.0  # longest wait for an answer
 STATUS_S = 1.0  # longest wait for a server's latched status; one that never had a goal has none
@@ -37,18 +41,37 @@ def _ends() -> ModuleType:
 # -- ends ------------------------------------------------------------------------------------------
 
 
-def list_ros2_ends(node: Node) -> list[Endpoint]:
-    """Return the ends on ROS 2 networks, with their names here.
+def _networks(node: Node, full: str | None) -> list[RosNetwork]:
+    """Return the ROS 2 networks that can be joined: of one full name, or all.
+
+    Raises:
+        TransportError: the one of the name cannot be joined. Of all networks, those that cannot are
+            named on standard error: the others can be used.
+
+    Blocks: the first time, until they are joined.
+    """
+    joined, errors = _ends().networks(node, full)
+    for settings, error in errors:
+        if full is not None:
+            raise error
+        whose = f"robot '{settings.robot}'" if settings.robot else f"router {settings.router}"
+        tell("actionlib", f"the names of {whose} are missing: {error}")
+    found: list[RosNetwork] = joined
+    return found
+
+
+def list_ros2_ends(node: Node, full: str | None = None) -> list[Endpoint]:
+    """Return the ends on ROS 2 networks, with their names here: of one full name, or all.
 
     Ends that ROS 2's tools hide are left out, and so are those of the command's own node.
 
-    Blocks: until the networks have answered, a second each at most.
+    Raises and blocks: as `_networks`, and until the networks have answered, a second each at most.
     """
     if not node.config.ros2:
         return []
     found = (
         _ends().end_of(network, token)
-        for network in _ends().networks(node)
+        for network in _networks(node, full)
         for token in network.ros.list()
         if (token.session, token.node_id) != (network.ros.token.session, network.ros.token.node_id)
     )
@@ -56,28 +79,29 @@ def list_ros2_ends(node: Node) -> list[Endpoint]:
 
 
 @contextlib.contextmanager
-def watching(node: Node, on_end: Callable[[Endpoint], object]) -> Iterator[None]:
-    """Call `on_end` for each present and future end, on the networks' threads."""
+def watching(node: Node, full: str, on_end: Callable[[Endpoint], object]) -> Iterator[None]:
+    """Call `on_end` for each present and future end on the network of a full name.
+
+    It is called on the network's threads.
+    """
 
     def on_change(end: Endpoint, _key: str, alive: bool) -> None:
         if alive:
             on_end(end)
 
     with contextlib.ExitStack() as stack:
-        for watch in _ends().watch_ends(node, on_change) if node.config.ros2 else ():
+        for watch in _ends().watch_ends(node, on_change, full) if node.config.ros2 else ():
             stack.callback(watch.close)
         yield
 
 
 def explain_absence(node: Node, full: str) -> str:
-    """Return why there may be no server of an action on ROS 2, and what to try.
+    """Return why there may be no server of an action, and what to try.
 
-    "" if the name is on no ROS 2 network. Blocks: as `list_ros2_ends`.
+    Blocks: as `list_ros2_ends`.
     """
-    if not node.config.ros2:
-        return ""
-    found: str = _ends().explain_absence(node, full)
-    return found
+    found: str = _ends().explain_absence(node, full) if node.config.ros2 else ""
+    return found or absence.explain_absence(node, full, Kind.ACTION_SERVER)
 
 
 def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]) -> list[Closable]:
@@ -92,7 +116,7 @@ def subscribe_to_bytes(node: Node, full: str, callback: Callable[[Sample], None]
 
     keys = {
         (network, data_key(token.domain, token.name, token.type, token.type_hash))
-        for network in _ends().networks(node)
+        for network in _networks(node, full)
         for token in network.ros.list(kind=RosKind.PUBLISHER, name=network.name(full))
     }
     return [network.transport.subscribe(key, callback, cached=1) for network, key in keys]
@@ -235,6 +259,14 @@ class RemoteAction:
         )
 
 
-def merged(own: list[Endpoint], node: Node, kinds: Collection[Kind]) -> list[Endpoint]:
-    """Return the ends of the given kinds on our own network and on ROS 2 networks."""
-    return [end for end in (*own, *list_ros2_ends(node)) if end.kind in kinds]
+def merged(
+    own: list[Endpoint], node: Node, kinds: Collection[Kind], full: str | None = None
+) -> list[Endpoint]:
+    """Return the ends of the given kinds on our own network and on ROS 2 networks.
+
+    With a `full` name, only the network that has it is joined, and only if it is needed.
+    """
+    here = [end for end in own if end.kind in kinds]
+    if full is not None and here:
+        return here
+    return here + [end for end in list_ros2_ends(node, full) if end.kind in kinds]

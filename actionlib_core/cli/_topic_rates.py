@@ -11,10 +11,11 @@ from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from actionlib_core.cli._command import add_command, count
+from actionlib_core.cli._command import add_command
 from actionlib_core.cli._network import open_node
 from actionlib_core.cli._ros2 import subscribe_to_bytes
-from actionlib_core.wire.presence import Kind, parse_token, token_pattern
+from actionlib_core.command_line.numbers import count
+from actionlib_core.transport.tokens import Kind, parse_token, token_pattern
 
 if TYPE_CHECKING:
     import argparse

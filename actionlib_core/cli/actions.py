@@ -16,7 +16,7 @@ from actionlib_core.cli._network import (
     typed_class,
     types_of,
 )
-from actionlib_core.wire.presence import Kind
+from actionlib_core.transport.tokens import Kind
 
 if TYPE_CHECKING:
     import argparse

@@ -9,20 +9,21 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED
-from actionlib_core.cli._command import add_command, count, print_json, print_message, seconds
+from actionlib_core.cli._command import add_command, print_json, print_message
 from actionlib_core.cli._feed import Feed
 from actionlib_core.cli._network import class_of_end, find_server, open_node
 from actionlib_core.cli._ros2 import RemoteAction, is_ros2
+from actionlib_core.command_line.numbers import count, seconds
 from actionlib_core.exceptions import DeserializationError
-from actionlib_core.output import tell
+from actionlib_core.process.output import tell
 
 if TYPE_CHECKING:
     import argparse
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Sample
+    from actionlib_core.transport.tokens import Endpoint
     from actionlib_core.wire.arrivals import Readable
-    from actionlib_core.wire.presence import Endpoint
 
 log = logging.getLogger(__name__)
 

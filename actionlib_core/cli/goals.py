@@ -6,11 +6,11 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core._arguments import is_goal_id
 from actionlib_core.cli import EXIT_FAILED, UsageError
 from actionlib_core.cli._command import add_command, json_text, print_message
 from actionlib_core.cli._network import ask, class_of_end, find_server, open_node
 from actionlib_core.cli._ros2 import RemoteAction, is_ros2
+from actionlib_core.inputs.arguments import is_goal_id
 
 if TYPE_CHECKING:
     import argparse
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from actionlib_core.goal.ports import StatusEntry
     from actionlib_core.node import Node
     from actionlib_core.transport import Reply
-    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.transport.tokens import Endpoint
     from actionlib_core.wire.ros2.action_messages import GoalState
 
 NS = 1_000_000_000

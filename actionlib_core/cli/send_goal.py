@@ -12,11 +12,11 @@ from actionlib_core.cli._command import (
     print_json,
     print_message,
     print_progress,
-    seconds,
     while_read,
 )
 from actionlib_core.cli._network import class_of_end, find_server, open_node, typed_class
-from actionlib_core.output import discard_output
+from actionlib_core.command_line.numbers import seconds
+from actionlib_core.process.output import discard_output
 
 if TYPE_CHECKING:
     import argparse
@@ -36,8 +36,8 @@ def register(subparsers: Any) -> None:
         "send_goal",
         run,
         "send a goal, wait for its result",
-        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C and SIGTERM cancel it first, and "
-        "so does a reader of the output that leaves (... | head).",
+        description="Exit code 0 when the goal SUCCEEDED. Ctrl-C, a closed terminal and SIGTERM "
+        "cancel it first, and so does a reader of the output that leaves (... | head).",
     )
     parser.add_argument("name", metavar="NAME", help="the action")
     parser.add_argument(
@@ -108,7 +108,7 @@ def _drive(
     with while_read():
         try:
             _follow(handle, args)
-        except KeyboardInterrupt as error:  # Ctrl-C or SIGTERM; raised again after the cancel
+        except KeyboardInterrupt as error:  # Ctrl-C or `Terminated`; raised again after the cancel
             interrupted = error
             _cancel(handle, args)
         except TimeoutError:

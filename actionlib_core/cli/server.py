@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.cli._command import add_command, print_json, print_message, print_progress
 from actionlib_core.cli._network import open_node, typed_class
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.output import tell
+from actionlib_core.process.output import tell
 
 if TYPE_CHECKING:
     from actionlib_core.action.server import ServerGoalHandle

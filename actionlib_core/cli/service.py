@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
-from actionlib_core.cli._command import add_command, json_text, print_progress, rate, seconds
+from actionlib_core.cli._command import add_command, json_text, print_progress
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     SERVICE_KINDS,
@@ -17,8 +17,9 @@ from actionlib_core.cli._network import (
     typed_class,
     types_of,
 )
+from actionlib_core.command_line.numbers import rate, seconds
 from actionlib_core.exceptions import ServiceException
-from actionlib_core.output import tell
+from actionlib_core.process.output import tell
 from actionlib_core.wire.presence import SETTLE_S
 
 if TYPE_CHECKING:

@@ -9,17 +9,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError, _topic_rates
-from actionlib_core.cli._command import (
-    add_command,
-    count,
-    json_text,
-    print_progress,
-    rate,
-    seconds,
-    size,
-)
+from actionlib_core.cli._command import add_command, json_text, print_progress
 from actionlib_core.cli._feed import Feed
-from actionlib_core.cli._filter import Filter
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
     TOPIC_KINDS,
@@ -32,7 +23,8 @@ from actionlib_core.cli._network import (
     types_of,
 )
 from actionlib_core.cli._ros2 import is_ros2
-from actionlib_core.wire.presence import Kind
+from actionlib_core.command_line.numbers import count, rate, seconds, size
+from actionlib_core.transport.tokens import Kind
 
 if TYPE_CHECKING:
     import argparse
@@ -41,7 +33,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Clock
     from actionlib_core.interfaces import Message
     from actionlib_core.node import Node
-    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.transport.tokens import Endpoint
 
 
 def register(subparsers: Any) -> None:
@@ -175,7 +167,7 @@ def _echo(args: argparse.Namespace) -> int:
     from actionlib_core.pubsub.topic import Subscriber
 
     limit = 1 if args.once else args.count
-    wanted = Filter(args.filter) if args.filter else None
+    wanted = _Filter(args.filter) if args.filter else None
     if wanted is not None and args.raw:
         raise UsageError("topic echo: got --filter beside --raw; expected one of the two.")
     with open_node(args) as node, contextlib.ExitStack() as stack:
@@ -202,6 +194,31 @@ def _echo(args: argparse.Namespace) -> int:
             print(show(item), flush=True)
             shown += 1
     return 0
+
+
+class _Filter:
+    """The condition of `--filter`."""
+
+    def __init__(self, text: str) -> None:
+        from actionlib_core.inputs.expression import Expression
+
+        with _of_filter():
+            self._expression = Expression(text)
+
+    def __call__(self, fields: dict[str, Any]) -> bool:
+        """Return whether a message with these fields is shown."""
+        with _of_filter():
+            return bool(self._expression(fields))
+
+
+@contextlib.contextmanager
+def _of_filter() -> Iterator[None]:
+    from actionlib_core.inputs.expression import ExpressionError
+
+    try:
+        yield
+    except ExpressionError as error:
+        raise UsageError(f"--filter: {error}") from error
 
 
 def _nothing(args: argparse.Namespace) -> int:

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 RESEND_FIRST_S = 0.5  # delay of the first repetition of a goal or cancel; doubled each time
 ASK_FIRST_S = 0.2  # after a final status without a result, query for the result
 SILENCE_S = 3.0  # after no message about a goal, query it (servers send a list once a second)
-LONGEST_S = 2.0  # limit of the doubled delay
+MAX_RESEND_DELAY_S = 2.0  # limit of the doubled delay
+SET_NS = 100_000_000  # by a greater difference, the wall clock was set
 UNLISTED_S = 5.0  # a goal missing in a tokenless server's lists for this time is LOST
 
 REMEMBERED = 1024  # sessions of former servers
@@ -61,7 +62,8 @@ class ClientGoal:
 
     Attributes:
         id: The goal's id.
-        stamp_ns: When it was sent [ns since the epoch]; 0 when unknown.
+        stamp_ns: When it was sent, by the wall clock [ns since the epoch]; 0 when unknown.
+        made_at: The same [s, clock].
         attached: The goal was sent by an earlier process: it is never sent, only queried.
         ack_timeout: Time for the acknowledgement [s]; then the goal is LOST. None: no limit.
         comm: Its state.
@@ -82,6 +84,7 @@ class ClientGoal:
     id: str
     stamp_ns: int = 0
     _: KW_ONLY
+    made_at: float = 0.0
     attached: bool = False
     ack_timeout: float | None = None
     comm: CommState = CommState.WAITING_FOR_GOAL_ACK
@@ -111,6 +114,22 @@ class ClientGoal:
             return Duty.GOAL
         self.offered = True
         return Duty.ASK
+
+    def is_before(self, stamp_ns: int, now: float, now_ns: int) -> bool:
+        """Return whether it was sent at or before a time of the wall clock.
+
+        If that clock was set in the meantime, the goal's stamp is read as if it had been right.
+
+        Args:
+            stamp_ns: That time [ns since the epoch].
+            now: The present time [s, clock].
+            now_ns: The same by the wall clock.
+        """
+        sent_ns = self.stamp_ns
+        if not self.attached:
+            seen_ns = now_ns - round((now - self.made_at) * 1e9)  # the stamp by the present clock
+            sent_ns = seen_ns if abs(seen_ns - sent_ns) > SET_NS else sent_ns
+        return 0 < sent_ns <= stamp_ns
 
     def limit_ack(self, ack_timeout: float | None, now: float) -> None:
         """Set the time for the acknowledgement [s], beginning now; None: no limit."""
@@ -268,19 +287,24 @@ class ClientGoal:
         self._pause = RESEND_FIRST_S
         self._due = now
 
-    def tick(self, now: float) -> tuple[Path, Duty]:
-        """Return the states passed and what to send, as time has passed without a message."""
+    def tick(self, now: float, lost_link: str = "") -> tuple[Path, Duty]:
+        """Return the states passed and what to send, as time has passed without a message.
+
+        Args:
+            now: The time [s, clock].
+            lost_link: What connects the client with all servers, if that is lost.
+        """
         if self.over:
             return (), Duty.NOTHING
         if self._ack_by is not None and now >= self._ack_by and not self.acknowledged:
             # A copy of the goal may still reach a server, which must not run what is LOST here.
-            return self.lose(f"no action server took this goal within {self.ack_timeout:g} s"), (
-                Duty.CANCEL if self.offered else Duty.NOTHING
-            )
+            why = f"no action server took this goal within {self.ack_timeout:g} s"
+            why += f", as the link to {lost_link} is lost" if lost_link else ""
+            return self.lose(why), Duty.CANCEL if self.offered else Duty.NOTHING
         if now < self._due:
             return (), Duty.NOTHING
         duty = self._missing()
-        self._pause = min(self._pause * 2, LONGEST_S)
+        self._pause = min(self._pause * 2, MAX_RESEND_DELAY_S)
         self._due = now + self._pause
         return (), duty
 

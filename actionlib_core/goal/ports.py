@@ -59,8 +59,22 @@ class ClientPort(Protocol):
     def is_heard(self) -> bool:
         """Return whether anybody subscribes to goals."""
 
+    @property
+    def lost_link(self) -> str:
+        """What connects this client with all servers, while that is lost; else "".
+
+        As `Transport.lost_link`, also for the next.
+        """
+
+    @property
+    def link_delay(self) -> float:
+        """A lost link is known this long after the servers behind it were reported gone [s]."""
+
     def explain_absence(self) -> str:
-        """Return why there may be no server and what to try; "" when there is nothing to say.
+        """Return why there may be no server: where it was looked for, what is there, what to try.
+
+        Raises:
+            TransportError: the session is closed.
 
         Blocks: for the network's answers, 1 s at most.
         """
@@ -83,9 +97,16 @@ class ClientPort(Protocol):
         """Return the result message; errors as `read_feedback`."""
 
     def send_goal(
-        self, goal_id: str, stamp_ns: int, body: bytes, server: Any, *, wait: bool = True
+        self,
+        goal_id: str,
+        stamp_ns: int,
+        body: bytes,
+        server: Any,
+        *,
+        age: float = 0.0,
+        wait: bool = True,
     ) -> None:
-        """Send a goal to one server; None: to a server without a token.
+        """Send a goal, made `age` [s] ago, to one server; None: to a server without a token.
 
         Blocks: with `wait`, while a link is full; without, the goal is then dropped.
         """
@@ -209,8 +230,17 @@ class ServerPort(Protocol):
 class ServerListener(Protocol):
     """The server's side of the port."""
 
-    def on_goal(self, goal_id: str, stamp_ns: int, content: Any, client: str) -> bool:
-        """Handle a goal; `client` identifies its sender, as in `on_client_lost`.
+    def on_goal(
+        self, goal_id: str, stamp_ns: int, content: Any, client: str, age: float = 0.0
+    ) -> bool:
+        """Handle a goal.
+
+        Args:
+            goal_id: Its id.
+            stamp_ns: When its client sent it first, by its clock [ns since the epoch].
+            content: The goal message.
+            client: Identifies its sender, as in `on_client_lost`.
+            age: Time from then until this copy was sent, by the client's monotonic clock [s].
 
         Returns:
             Whether it is new and has been taken.

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 # A finished goal, and a cancel that came before its goal, stay in the status list for this time.
 LISTED_S = 5.0  # ROS's parameter status_list_timeout
 RESULT_TIMEOUT_S = 60.0  # a result without acknowledgement is kept for this time
-FUTURE_NS = 1_000_000_000  # tolerated difference between the clocks of two computers
+REPEATED_S = 0.1  # a copy of a goal that was sent this long after the goal was made is a repetition
+ON_ITS_WAY_S = 0.05  # a goal that comes this long after a cancel may have been sent before it
+CANCELS = 16  # remembered cancels by stamp
 MEMORY_S = 3600.0  # ids of finished goals are remembered, so that a late copy is not run again
 MEMORY_GOALS = 100_000  # limit on their number; the oldest is forgotten first
 
@@ -51,10 +53,12 @@ class ServerGoal:
 
     Attributes:
         id: The goal's id, unique on the network.
-        stamp_ns: When the client sent it [ns since the epoch]; cancels and preemption compare it.
+        stamp_ns: When the client sent it, by its clock [ns since the epoch]; cancels compare it.
         status: Its state in the server's life cycle.
         text: The text of that status.
         client: Session id of its sender; "" when unknown.
+        made_at: When the client first sent it, as far as known [s, clock].
+        age: Time from that until the copy was sent that has arrived first [s].
         arrived: False while only a cancel has come for this id.
         result: The result as it is sent, once there is one.
         listed_until: End of its time in the status list [s, clock]; None: no end yet, or passed.
@@ -67,6 +71,8 @@ class ServerGoal:
     status: Status = Status.PENDING
     text: str = ""
     client: str = ""
+    made_at: float = 0.0
+    age: float = 0.0
     arrived: bool = True
     result: object = None
     listed_until: float | None = None
@@ -76,6 +82,19 @@ class ServerGoal:
     def entry(self) -> StatusEntry:
         """Return its entry in the status list."""
         return StatusEntry(self.id, self.stamp_ns, self.status, self.text)
+
+    def is_older_than(self, other: ServerGoal) -> bool:
+        """Return whether this goal, which has just arrived, was sent before one that is here.
+
+        That is so only for a repetition, as its first copy may have been lost: first copies arrive
+        in order. Stamps are compared only between goals of one client, which makes them increasing:
+        the clocks of two computers differ, and a clock may be set at any time.
+        """
+        if self.age < REPEATED_S:
+            return False
+        if self.client and self.client == other.client:
+            return self.stamp_ns < other.stamp_ns
+        return self.made_at < other.made_at
 
 
 class ServerGoals:
@@ -88,6 +107,8 @@ class ServerGoals:
     Attributes:
         closed: No more goals are taken.
         tracked: Id -> goal that runs, or whose end its client may not know yet.
+        forgotten: For a file of the goals: id and status of each whose result is no longer kept;
+            id and None once the id is forgotten too. The caller empties it; None: nobody does.
 
     Threads: none of its own, no lock; the owner calls it under its lock.
     """
@@ -96,13 +117,16 @@ class ServerGoals:
         self.name = name
         self.result_timeout = result_timeout
         self.tracked: dict[str, ServerGoal] = {}
+        self.forgotten: list[tuple[str, Status | None]] | None = None
         # Status, when it was forgotten, whether acknowledged. Tuples of plain numbers, because
         # CPython's garbage collector does not have to visit these, of which there may be 100,000.
         self._past: dict[str, tuple[int, float, bool]] = {}
         # Its ids in order. `next(iter(dict))` steps over the gaps of all entries deleted before.
         self._oldest: deque[str] = deque()
         self.closed = False
-        self._last_cancel_ns = 0
+        # Cancels by stamp, for goals that are still on their way: the stamp [ns], and when it came
+        # [s, clock]. The latest comes last; an earlier one stays while its stamp is greater.
+        self._cancels: list[tuple[int, float]] = []
         self._steps = server_life_cycle()
 
     def find(self, goal_id: str) -> ServerGoal | None:
@@ -132,23 +156,32 @@ class ServerGoals:
         self.tracked[arrived.id] = arrived
         if known is not None:  # not arrived: the entry that an early cancel has left
             text = TEXT_CANCEL_CAME_FIRST
-        elif 0 < arrived.stamp_ns <= self._last_cancel_ns:
+        elif self._is_cancelled(arrived):
             text = TEXT_CANCELLED_BEFORE
         else:
             return Arrival.NEW, arrived
         self.step(arrived, "cancel", "the cancel that came first", now, text)
         return Arrival.RECALLED, arrived
 
-    def on_cancel(self, goal_id: str, stamp_ns: int, now: float, now_ns: int) -> list[ServerGoal]:
-        """Apply the four cancel rules of actionlib; `now_ns` [ns since the epoch], as in stamps.
+    def _is_cancelled(self, arrived: ServerGoal) -> bool:
+        """Return whether a goal was sent before a cancel by stamp that came first.
+
+        Its stamp alone does not show that: its client's clock may be behind, or was put back.
+        """
+        return arrived.stamp_ns > 0 and any(
+            arrived.stamp_ns <= stamp_ns and arrived.made_at <= came_at + ON_ITS_WAY_S
+            for stamp_ns, came_at in self._cancels
+        )
+
+    def on_cancel(self, goal_id: str, stamp_ns: int, now: float) -> list[ServerGoal]:
+        """Apply the four cancel rules of actionlib.
 
         Neither id nor stamp: all goals. Stamp only: goals at or before it. Id only: that goal.
         Both: that goal and those at or before the stamp.
 
         A cancel for an unknown id is remembered for `LISTED_S`: a goal with that id that arrives
-        later is recalled. So is every goal with a stamp at or before that of a cancel. A stamp more
-        than `FUTURE_NS` ahead comes from a wrong clock and counts as `now_ns`, as it would recall
-        all goals until then.
+        later is recalled. So is a goal that was sent before this cancel, comes after it, and has a
+        stamp at or before the cancel's.
 
         Returns:
             The goals that this cancel asks to stop and that were not asked before.
@@ -164,9 +197,10 @@ class ServerGoals:
             self.tracked[goal_id] = ServerGoal(
                 goal_id, 0, Status.RECALLING, arrived=False, listed_until=now + LISTED_S
             )
-        # Kept for goals that are still on the way: `on_goal` compares their stamps.
-        until_ns = stamp_ns if stamp_ns <= now_ns + FUTURE_NS else now_ns
-        self._last_cancel_ns = max(self._last_cancel_ns, until_ns)
+        if stamp_ns:
+            self._cancels = [cancel for cancel in self._cancels if cancel[0] > stamp_ns]
+            self._cancels.append((stamp_ns, now))
+            del self._cancels[:-CANCELS]
         return asked
 
     def on_client_lost(self, client: str) -> list[ServerGoal]:
@@ -232,10 +266,9 @@ class ServerGoals:
             goal.listed_until = now + LISTED_S
 
     def restore(self, goal: ServerGoal, now: float) -> None:
-        """Track a goal that an earlier server process had taken."""
+        """Track a goal that an earlier server process had taken; its result is kept once more."""
         self.tracked[goal.id] = goal
-        if goal.status in TERMINAL:
-            goal.listed_until = now + LISTED_S
+        if goal.status in TERMINAL:  # not listed: nobody knows how long ago it has ended
             goal.kept_until = now + self.result_timeout
 
     def restore_past(self, goal_id: str, status: int, now: float) -> None:
@@ -305,6 +338,8 @@ class ServerGoals:
         del self.tracked[goal.id]
         self._past[goal.id] = (int(goal.status), now, acknowledged)
         self._oldest.append(goal.id)
+        if self.forgotten is not None:
+            self.forgotten.append((goal.id, goal.status))
         # Not only in `expire`: many goals may end between two of its calls.
         if len(self._past) > MEMORY_GOALS:
             self._trim(now)
@@ -316,3 +351,5 @@ class ServerGoals:
             if len(self._past) <= MEMORY_GOALS and self._past[oldest][1] + MEMORY_S > now:
                 return
             del self._past[self._oldest.popleft()]
+            if self.forgotten is not None:
+                self.forgotten.append((oldest, None))

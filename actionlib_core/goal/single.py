@@ -2,7 +2,8 @@
 
 Source:
     `SimpleActionServer` of ROS 1 actionlib for the policy "preempt": a newer goal preempts the
-    running goal and recalls the waiting one; a goal with an older stamp is itself recalled.
+    running goal and recalls the waiting one; an older goal that comes late is itself recalled. ROS
+    compares stamps, also with those of goals that have ended; see `ServerGoal.is_older_than`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 from actionlib_core.goal.states import TERMINAL
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from actionlib_core.goal.server import ServerGoal
 
 
@@ -54,7 +57,6 @@ class _Waiting(Generic[G]):
     """A goal that waits to be accepted, and whether it was cancelled in the meantime."""
 
     goal: G
-    stamp_ns: int
     cancelled: bool = False
 
 
@@ -83,7 +85,6 @@ class SingleGoal(Generic[G]):
         self.current: G | None = None
         self.preempt_requested = False
         self.waiting: deque[_Waiting[G]] = deque()
-        self._current_stamp_ns = 0
 
     @property
     def next(self) -> G | None:
@@ -94,6 +95,13 @@ class SingleGoal(Generic[G]):
     def running(self) -> bool:
         """Whether the current goal has not ended."""
         return self.current is not None and self.current.record.status not in TERMINAL
+
+    def _unended(self) -> Iterator[G]:
+        """Yield the goal that runs and those that wait."""
+        if self.current is not None and self.running:
+            yield self.current
+        for waiting in self.waiting:
+            yield waiting.goal
 
     def find(self, goal: G) -> G:
         """Return the stored object that equals `goal`, or `goal` itself.
@@ -114,29 +122,22 @@ class SingleGoal(Generic[G]):
         self.waiting.clear()
         return waiting
 
-    def on_goal(self, goal: G, stamp_ns: int) -> Decision[G]:
+    def on_goal(self, goal: G) -> Decision[G]:
         """Decide about a goal that arrived."""
-        if self.policy == "queue":
-            self.waiting.append(_Waiting(goal, stamp_ns))
+        busy = self.running or bool(self.waiting)
+        if self.policy == "reject" and busy:
+            return Decision(reject=goal)
+        if self.policy == "queue" or not busy:
+            self.waiting.append(_Waiting(goal))
             return ANNOUNCE
-        if self.policy == "reject":
-            if self.running or self.waiting:
-                return Decision(reject=goal)
-            self.waiting.append(_Waiting(goal, stamp_ns))
-            return ANNOUNCE
-        # "preempt", by stamps rather than by arrival: the network may deliver goals out of order.
-        newest = self.waiting[-1].stamp_ns if self.waiting else 0
-        # An old goal that comes late must not stop a newer one.
-        if stamp_ns < newest or stamp_ns < self._current_stamp_ns:
+        # "preempt": an older goal that comes late must not stop a newer one.
+        if any(goal.record.is_older_than(other.record) for other in self._unended()):
             return Decision(recall=(goal,))
-        if not self.waiting and not self.running:
-            self.waiting.append(_Waiting(goal, stamp_ns))
-            return ANNOUNCE
         # The new goal replaces the waiting one at once; the running one only when its code accepts
         # the new goal, or ends.
         older = tuple(waiting.goal for waiting in self.waiting)
         self.waiting.clear()
-        self.waiting.append(_Waiting(goal, stamp_ns))
+        self.waiting.append(_Waiting(goal))
         self.preempt_requested = self.preempt_requested or self.running
         return Decision(recall=older, preempt=self.running, announce=True)
 
@@ -169,6 +170,6 @@ class SingleGoal(Generic[G]):
             return None, None
         replaced = self.current if self.running else None
         new = self.waiting.popleft()
-        self.current, self._current_stamp_ns = new.goal, new.stamp_ns
+        self.current = new.goal
         self.preempt_requested = new.cancelled
         return self.current, replaced

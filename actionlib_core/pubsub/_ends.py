@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
+from functools import partial
 from typing import TYPE_CHECKING
 
+from actionlib_core.exceptions import TransportError
 from actionlib_core.node import get_node
 from actionlib_core.shutdown import current_shutdown
+from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire import looked_for
+from actionlib_core.wire.absence import ABSENT_S
 from actionlib_core.wire.end_port import make_end_port
-from actionlib_core.wire.presence import Endpoint, Kind, find_mismatch
+from actionlib_core.wire.presence import find_mismatch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterator
     from typing import Self
 
     from actionlib_core.clock import Event
@@ -26,7 +31,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("actionlib_core")
 
 
-class End:
+class NamedEnd:
     """Base class of publisher, subscriber, service and proxy.
 
     A subclass sets `_ends` and `_forget`, and appends to `_parts` everything that is to be closed
@@ -190,6 +195,31 @@ class NameWatch:
             forget()
             with self._lock:
                 self._waiters.remove(changed)
+
+    @contextlib.contextmanager
+    def telling(self, kind: Kind) -> Iterator[None]:
+        """Wait in the block for an end of `kind`; if there is none after `ABSENT_S`, log that.
+
+        The log says where it was looked for and which names there are.
+        """
+
+        def look() -> None:
+            if not self.ends(kind, any_type=True):
+                self._node.clock.spawn(partial(self._log_absence, kind), name="absence")
+
+        timer = self._node.clock.call_later(ABSENT_S, look)
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def _log_absence(self, kind: Kind) -> None:
+        of_topic = kind is Kind.PUBLISHER
+        what, nobody = ("topic", "publisher") if of_topic else ("service", "server")
+        name = self._end.own.name
+        with contextlib.suppress(TransportError):  # the session is closed: nobody waits any more
+            why = self._end.explain_absence()
+            logger.warning("%s '%s': no %s after %g s: %s", what, name, nobody, ABSENT_S, why)
 
     def wake(self) -> None:
         """Let the waiting threads check their conditions again."""

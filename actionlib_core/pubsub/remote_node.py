@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core._arguments import check_limit
 from actionlib_core.exceptions import RemoteNodeError
+from actionlib_core.inputs.arguments import check_limit
 from actionlib_core.interfaces import ros2
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     )
 
 TIMEOUT_S = 10.0  # default limit of a call
-MOST = 2**63  # integer parameters have 64 bits
+MAX_INTEGER = 2**63  # integer parameters have 64 bits
 
 _FIELDS = {
     1: "bool_value",
@@ -208,7 +208,7 @@ def _field_of(value: Any) -> str:
         simple = {f"{word}_value" for word in ("bool", "integer", "double", "string")}
         if len(inner) == 1 and inner <= simple:
             return inner.pop().replace("_value", "_array_value")
-    too_big = type(value) is int and not -MOST <= value < MOST
+    too_big = type(value) is int and not -MAX_INTEGER <= value < MAX_INTEGER
     # bool before int, of which it is a subclass.
     kinds = ((bool, "bool"), (int, "integer"), (float, "double"), (str, "string"))
     for kind, word in (*kinds, (bytes, "byte_array"), (bytearray, "byte_array")):

@@ -17,7 +17,7 @@ import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core._arguments import check_function
+from actionlib_core import border
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.exceptions import (
     ActionlibError,
@@ -28,17 +28,13 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
     text_of,
 )
+from actionlib_core.inputs.arguments import check_function
 from actionlib_core.pubsub._ends import NameWatch
 from actionlib_core.pubsub.service_proxy import ServiceEnd, handler_raised, is_from
+from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.encoding import parse_encoding
-from actionlib_core.wire.presence import (
-    Endpoint,
-    Kind,
-    in_conflict,
-    is_younger,
-    with_age,
-)
+from actionlib_core.wire.presence import in_conflict, is_younger, with_age
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -94,7 +90,7 @@ class Service(ServiceEnd):
         super().__init__(name, service_class, node)
         # Of two servers with the name, the younger stops.
         if self._end.ages:
-            self._end.own = with_age(self._end.own, self.node.clock.time_ns())
+            self._end.own = with_age(self._end.own, self.node)
         self.handler = handler
         self.error: ServiceConflictError | None = None
         self._alone = alone
@@ -109,6 +105,7 @@ class Service(ServiceEnd):
         self._ends = self._watch()
         self._parts.append(self._ends)
         self._forget = self.node.on_close(self.close)
+        self._used = self.node.offer(f"service '/{self._full_name}'") if alone else bool
         self._calls = CallbackQueue(self.node, f"service /{self._full_name}")
         try:
             self._parts.append(self._end.answer(self._on_query))
@@ -120,6 +117,7 @@ class Service(ServiceEnd):
 
     def close(self) -> None:
         """Stop answering; a second call does nothing."""
+        self._used()
         self._leave()
 
     def shutdown(self, reason: str = "") -> None:
@@ -139,6 +137,7 @@ class Service(ServiceEnd):
 
         Blocks: until then.
         """
+        self._used()
         self._ends.wait(lambda: self._closed, None)
         if self.error is not None:
             raise self.error
@@ -186,6 +185,7 @@ class Service(ServiceEnd):
     # -- calls ---------------------------------------------------------------------------------
 
     def _on_query(self, query: Query) -> None:
+        self._used()
         try:
             self._end.check(query)
         except TypeMismatchError as error:
@@ -256,6 +256,9 @@ class Service(ServiceEnd):
             self._report_unreadable("a request cannot be read", error)
             _send_error(query, "", f"the request cannot be read: {error}")
             return
+        if border.listeners:
+            number = next(border.numbers)
+            border.tell("asked", self.node, self._full_name, self.type, number, request)
         try:
             response = self._respond(self.handler(request))
             self._end.reply(query, response)
@@ -279,9 +282,10 @@ class Service(ServiceEnd):
 
     def _respond(self, result: object) -> Message:
         # The return values that rospy accepts.
-        if isinstance(result, self.response_class):
-            return result
         make: Callable[..., Message] = self.response_class
+        if isinstance(result, self.response_class):
+            response: Message = result
+            return response
         if isinstance(result, dict):
             return make(**result)
         if isinstance(result, (tuple, list)):

@@ -9,9 +9,9 @@ from __future__ import annotations
 import itertools
 import json
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, Protocol, TypeVar, overload
 
-from actionlib_core._arguments import check_class, check_delay, check_limit
+from actionlib_core import border
 from actionlib_core.exceptions import (
     ActionlibError,
     DeserializationError,
@@ -24,11 +24,12 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
     WaitTimeoutError,
 )
+from actionlib_core.inputs.arguments import check_class, check_delay, check_limit
 from actionlib_core.node import get_node
-from actionlib_core.pubsub._ends import End, NameWatch
+from actionlib_core.pubsub._ends import NamedEnd, NameWatch
 from actionlib_core.shutdown import requested
+from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.end_port import make_end_port
-from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,10 +41,30 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Reply
     from actionlib_core.wire.end_port import EndPort
 
+if TYPE_CHECKING:
+    import typing_extensions  # type checkers have it; a plain `ServiceProxy` is one of any service
+
+    P = typing_extensions.ParamSpec("P", default=...)
+    Q = typing_extensions.TypeVar("Q", default=Any)
+    S = typing_extensions.TypeVar("S", default=Any)
+    Q_co = typing_extensions.TypeVar("Q_co", default=Any, covariant=True)
+    S_co = typing_extensions.TypeVar("S_co", default=Any, covariant=True)
+else:
+    P, Q, S = ParamSpec("P"), TypeVar("Q"), TypeVar("S")
+    Q_co, S_co = TypeVar("Q_co", covariant=True), TypeVar("S_co", covariant=True)
+
+
+class ServiceSpec(Protocol[P, Q_co, S_co]):
+    """A service class: type checkers find its request's fields and its response through it."""
+
+    @staticmethod
+    def _call(*args: P.args, **kwargs: P.kwargs) -> tuple[Q_co, S_co]: ...
+
+
 CALL_TIMEOUT_S = 60.0  # default limit of a call
 APPEAR_S = 2.0  # part of it in which the server must appear
 FOREVER_S = 1e8  # three years: the network needs a number for "no limit"
-LEAST_S = 3600.0  # see `patience_of`
+MIN_PATIENCE_S = 3600.0  # see `patience_of`
 STALE_S = 0.2  # a server that vanishes this soon after a call may already have died before it
 MARGIN_S = 1.0  # added for the network, so that it does not give up before the call itself
 
@@ -58,10 +79,10 @@ def patience_of(calls: int) -> float:
     such calls may wait for years, and a program that makes millions of them needs about 20 MB, plus
     the memory of the calls of the last hour.
     """
-    return max(FOREVER_S / calls, LEAST_S)
+    return max(FOREVER_S / calls, MIN_PATIENCE_S)
 
 
-class ServiceEnd(End):
+class ServiceEnd(NamedEnd):
     """Base class of server and proxy."""
 
     _what = "service"
@@ -94,7 +115,7 @@ def handler_raised(name: str, remote_type: str, remote_text: str) -> ServiceExce
     )
 
 
-class ServiceProxy(ServiceEnd):
+class ServiceProxy(ServiceEnd, Generic[P, Q, S]):
     """Calls a service: `proxy(request)`, `proxy(data=True)`, `proxy(True)`.
 
     Args:
@@ -118,14 +139,15 @@ class ServiceProxy(ServiceEnd):
     def __init__(
         self,
         name: str,
-        service_class: type[ServiceType],
+        service_class: type[ServiceSpec[P, Q, S]],
         persistent: bool = False,
         headers: dict[str, str] | None = None,
         *,
         timeout: float | Duration | None = CALL_TIMEOUT_S,
         node: Node | None = None,
     ) -> None:
-        super().__init__(name, service_class, node)
+        service: Any = service_class
+        super().__init__(name, service, node)
         self.persistent = persistent
         self.headers = headers
         self.timeout = check_limit(f"service {name!r}", "timeout", timeout)
@@ -148,10 +170,18 @@ class ServiceProxy(ServiceEnd):
         self._closed = True
         self._ends.wake()
 
+    @overload
+    def __call__(self, request: Q, /) -> S: ...
+    @overload
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> S: ...
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the service; see `call`."""
         return self.call(*args, **kwargs)
 
+    @overload
+    def call(self, request: Q, /) -> S: ...
+    @overload
+    def call(self, *args: P.args, **kwargs: P.kwargs) -> S: ...
     def call(self, *args: Any, **kwargs: Any) -> Any:
         """Send a request, or one made from the arguments, and return the response.
 
@@ -173,12 +203,32 @@ class ServiceProxy(ServiceEnd):
             request = args[0]
         else:
             request = self.request_class(*args, **kwargs)
+        return self._call_told(request) if border.listeners else self._call(request)
+
+    def _call(self, request: Message) -> Message:
         clock = self.node.clock
         # The wait for the server is part of the timeout.
         start = clock.now()
         self._find_server()
         left = None if self.timeout is None else max(self.timeout - (clock.now() - start), 0.0)
         return self._read(self._ask(request, left))
+
+    def _call_told(self, request: Message) -> Message:
+        """Call, and tell the listeners of the border what is sent and what comes back."""
+        number = next(border.numbers)
+        told = self.node, self._full_name, self.type, number
+        border.tell("request", *told, request)
+        try:
+            self._find_server()
+            if any(end.session == self.node.transport.session_id for end in self._ends.ends()):
+                border.tell("own", *told)
+            response = self._call(request)
+        except ActionlibError as error:
+            text = error.remote_text if isinstance(error, ServiceException) else ""
+            border.tell("response", *told, None, type(error).__name__, text)
+            raise
+        border.tell("response", *told, response)
+        return response
 
     def wait_for_service(self, timeout: float | Duration | None = None) -> None:
         """Wait until there is a server.
@@ -195,16 +245,24 @@ class ServiceProxy(ServiceEnd):
         Blocks: see `timeout`.
         """
         seconds = check_delay(f"service /{self._full_name}", "timeout", timeout)
+        started = self.node.clock.now()
         if not self._wait_for_server(seconds):
+            if border.listeners:
+                waited = f"{self.node.clock.now() - started:.6f}"
+                border.tell("absent", self.node, self._full_name, self.type, "", text=waited)
             raise WaitTimeoutError(
                 f"/{self._full_name}: no server: got none in {_show(seconds)}; expected one of "
                 f"type {self.type}. "
-                + (self._end.explain_absence() or "Try 'actionlib service list'.")
+                f"{self._absence() or 'Try starting it.'}"
             )
 
     def _wait_for_server(self, timeout: float | None) -> bool:
-        # A server of another type ends the wait too, so that it is reported at once.
-        self._ends.wait(lambda: self._closed or bool(self._ends.ends(any_type=True)), timeout)
+        def known() -> bool:  # also a server of another type, which is then reported at once
+            return self._closed or bool(self._ends.ends(any_type=True))
+
+        if not known():
+            with self._ends.telling(Kind.SERVICE):
+                self._ends.wait(known, timeout)
         if self._closed:
             raise NodeError(f"/{self._full_name}: not called: the proxy is closed.")
         if self._ends.ends():
@@ -223,8 +281,14 @@ class ServiceProxy(ServiceEnd):
             raise ServiceUnavailableError(
                 self._full_name,
                 f"no server: got none in {longest:g} s; expected one of type {self.type}. "
-                + (self._end.explain_absence() or "Try starting it, or wait_for_service() first."),
+                f"{self._absence() or 'Try starting it, or wait_for_service() first.'}",
             )
+
+    def _absence(self) -> str:
+        """Return why there may be no server, as a sentence."""
+        link = self._end.transport.lost_link
+        why = f"the link to {link} is lost." if link else self._end.explain_absence()
+        return f"{why[:1].upper()}{why[1:]}"
 
     def _ask(self, request: Message, timeout: float | None) -> Reply:
         """Send a request and return the first reply.
@@ -294,7 +358,14 @@ class ServiceProxy(ServiceEnd):
         if self._closed:
             return NodeError(f"/{self._full_name}: no answer: the proxy was closed.")
         if in_time:
-            return ServiceLostError(self._full_name, "the server died or left before it answered.")
+            self.node.clock.sleep(self._end.transport.link_delay)
+            link = self._end.transport.lost_link
+            return ServiceLostError(
+                self._full_name,
+                f"the link to {link} is lost; the server may still handle the call."
+                if link
+                else "the server died or left before it answered.",
+            )
         if self.node.closed or timeout is None:
             return NodeError(
                 f"/{self._full_name}: no answer: the node was closed or shutdown was requested."
@@ -367,15 +438,16 @@ def wait_for_service(
     anybody = make_end_port(node, Kind.SERVICE, name, None)
     watch = NameWatch(node, anybody, {Kind.SERVICE}, any_type=True)
     try:
-        if watch.wait(lambda: bool(watch.ends(any_type=True)), seconds):
-            return
+        with watch.telling(Kind.SERVICE):
+            if watch.wait(lambda: bool(watch.ends(any_type=True)), seconds):
+                return
     finally:
         watch.close()
     if seconds is None or node.closed:
         raise NodeError(f"/{name}: not there: the node was closed or shutdown was requested.")
+    why = anybody.explain_absence()
     raise WaitTimeoutError(
-        f"/{name}: no server: got none in {seconds:g} s; expected one. "
-        "Try 'actionlib service list'."
+        f"/{name}: no server: got none in {seconds:g} s; expected one. {why[:1].upper()}{why[1:]}"
     )
 
 

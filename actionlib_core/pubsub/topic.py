@@ -14,9 +14,9 @@ import logging
 import threading
 import weakref
 from functools import partial
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
-from actionlib_core._arguments import check_class, check_delay, check_function, check_queue_size
+from actionlib_core import border
 from actionlib_core.action._callbacks import CallbackQueue
 from actionlib_core.exceptions import (
     ActionlibError,
@@ -26,13 +26,20 @@ from actionlib_core.exceptions import (
     WaitTimeoutError,
 )
 from actionlib_core.goal.bounded import MESSAGES, Backlog
-from actionlib_core.pubsub._ends import End, NameWatch, close_all
+from actionlib_core.inputs.arguments import (
+    check_class,
+    check_delay,
+    check_function,
+    check_queue_size,
+)
+from actionlib_core.pubsub._ends import NamedEnd, NameWatch, close_all
 from actionlib_core.shutdown import requested
+from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.arrivals import Readable
-from actionlib_core.wire.presence import Kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from contextlib import AbstractContextManager
 
     from actionlib_core.interfaces import Message
     from actionlib_core.node import Node
@@ -41,11 +48,12 @@ if TYPE_CHECKING:
     from actionlib_core.wire.end_port import Sender
 
 M = TypeVar("M", bound="Message")
+A = TypeVar("A")
 
 logger = logging.getLogger("actionlib_core")
 
 
-class _TopicEnd(End):
+class _TopicEnd(NamedEnd):
     """Base class of publisher and subscriber."""
 
     _what = "topic"
@@ -88,7 +96,15 @@ class _TopicEnd(End):
         Blocks: see `timeout`.
         """
         limit = check_delay(f"topic {self.name}", "timeout", timeout)
-        return self._ends.wait(lambda: self.get_num_connections() >= count, limit)
+        with self.telling():
+            return self._ends.wait(lambda: self.get_num_connections() >= count, limit)
+
+    def telling(self) -> AbstractContextManager[None]:
+        """Return a block that waits for the other side: a log tells after 3 s that nobody is there.
+
+        Use it only for waits that may be in vain, as most subscribers need no publisher.
+        """
+        return self._ends.telling(self._counterpart)
 
     def unregister(self) -> None:
         """Leave the topic; a second call does nothing.
@@ -180,6 +196,8 @@ class Publisher(_TopicEnd):
             message = args[0]
         else:
             message = self.data_class(*args, **kwargs)
+        if border.listeners:
+            border.tell("published", self.node, self._full_name, self.type, "", message)
         self._sender.put(message)
         if self._ends.mismatches:
             self._raise_if_nobody_fits()
@@ -217,8 +235,31 @@ class Subscriber(_TopicEnd, Generic[M]):
 
     _kind = Kind.SUBSCRIBER
     _counterpart = Kind.PUBLISHER
+    _is_input = True
     _call: Callable[[Callable[[], None]], object]
 
+    @overload
+    def __init__(
+        self,
+        name: str,
+        data_class: type[M],
+        callback: Callable[[M], object] | None = None,
+        callback_args: None = None,
+        queue_size: int | None = None,
+        *,
+        node: Node | None = None,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        name: str,
+        data_class: type[M],
+        callback: Callable[[M, A], object],
+        callback_args: A,
+        queue_size: int | None = None,
+        *,
+        node: Node | None = None,
+    ) -> None: ...
     def __init__(
         self,
         name: str,
@@ -238,6 +279,9 @@ class Subscriber(_TopicEnd, Generic[M]):
         self._lock = threading.Lock()  # guards `_waiting`
         self._waiting: Backlog[Sample] = Backlog(queue_size or MESSAGES)
         self._readable = Readable(logger)
+        self._number = next(border.numbers)
+        if self._is_input and border.listeners:
+            border.tell("subscriber", self.node, self._full_name, self.type, self._number)
         self._call = self._caller()
         # Last: a message may arrive at once, and needs all of the above.
         self._join(lambda: self._end.receive(self._on_sample))
@@ -286,10 +330,18 @@ class Subscriber(_TopicEnd, Generic[M]):
     def _call_back(self, message: M) -> None:
         if self._closed or self.callback is None:  # unregistered while the message was decoded
             return
+        if self._is_input and border.listeners:
+            border.tell("message", self.node, self._full_name, self.type, self._number, message)
         if self.callback_args is None:
             self.callback(message)
         else:
             self.callback(message, self.callback_args)
+
+
+class WatchingSubscriber(Subscriber[M]):
+    """A subscriber of somebody who only watches; what it gets is no input of the program."""
+
+    _is_input = False
 
 
 class NotingSubscriber(Subscriber[M]):
@@ -345,7 +397,8 @@ class _OneMessage(NotingSubscriber[M]):
 
     def take(self, timeout: float | None) -> M:
         found = self._found
-        self._ends.wait(lambda: bool(found) or self._mismatch() is not None, timeout)
+        with self.telling():
+            self._ends.wait(lambda: bool(found) or self._mismatch() is not None, timeout)
         if found:
             return found[0]
         mismatch = self._mismatch()

@@ -161,6 +161,29 @@ class Transport(Protocol):
         """Longest time in which a lost link is restored once the network allows it [s]."""
         ...
 
+    @property
+    def lost_link(self) -> str:
+        """What connects this session with all others, while that is lost; else "".
+
+        For example "router tcp/robot:7447". Of a peer this is never known, as it has many links.
+        """
+        ...
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether this session has found any other one, which may have announced nothing yet."""
+        ...
+
+    @property
+    def link_delay(self) -> float:
+        """A lost link is known this long after the tokens behind it have vanished [s]."""
+        ...
+
+    @property
+    def is_local(self) -> bool:
+        """Whether all programs of the network run on this computer and share its clocks."""
+        ...
+
     def publisher(self, key: str, encoding: str = "", quality: Quality = ...) -> PublisherPort:
         """Declare a publisher of `key`."""
         ...

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from actionlib_core.transport._keys import key_matches
-from actionlib_core.wire.presence import ROOT, WORDS_BEFORE_NAME
+from actionlib_core.transport.tokens import ROOT, WORDS_BEFORE_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

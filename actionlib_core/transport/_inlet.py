@@ -1,8 +1,8 @@
 """Delivery from the threads of a network library to callbacks.
 
 A network library calls back on its own threads, and also inside a call of ours. `Inlet` delivers in
-order and never on the stack of a caller, who may hold locks. `Gate` lets a session end with no
-callback left running.
+order and never on the stack of a caller, who may hold locks. `CallbackGate` lets a session end with
+no callback left running.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Inside:
 inside = Inside()
 
 
-class Gate:
+class CallbackGate:
     """Lets callbacks run until it is shut, and waits until the last one has returned.
 
     It needs no lock: a callback registers in `running` before it reads `is_shut`, and `shut` sets
@@ -118,7 +118,7 @@ class Inlet:
 
     __slots__ = ("_gate", "_queued", "_submit", "closed")
 
-    def __init__(self, gate: Gate, executor: SerialExecutor) -> None:
+    def __init__(self, gate: CallbackGate, executor: SerialExecutor) -> None:
         self._gate = gate
         self._submit = executor.submit
         self._queued: list[None] = []  # a counter of queued items: list operations are atomic
@@ -175,7 +175,7 @@ class Inlet:
 # when the callback returns, mapping memory each time: about 14 us of a callback that otherwise
 # takes 2. After one call of PyGILState_Ensure without its Release, the thread keeps its state.
 # https://docs.python.org/3/c-api/init.html#non-python-created-threads
-LONGEST = 64  # threads; a library that starts more than these does not reuse its threads
+MAX_KNOWN_THREADS = 64  # threads; a library that starts more than these does not reuse its threads
 
 _enter = ctypes.pythonapi.PyGILState_Ensure if sys.implementation.name == "cpython" else None
 
@@ -188,6 +188,6 @@ def pin(me: int) -> None:
 
     A new thread with the id of an earlier one is not pinned again. That only costs it time.
     """
-    if _enter is not None and len(pinned) < LONGEST:
+    if _enter is not None and len(pinned) < MAX_KNOWN_THREADS:
         _enter()
     pinned.add(me)

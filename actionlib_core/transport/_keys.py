@@ -30,6 +30,20 @@ def check_key(key: str) -> str:
     return key
 
 
+def check_pattern(pattern: str) -> list[str]:
+    """Return the words of a pattern.
+
+    Raises:
+        TransportError: it has an empty word.
+    """
+    words = pattern.split("/")
+    if "" in words:
+        raise TransportError(
+            f"pattern: empty word: got {pattern!r}; expected words with single slashes between them"
+        )
+    return words
+
+
 @lru_cache(maxsize=1024)
 def compile_pattern(pattern: str) -> re.Pattern[str]:
     """Return a regular expression for `fullmatch` with a key and one more slash.
@@ -39,12 +53,7 @@ def compile_pattern(pattern: str) -> re.Pattern[str]:
     Raises:
         TransportError: the pattern has an empty word.
     """
-    words = pattern.split("/")
-    if "" in words:
-        raise TransportError(
-            f"pattern: empty word: got {pattern!r}; expected words with single slashes between them"
-        )
-    parts = [_WORDS.get(word) or re.escape(word) + "/" for word in words]
+    parts = [_WORDS.get(word) or re.escape(word) + "/" for word in check_pattern(pattern)]
     return re.compile("".join(parts))
 
 

@@ -297,27 +297,32 @@ class Publisher(Entry):
                 link.later(delay, partial(self._put_late, payload, attachment))
 
     def _put_late(self, payload: bytes, attachment: bytes | None) -> None:
-        if not self.closed:
-            self._put(payload, attachment)
+        # What was sent arrives, also if the publisher has been closed meanwhile.
+        with self.network.lock:
+            if self.session.is_open:
+                self._deliver_locked(payload, attachment)
 
     def _put(self, payload: bytes, attachment: bytes | None) -> None:
-        network = self.network
-        with network.lock:
+        with self.network.lock:
             if self.closed:
                 if self.session.killed:  # see `MemoryTransport.kill`
                     return
                 raise TransportError(
                     f"{self._key}: the publisher is closed. Try sending before the node is closed."
                 )
-            subscribers = network.subscribers.get(self._key, ())
-            if not (subscribers or self._latch):
-                return
-            stamp_ns = 0 if attachment is None else network.clock.time_ns()
-            sample = Sample(self._key, payload, self._encoding, self._source, attachment, stamp_ns)
-            if self._latch:
-                self.kept.append(sample)
-            for subscriber in subscribers:
-                subscriber.inbox.post(subscriber, sample)
+            self._deliver_locked(payload, attachment)
+
+    def _deliver_locked(self, payload: bytes, attachment: bytes | None) -> None:
+        network = self.network
+        subscribers = network.subscribers.get(self._key, ())
+        if not (subscribers or self._latch):
+            return
+        stamp_ns = 0 if attachment is None else network.clock.time_ns()
+        sample = Sample(self._key, payload, self._encoding, self._source, attachment, stamp_ns)
+        if self._latch:
+            self.kept.append(sample)
+        for subscriber in subscribers:
+            subscriber.inbox.post(subscriber, sample)
 
     def matching(self) -> bool:
         link = self.session.link

@@ -112,7 +112,7 @@ def _explain_tls(plain: socket.socket, host: str, context: ssl.SSLContext, tls: 
     except ssl.SSLError as error:
         shown = repr(tls.certificate) if tls.certificate else "no certificate"
         return (
-            f"it refuses us: {_reason(error)}: got {shown}; expected a client certificate "
+            f"it refuses us ({_reason(error)}): got {shown}; expected a client certificate "
             "that it knows. Try tls.certificate and tls.key signed by its certificate authority."
         )
     except OSError:

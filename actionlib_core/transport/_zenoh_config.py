@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.config import ROUTER_ENDPOINT
 from actionlib_core.transport._access import ACCESS_KEY
-from actionlib_core.wire.presence import ROOT
+from actionlib_core.transport.tokens import ROOT
 
 if TYPE_CHECKING:
     from actionlib_core.config import AccessRule, Config
@@ -81,6 +81,12 @@ def zenoh_settings(config: Config) -> dict[str, object]:
     return settings
 
 
+def is_local(config: Config) -> bool:
+    """Return whether a session can only be linked with others on this computer."""
+    alone = config.mode == "peer" and not (config.connect or config.listen)
+    return alone and config.discovery == "lo"
+
+
 def new_session_id(now_ns: int) -> str:
     """Return an id for a new session: greater, in Zenoh's order, than those of earlier sessions.
 
@@ -88,7 +94,8 @@ def new_session_id(now_ns: int) -> str:
     searches for peers at once, while the others do so only every 8 s.
 
     Args:
-        now_ns: The time [ns since the epoch].
+        now_ns: The time [ns]: on one computer the monotonic one, as the other can be put back; else
+            that since the epoch, which is the same on all computers.
     """
     # Zenoh compares ids from the last byte of the number to the first.
     raw = now_ns.to_bytes(8, "big") + secrets.token_bytes(8)

@@ -158,6 +158,26 @@ class FaultyTransport:
         """That of the inner session."""
         return self.inner.rediscovery
 
+    @property
+    def lost_link(self) -> str:
+        """All of the network, once the link has been cut for longer than the lease."""
+        return "the network" if self.is_dead else ""
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether other sessions are linked: those of `inner`, unless the link is cut."""
+        return self.inner.is_linked and not self.is_dead
+
+    @property
+    def link_delay(self) -> float:
+        """0: it is known at once."""
+        return 0.0
+
+    @property
+    def is_local(self) -> bool:
+        """Whether the network ends at this computer."""
+        return self.inner.is_local
+
     def close(self) -> None:
         """Close the session."""
         self._cancel_timers()

@@ -108,6 +108,26 @@ class MemoryTransport:
         """0: no link is ever lost."""
         return 0.0
 
+    @property
+    def lost_link(self) -> str:
+        """Nothing: no link is ever lost."""
+        return ""
+
+    @property
+    def is_linked(self) -> bool:
+        """True: whoever else is on the network is known at once."""
+        return True
+
+    @property
+    def link_delay(self) -> float:
+        """0, likewise."""
+        return 0.0
+
+    @property
+    def is_local(self) -> bool:
+        """True: the network lives in this process."""
+        return True
+
     def publisher(
         self, key: str, encoding: str = "", quality: Quality = DEFAULT_QUALITY
     ) -> Publisher:
@@ -201,6 +221,11 @@ class MemoryTransport:
             entry = make()
             self.declared[entry] = None
             return entry
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the session has not been closed."""
+        return not self._closed
 
     def _check_open(self, key: str) -> None:
         if self._closed:

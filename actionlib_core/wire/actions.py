@@ -17,18 +17,16 @@ from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces._message import codecs_of
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.transport import Quality, Sample
+from actionlib_core.transport.tokens import Kind, parse_token, token_key, token_pattern
 from actionlib_core.wire import in_process
+from actionlib_core.wire.absence import explain_absence
 from actionlib_core.wire.arrivals import Bursts, Readable
 from actionlib_core.wire.encoding import encoding_of
 from actionlib_core.wire.presence import (
-    Kind,
     find_mismatch,
     in_conflict,
     is_younger,
     list_endpoints,
-    parse_token,
-    token_key,
-    token_pattern,
     with_age,
 )
 
@@ -45,8 +43,8 @@ if TYPE_CHECKING:
         Reply,
         Transport,
     )
+    from actionlib_core.transport.tokens import Endpoint
     from actionlib_core.wire.action_types import ActionTypes
-    from actionlib_core.wire.presence import Endpoint
 
 log = logging.getLogger(__name__)
 
@@ -125,6 +123,15 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     if end > len(payload):
         raise _too_short("XActionGoal", payload)
     return payload[at:end].decode(), secs * _NS + nsecs, payload[end:]
+
+
+def unpack_age(payload: bytes, stamp_ns: int) -> float:
+    """Return how long after its stamp this copy of an XActionGoal was sent [s].
+
+    0 without a stamp in the goal id or in the header, and if the header's is the earlier one.
+    """
+    sent_ns = int.from_bytes(payload[4:8], "little") * _NS + int.from_bytes(payload[8:12], "little")
+    return max(0.0, (sent_ns - stamp_ns) / _NS) if stamp_ns else 0.0
 
 
 def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
@@ -288,6 +295,7 @@ class ActionClientPort:
         types: ActionTypes,
         spawn: Callable[[Callable[[], object], str], object],
     ) -> None:
+        self._node = node
         self._transport = node.transport
         self._clock = node.clock
         self._name = name
@@ -335,8 +343,16 @@ class ActionClientPort:
         for server in list(self._in_process.values()):
             server.leave(self)
 
+    @property
+    def lost_link(self) -> str:
+        return self._transport.lost_link
+
+    @property
+    def link_delay(self) -> float:
+        return self._transport.link_delay
+
     def explain_absence(self) -> str:
-        return ""
+        return explain_absence(self._node, self._name, Kind.ACTION_SERVER)
 
     def send_goal(
         self,
@@ -345,6 +361,7 @@ class ActionClientPort:
         body: bytes,
         server: Endpoint | None,
         *,
+        age: float = 0.0,
         wait: bool = True,
     ) -> None:
         """Send an XActionGoal with the receiver's token as its frame_id."""
@@ -354,7 +371,7 @@ class ActionClientPort:
             if wait
             else self._publishers[self._keys.goal, self._types.action_goal, AGAIN]
         )
-        message = pack_goal(stamp_ns, goal_id, stamp_ns, body, token)
+        message = pack_goal(stamp_ns + int(age * _NS), goal_id, stamp_ns, body, token)
         goals.put(message)  # first, as it fails when the session is closed: nobody would follow it
         if wait and token in self._in_process and (near := in_process.servers.get(token)):
             near.take_goal(Sample(self._keys.goal, message, self._goal_encoding, self._session))
@@ -522,7 +539,7 @@ class ActionServerPort:
         self.pack_feedback = codecs_of(types.feedback)[0]
         action = types.action
         endpoint = node.endpoint(Kind.ACTION_SERVER, name, action._type, action._md5sum)
-        self.endpoint = with_age(endpoint, node.clock.time_ns())
+        self.endpoint = with_age(endpoint, node)
         self._own_key = token_key(self.endpoint)
 
     def open(self, listener: ServerListener) -> None:
@@ -612,7 +629,8 @@ class ActionServerPort:
         except (ValueError, ActionlibError) as error:
             self._report_unreadable("a goal", sample, error)
             return
-        self._listener.on_goal(goal_id, stamp_ns, content, sample.source)
+        age = unpack_age(sample.payload, stamp_ns)
+        self._listener.on_goal(goal_id, stamp_ns, content, sample.source, age)
 
     def _is_of_another(self, frame: str) -> bool:
         """Return whether a goal was sent to another server of this action."""

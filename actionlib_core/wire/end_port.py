@@ -11,15 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from actionlib_core.exceptions import ConfigError
 from actionlib_core.transport import Quality
+from actionlib_core.transport.tokens import Endpoint, Kind, parse_token, token_key, token_pattern
+from actionlib_core.wire.absence import explain_absence
 from actionlib_core.wire.encoding import check_encoding, encoding_of, parse_encoding
-from actionlib_core.wire.presence import (
-    Endpoint,
-    Kind,
-    list_endpoints,
-    parse_token,
-    token_key,
-    token_pattern,
-)
+from actionlib_core.wire.presence import list_endpoints
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -61,6 +56,10 @@ class EndPort(Protocol):
     own: Endpoint
     ages: bool
 
+    @property
+    def transport(self) -> Transport:
+        """The session that it uses."""
+
     def show(self) -> Closable:
         """Announce the end with a token."""
 
@@ -74,7 +73,9 @@ class EndPort(Protocol):
         """Return the servers of the name. Blocks: until the network has answered, 1 s at most."""
 
     def explain_absence(self) -> str:
-        """Return where else there is a server of the name, and what to try; "" if nowhere.
+        """Return why there may be no other side: where it was looked for, and what is there.
+
+        A service has a server at its other side, a subscriber a publisher.
 
         Blocks: as `list_services`.
         """
@@ -171,6 +172,10 @@ class OwnEndPort:
         type_name, md5 = ("", "") if interface is None else (interface._type, interface._md5sum)
         self.own = node.endpoint(kind, name, type_name, md5)
 
+    @property
+    def transport(self) -> Transport:
+        return self._transport
+
     def show(self) -> Closable:
         return self._transport.declare_alive(token_key(self.own))
 
@@ -187,14 +192,19 @@ class OwnEndPort:
         return list_endpoints(self._transport, kind=Kind.SERVICE, name=self.own.name)
 
     def explain_absence(self) -> str:
-        if not self._node.config.ros2:
+        kind = Kind.PUBLISHER if self.own.kind is Kind.SUBSCRIBER else Kind.SERVICE
+        return self._look_on_ros2() or explain_absence(self._node, self.own.name, kind)
+
+    def _look_on_ros2(self) -> str:
+        """Return that a ROS 2 robot has a service of the name; "" if none has."""
+        if not self._node.config.ros2 or self.own.kind is Kind.SUBSCRIBER:
             return ""
         from actionlib_core.wire.ros2.end_port import list_any_type
 
         with contextlib.suppress(ConfigError):  # the name is on none of several networks
             for other in list_any_type(self._node, self.own.name):
                 return (
-                    f"A ROS 2 robot has one, of type {other.type}, in node '/{other.node}'. Try "
+                    f"a ROS 2 robot has one, of type {other.type}, in node '/{other.node}'. Try "
                     f"'names: [{self.own.name}]' in the section ros2 of the configuration."
                 )
         return ""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.transport.tokens import Kind, token_pattern
 from actionlib_core.wire import looked_for
 from actionlib_core.wire.action_types import ActionTypes
-from actionlib_core.wire.presence import Kind, token_pattern
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,78 +1,34 @@
-"""The liveliness tokens by which action servers, clients, services and topics announce themselves.
-
-Every end of a name has one token while it lives. The token's key contains everything that tools and
-clients need, so that they need not query or poll:
-
-    @smachpy/<kind>/<session>/<entity>/<node>/<type>/<md5>/<name ...>
-
-`session` is the id of the network session, `entity` a number within it, `node` the node's full
-name. Slashes in `node` and `type` are written `%`, an empty word is written `-`. The name comes
-last and keeps its slashes, so `@smachpy/*/*/*/*/*/*/robot_1/**` matches everything of one robot.
-"""
+"""Who is on the network, by the tokens of its ends: found, waited for, compared."""
 
 from __future__ import annotations
 
-from enum import StrEnum
-from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+import os
+from typing import TYPE_CHECKING
 
 from actionlib_core.exceptions import TypeMismatchError
+from actionlib_core.transport.tokens import Endpoint, Kind, parse_token, token_pattern
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from actionlib_core.clock import Clock
+    from actionlib_core.node import Node
     from actionlib_core.transport import Transport
 
-ROOT = "@smachpy"
-WORDS_BEFORE_NAME = 7
 LIST_TIMEOUT_S = 1.0  # longest wait for the answers to a query for tokens
 SETTLE_S = 0.4  # discovery counts as finished after this time without a new token
-SETTLE_MOST_S = 3.0  # or after this time in all
+FIRST_S = 2.0  # a program that was found, but is busy, may take this long to show its first token
+SETTLE_MOST_S = 20.0  # longest wait while tokens keep coming
 
 
-class Kind(StrEnum):
-    """The role of an end of a name."""
-
-    ACTION_SERVER = "action_server"
-    ACTION_CLIENT = "action_client"
-    SERVICE = "service"
-    PUBLISHER = "publisher"
-    SUBSCRIBER = "subscriber"
-
-
-class Endpoint(NamedTuple):
-    """One end of a name, with the contents of its token.
-
-    Attributes:
-        kind: Its role.
-        name: Full name of the action, service or topic, no slash in front.
-        type: "pkg/Type".
-        md5: Checksum of the type.
-        session: Id of its network session.
-        node: Full name of its node.
-        entity: Its number within the session.
-    """
-
-    kind: Kind
-    name: str
-    type: str
-    md5: str
-    session: str
-    node: str
-    entity: int = 0
-
-    @property
-    def age(self) -> tuple[int, str]:
-        """Sorts ends by their start: the later, the greater; see `with_age`."""
-        return self.entity, self.session
-
-
-def with_age(endpoint: Endpoint, now_ns: int) -> Endpoint:
+def with_age(endpoint: Endpoint, node: Node) -> Endpoint:
     """Return `endpoint` with an entity number that contains the time: milliseconds, then its own.
 
-    For names that only one end may have: of two, the older stays.
+    For names that only one end may have: of two, the older stays. On one computer the time is the
+    monotonic one, as the other can be put back; else it is that since the epoch.
     """
+    clock = node.clock
+    now_ns = round(clock.now() * 1e9) if node.transport.is_local else clock.time_ns()
     entity = now_ns // 1_000_000 * 1_000_000 + endpoint.entity % 1_000_000
     return endpoint._replace(entity=entity)
 
@@ -80,46 +36,6 @@ def with_age(endpoint: Endpoint, now_ns: int) -> Endpoint:
 def is_younger(endpoint: Endpoint, other: Endpoint) -> bool:
     """Return whether `endpoint` started after `other`; both sides come to the same answer."""
     return endpoint.age > other.age
-
-
-@lru_cache(maxsize=1024)  # used for every goal, whose message names its server
-def token_key(endpoint: Endpoint) -> str:
-    """Return the key of the token of `endpoint`."""
-    kind, name, type_name, md5, session, node, entity = endpoint
-    words = (kind.value, session, str(entity), node, type_name, md5)
-    return "/".join((ROOT, *(_pack(word) for word in words), name))
-
-
-def parse_token(key: str) -> Endpoint | None:
-    """Return the end that a token's key describes; None if the key is not one of our tokens."""
-    words = key.split("/", WORDS_BEFORE_NAME)  # the name keeps its slashes
-    # Commands print names: a line break or an escape sequence in one could pass for their output.
-    if len(words) <= WORDS_BEFORE_NAME or words[0] != ROOT or not key.isprintable():
-        return None
-    _, kind, session, entity, node, type_name, md5, name = words
-    try:
-        return Endpoint(
-            Kind(kind),
-            name,
-            _unpack(type_name),
-            _unpack(md5),
-            session,
-            _unpack(node),
-            int(entity),
-        )
-    except ValueError:
-        return None
-
-
-def token_pattern(kind: Kind | None = None, name: str = "**", *, session: str = "*") -> str:
-    """Return the pattern of the tokens of a kind and a name, to watch or list them.
-
-    Args:
-        kind: None for every kind.
-        name: Full name, or a pattern: "**" is every name, "robot_1/**" those of one robot.
-        session: Only those of this session.
-    """
-    return f"{ROOT}/{kind.value if kind else '*'}/{session}/*/*/*/*/{name}"
 
 
 def in_conflict(
@@ -144,24 +60,49 @@ def list_endpoints(
 
     Blocks: until the network has answered, `timeout` [s] at most.
     """
-    keys = transport.list_alive(token_pattern(kind, name), timeout)
+    # Of one name all kinds are asked for: the transport knows them if they are watched, too.
+    keys = transport.list_alive(token_pattern(kind if "*" in name else None, name), timeout)
     found = (parse_token(key) for key in keys)
-    return sorted(endpoint for endpoint in found if endpoint is not None)
+    return sorted(end for end in found if end is not None and kind in {None, end.kind})
 
 
-def settle_network(transport: Transport, clock: Clock, quiet: float = SETTLE_S) -> None:
+def settle_network(transport: Transport, clock: Clock, quiet: float = SETTLE_S) -> bool:
     """Wait in a new session until no new token has been found for `quiet` [s].
 
-    Blocks: `SETTLE_MOST_S` at most.
+    Returns:
+        Whether that was so; False if tokens were still coming at the end of the time.
+
+    Blocks: until then, `SETTLE_MOST_S` at most.
     """
     news = clock.event("the network to be known")
-    watch = transport.watch_alive(token_pattern(None, "**"), lambda _presence: news.set())
-    deadline = clock.now() + SETTLE_MOST_S
+    everything = token_pattern(None, "**")
+    watch = transport.watch_alive(everything, lambda _presence: news.set())
+    started = clock.now()
+    heard = False
     try:
-        while news.wait(min(quiet, max(deadline - clock.now(), 0.0))):
-            news.clear()
+        while clock.now() < started + SETTLE_MOST_S:
+            if news.wait(quiet):
+                heard = True
+                news.clear()
+            elif heard:
+                return True
+            elif not transport.is_linked:  # alone; a busy computer takes its time to find others
+                if clock.now() >= started + (FIRST_S if is_busy() else quiet):
+                    return True
+            elif clock.now() >= started + FIRST_S:
+                # Busy programs show nothing for long, but answer: with nothing, if they have none.
+                left = started + SETTLE_MOST_S - clock.now()
+                if not transport.list_alive(everything, left):
+                    return clock.now() < started + SETTLE_MOST_S
+                heard = True
+        return False
     finally:
         watch.close()
+
+
+def is_busy() -> bool:
+    """Return whether more than two programs wait for each core of this computer."""
+    return os.getloadavg()[0] > 2 * (os.cpu_count() or 1)
 
 
 def find_mismatch(endpoints: Iterable[Endpoint], own: Endpoint) -> TypeMismatchError | None:
@@ -175,12 +116,3 @@ def find_mismatch(endpoints: Iterable[Endpoint], own: Endpoint) -> TypeMismatchE
                 by=f"{other.kind} in node {other.node!r}",
             )
     return None
-
-
-# In a key, slashes separate words, and a word cannot be empty.
-def _pack(word: str) -> str:
-    return word.replace("/", "%") or "-"
-
-
-def _unpack(word: str) -> str:
-    return "" if word == "-" else word.replace("%", "/")

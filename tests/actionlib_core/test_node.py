@@ -17,7 +17,8 @@ from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.names import parse_arguments
 from actionlib_core.node import CLOSE_S, Node, get_node, use_node
 from actionlib_core.transport.faulty import FaultyTransport
-from actionlib_core.wire.presence import Kind, list_endpoints
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
 
 
 def test_names_of_a_node(network, clock):

@@ -674,6 +674,64 @@ def test_list_returns_what_matches_now(network):
     assert a.list_alive("*/**", 5.0) == []  # no wildcard stands for a word with '@'
 
 
+MANY = 30  # watches and lists of single names, which a session may serve together
+NAME = "@x/*/name/{}"
+
+
+def test_many_watches_of_single_names_hear_theirs_only(network):
+    a, b = network.session(), network.session()
+    before = b.declare_alive("@x/a/name/7")
+    network.meet(a, b)
+    inboxes = [network.inbox() for _ in range(MANY)]
+    watches = [a.watch_alive(NAME.format(n), inbox) for n, inbox in enumerate(inboxes)]
+    inboxes[7].wait_for(1)
+    late = network.inbox()
+    a.watch_alive(NAME.format(7), late)
+    assert late.wait_for(1) == [Presence("@x/a/name/7", alive=True)]
+    tokens = [(a if n % 2 else b).declare_alive(f"@x/b/name/{n}") for n in range(MANY)]
+    for n, inbox in enumerate(inboxes):
+        inbox.wait_for(2 if n == 7 else 1)
+    before.close()
+    inboxes[7].wait_for(3)
+    for token in tokens:
+        token.close()
+    assert [(p.key, p.alive) for p in inboxes[7].wait_for(4)] == [
+        ("@x/a/name/7", True), ("@x/b/name/7", True),
+        ("@x/a/name/7", False), ("@x/b/name/7", False),
+    ]  # fmt: skip
+    for n in (0, 20, MANY - 1):
+        heard = [Presence(f"@x/b/name/{n}", alive) for alive in (True, False)]
+        assert inboxes[n].wait_for(2) == heard
+    watches[20].close()
+    late.wait_for(4)
+    again = [a.declare_alive(f"@x/b/name/{n}") for n in (20, 7)]
+    late.wait_for(5)
+    assert len(inboxes[20].items) == 2
+    again[1].close()
+
+
+def test_lists_of_single_names_are_right_beside_many_watches(network):
+    a, b = network.session(), network.session()
+    for n in range(MANY):
+        a.watch_alive(NAME.format(n), network.inbox())
+    theirs = b.declare_alive("@x/a/name/3")
+    network.meet(a, b)
+    for who in "bcd":  # the first answer may come from the network, later ones not
+        assert a.list_alive(NAME.format(3), 5.0) == ["@x/a/name/3"]
+        assert a.list_alive(NAME.format(4), 5.0) == []
+        own = a.declare_alive(f"@x/{who}/name/3")
+        assert a.list_alive(NAME.format(3), 5.0) == ["@x/a/name/3", f"@x/{who}/name/3"]
+        own.close()
+        assert a.list_alive(NAME.format(3), 5.0) == ["@x/a/name/3"]
+    inbox = network.inbox()
+    a.watch_alive(NAME.format(3), inbox)
+    inbox.wait_for(1)
+    theirs.close()
+    assert inbox.wait_for(2) == [Presence("@x/a/name/3", alive) for alive in (True, False)]
+    assert a.list_alive(NAME.format(3), 5.0) == []
+    assert a.list_alive("@x/e/name/3", 5.0) == []
+
+
 # -- closing ---------------------------------------------------------------------------------------
 
 

@@ -36,12 +36,13 @@ from actionlib_core.transport._access import (
     decode_permissions,
     find_permissions,
 )
-from actionlib_core.transport._inlet import Gate, inside
-from actionlib_core.transport._keys import check_key, compile_pattern, key_mark
+from actionlib_core.transport._inlet import CallbackGate, inside
+from actionlib_core.transport._keys import check_key, check_pattern, key_mark, key_matches
 from actionlib_core.transport._refusal import check_interface, explain_refusal
 from actionlib_core.transport._zenoh_config import (
     RETRY_S,
     SCOUT_S,
+    is_local,
     new_session_id,
     zenoh_settings,
 )
@@ -51,13 +52,14 @@ from actionlib_core.transport.zenoh._declared import (
     CachingPublisher,
     Declared,
     LatchedPublisher,
+    Links,
     Publisher,
     Queryable,
     Subscriber,
     Token,
-    Watcher,
 )
 from actionlib_core.transport.zenoh._process import process
+from actionlib_core.transport.zenoh._shared import Watches
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,6 +73,7 @@ D = TypeVar("D", bound=Declared)
 CLOSE_S = 0.5  # longest wait for Zenoh to close a session; its thread is then left behind
 LET_GO_S = 2.0  # longest wait at exit for running callbacks and calls; long on a busy computer only
 LET_GO_PARTS = round(LET_GO_S / PART_S)
+LINK_S = 0.03  # Zenoh reports the end of a link some 0.4 ms after that of the tokens behind it
 IDLE_S = 0.3  # longest wait of `close` for running callbacks
 ACCESS_S = 1.0  # longest wait for the other side's access rules
 ASK_S = 5.0  # longest wait for a latched publisher's answer
@@ -94,17 +97,24 @@ class ZenohTransport:
         self.config = load_config(config)
         clock = current_clock()
         self.clock = clock if isinstance(clock, RealClock) else RealClock()
-        self.gate = Gate()
+        self.gate = CallbackGate()
         self.numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._closed = False
         self._declared: dict[Declared, None] = {}
         self._permissions: Permissions | None = None
-        self.session = _open(self.config, new_session_id(self.clock.time_ns()))
+        self.watches = Watches(self)
+        time_ns = round(self.clock.now() * 1e9) if self.is_local else self.clock.time_ns()
+        self.session = _open(self.config, new_session_id(time_ns))
         self._session_id = str(self.session.zid())
         self.loopback = SerialExecutor(self.clock, f"transport-{self._session_id[:8]}")
         _loopbacks.add(self.loopback)
         _open_transports[self] = None
+        self._links: Links | None = None
+        if self.config.mode == "client":
+            with inside:
+                self._links = Links(self)
+            self._declared[self._links] = None
         if self.config.access:
             self.queryable(ACCESS_KEY, self._send_permissions)
         if self.config.connect:
@@ -120,6 +130,33 @@ class ZenohTransport:
         """Zenoh's intervals: peers search every 8 s, clients try their router every second."""
         looks = self.config.mode == "peer" and self.config.discovery != "off"
         return SCOUT_S if looks else 2 * RETRY_S
+
+    @property
+    def lost_link(self) -> str:
+        """The routers of a client, while it is linked with none of them."""
+        if self._links is None or self._links.open:
+            return ""
+        return f"router {', '.join(self.config.connect)}"
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether there is any link, to a peer or a router."""
+        return bool(self.session.info.links())
+
+    @property
+    def link_delay(self) -> float:
+        """Of a client, the time until Zenoh reports the end of the link; of a peer 0."""
+        return 0.0 if self._links is None else LINK_S
+
+    @property
+    def is_local(self) -> bool:
+        """Whether this session listens and looks for others on the loopback interface only."""
+        return is_local(self.config)
+
+    @property
+    def is_restricted(self) -> bool:
+        """Whether access rules limit which names this session may watch."""
+        return self._permissions is not None
 
     def publisher(self, key: str, encoding: str = "", quality: Quality = DEFAULT) -> Publisher:
         kind = Publisher
@@ -159,8 +196,7 @@ class ZenohTransport:
         self._check_open(check_key(key))
         self._check_access(key)
         asking = Asking(self, on_reply, on_done)
-        with self._lock:
-            self._declared[asking] = None
+        self.keep(asking)
         callback = direct(asking.take_reply, asking.take_done)
         try:
             self._get(
@@ -218,13 +254,24 @@ class ZenohTransport:
     def declare_alive(self, key: str) -> Token:
         return self._declare(lambda: Token(self, check_key(key)), key)
 
-    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Watcher:
-        compile_pattern(pattern)
-        return self._declare(lambda: Watcher(self, pattern, callback), pattern)
+    def watch_alive(self, pattern: str, callback: Callable[[Presence], None]) -> Declared:
+        check_pattern(pattern)
+        return self._declare(lambda: self.watches.new(pattern, callback), pattern)
 
     def list_alive(self, pattern: str, timeout: float) -> list[str]:
-        compile_pattern(pattern)
+        check_pattern(pattern)
         self._check_open(pattern)
+        known = self.watches.known(pattern)
+        if known is not None:
+            return known
+        asked = self.watches.asks_for(pattern)
+        found, is_complete = self._ask_alive(asked, timeout)
+        if asked != pattern and is_complete:
+            self.watches.answered(asked, found)
+        return sorted(key for key in found if asked == pattern or key_matches(pattern, key))
+
+    def _ask_alive(self, pattern: str, timeout: float) -> tuple[set[str], bool]:
+        """Return the tokens that match a pattern, and whether the network has answered in time."""
         found: set[str] = set()
         done, freed = self.clock.event(), self.clock.event()
 
@@ -254,9 +301,11 @@ class ZenohTransport:
             freed.wait(max(0.0, deadline - self.clock.now()))
         except zenoh.ZError as error:
             raise TransportError(f"{pattern}: cannot ask: {error}") from error
-        return sorted(found)
+        return found, done.is_set() and freed.is_set()
 
     def close(self) -> None:
+        if process.forked:  # it is the parent's
+            return
         with self._lock:
             if self._closed:
                 return
@@ -269,6 +318,11 @@ class ZenohTransport:
             _kept.extend(self._declared)
         self._declared.clear()
         _open_transports.pop(self, None)
+
+    def keep(self, entry: Declared) -> None:
+        """Keep an entry until it is closed."""
+        with self._lock:
+            self._declared[entry] = None
 
     def forget(self, entry: Declared) -> bool:
         """Remove an entry that is being closed; False when it was removed before."""
@@ -322,8 +376,7 @@ class ZenohTransport:
             if ending.begun:  # its traceback refers to objects of Zenoh; see `_kept`
                 _kept.append(error)
             raise TransportError(f"{key}: cannot be declared: {error}") from error
-        with self._lock:
-            self._declared[entry] = None
+        self.keep(entry)
         return entry
 
     def _check_open(self, key: str) -> None:

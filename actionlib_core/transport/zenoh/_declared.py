@@ -530,12 +530,41 @@ class Watcher(Declared):
             self._callback(Presence(key, alive))
 
 
+class Links(Declared):
+    """The links of the session.
+
+    Attributes:
+        open: The ids of the sessions at their other ends.
+    """
+
+    def __init__(self, transport: ZenohTransport) -> None:
+        super().__init__(transport)
+        self.open: set[str] = set()
+        listener = transport.session.info.declare_transport_events_listener(
+            direct(self._on_event), history=True
+        )
+        self._keep(listener)
+
+    def _on_event(self, event: zenoh.TransportEvent) -> None:
+        # Without the inlet: this calls no callback and takes no lock, so it may run inline.
+        change = self.open.add if event.kind == zenoh.SampleKind.PUT else self.open.discard
+        change(str(event.transport.zid))
+
+
 class Token(Declared):
     """A liveliness token."""
 
     def __init__(self, transport: ZenohTransport, key: str) -> None:
         super().__init__(transport)
+        self._key = key
         self._keep(transport.session.liveliness().declare_token(key))
+        transport.watches.note_own(key, 1)
+
+    def close(self) -> None:
+        was_open = not self._inlet.closed
+        super().close()
+        if was_open:
+            self._transport.watches.note_own(self._key, -1)
 
 
 def _convert_encoding(raw: zenoh.Encoding) -> str:

@@ -7,7 +7,7 @@ import os
 from actionlib_core.exceptions import TransportError
 
 
-class Process:
+class ProcessState:
     """The state of this process.
 
     Attributes:
@@ -40,4 +40,4 @@ class Process:
             )
 
 
-process = Process()
+process = ProcessState()

@@ -33,7 +33,7 @@ from actionlib_core.wire.ros2.action_messages import (
 )
 from actionlib_core.wire.ros2.attachment import unpack_attachment
 from actionlib_core.wire.ros2.diagnosis import explain_absence, explain_mismatch
-from actionlib_core.wire.ros2.goal_exchange import ENDS, TEXT_UNKNOWN, GoalExchange, Step
+from actionlib_core.wire.ros2.goal_exchange import ENDS, TEXT_UNKNOWN, Duty, GoalExchange
 from actionlib_core.wire.ros2.goal_states import CancelCode, reason_of
 from actionlib_core.wire.ros2.graph import ActionServers
 from actionlib_core.wire.ros2.link_probe import LinkProbe
@@ -58,23 +58,20 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable, Reply, Sample
     from actionlib_core.wire.action_types import ActionTypes
     from actionlib_core.wire.ros2.action_messages import CancelResponse
-    from actionlib_core.wire.ros2.graph import End, RosServer
+    from actionlib_core.wire.ros2.graph import RosEnd, RosServer
     from actionlib_core.wire.ros2.names import Token
 
 T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-# The default of rmw_zenoh. It is not infinite, because Zenoh keeps memory for each query until its
-# time is over, even when it was answered. A request that ends without an answer is repeated.
-ANSWER_S = 600.0
 MAX_IN_FLIGHT = 8  # unanswered goals; a ROS 2 server queues 10 requests and drops the oldest
 PAUSE_S = 0.1  # before an unanswered request is repeated; doubled each time
-LONGEST_PAUSE_S = 2.0
+MAX_PAUSE_S = 2.0
 LATE_ANSWERS_S = 0.03  # answers of a leaving server are awaited for this time after its tokens went
 
 
-class _Goal:
+class _OpenGoal:
     """A goal and its open requests."""
 
     __slots__ = ("body", "exchange", "id", "on_done", "open", "pause", "server", "uuid")
@@ -87,7 +84,7 @@ class _Goal:
         self.exchange = GoalExchange(attached=attached)
         self.pause = PAUSE_S
         self.on_done: list[Callable[[], None]] = []
-        self.open: dict[End, Closable] = {}  # requests that are not answered yet, by service
+        self.open: dict[RosEnd, Closable] = {}  # requests that are not answered yet, by service
 
 
 class RosClientPort:
@@ -136,11 +133,11 @@ class RosClientPort:
         self._last_status: Sample | None = None
         self._last_number: tuple[bytes, int] | None = None
         # The same goals by id and by UUID: the first is the client's key, the second the wire's.
-        self._goals: dict[str, _Goal] = {}
-        self._by_uuid: dict[bytes, _Goal] = {}
+        self._goals: dict[str, _OpenGoal] = {}
+        self._by_uuid: dict[bytes, _OpenGoal] = {}
         # Goals that wait to be sent, and those whose request is not answered.
-        self._queue: deque[_Goal] = deque()
-        self._sending: set[_Goal] = set()
+        self._queue: deque[_OpenGoal] = deque()
+        self._sending: set[_OpenGoal] = set()
         # Servers with the error about their types; servers whose tokens are there but that did not
         # answer a probe; servers whose tokens are gone and whose last answers may still come. A
         # server is in one of the three.
@@ -195,6 +192,14 @@ class RosClientPort:
     def is_heard(self) -> bool:
         return any(error is None for error in self._present.values())
 
+    @property
+    def lost_link(self) -> str:
+        return self._network.transport.lost_link
+
+    @property
+    def link_delay(self) -> float:
+        return self._network.transport.link_delay
+
     def explain_absence(self) -> str:
         settings = self._network.settings
         others = self._network.ros.list_others()
@@ -221,6 +226,7 @@ class RosClientPort:
         body: bytes,
         server: RosServer | None,
         *,
+        age: float = 0.0,  # noqa: ARG002  for a ROS 2 server, order is that of arrival
         wait: bool = True,  # noqa: ARG002  a request is not dropped
     ) -> None:
         """Send a goal, unless it is already on its way; the client calls this repeatedly.
@@ -233,7 +239,7 @@ class RosClientPort:
                 raise TransportError(f"action '{self._name}': the client is stopped.")
             goal = self._goals.get(goal_id)
             if goal is None:
-                goal = self._keep(_Goal(goal_id, body, server.session if server else ""))
+                goal = self._keep(_OpenGoal(goal_id, body, server.session if server else ""))
             step = goal.exchange.want()
         self._do(goal, step)
 
@@ -244,7 +250,7 @@ class RosClientPort:
         with self._lock:
             goal = self._goals.get(goal_id)
             if goal is None:
-                goal = self._keep(_Goal(goal_id, b"", "", attached=True))
+                goal = self._keep(_OpenGoal(goal_id, b"", "", attached=True))
             step = goal.exchange.cancel(again=not wait)
         self._do(goal, step)
 
@@ -268,8 +274,8 @@ class RosClientPort:
             goal = self._goals.get(goal_id)
             known = goal is not None
             if goal is None:  # an earlier process has sent it
-                goal = self._keep(_Goal(goal_id, b"", "", attached=True))
-            step = goal.exchange.ask_again() if self._present else Step.NOTHING
+                goal = self._keep(_OpenGoal(goal_id, b"", "", attached=True))
+            step = goal.exchange.ask_again() if self._present else Duty.NOTHING
             # Added before `_do` sends the request, whose answer may come at once.
             waits = goal.exchange.asking
             if waits:
@@ -282,13 +288,13 @@ class RosClientPort:
             with contextlib.suppress(ValueError):  # reported when it arrived
                 self._read_states(self._last_status)
 
-    def _keep(self, goal: _Goal) -> _Goal:
+    def _keep(self, goal: _OpenGoal) -> _OpenGoal:
         """Keep a new goal. Needs the lock."""
         self._goals[goal.id] = self._by_uuid[goal.uuid] = goal
         goal.server = goal.server or next((server.session for server in self._present), "")
         return goal
 
-    def _drop(self, goal: _Goal) -> None:
+    def _drop(self, goal: _OpenGoal) -> None:
         """Forget a goal that has ended, or that the client no longer follows."""
         with self._lock:
             self._goals.pop(goal.id, None)
@@ -300,7 +306,7 @@ class RosClientPort:
             request.close()
         self._send_next()  # the goal may have been one of the `MAX_IN_FLIGHT`
 
-    def _withdraw(self, goal: _Goal) -> list[Closable]:
+    def _withdraw(self, goal: _OpenGoal) -> list[Closable]:
         """Return a goal's open requests, for the caller to close without the lock. Needs the lock.
 
         They count as unanswered from now on.
@@ -313,28 +319,28 @@ class RosClientPort:
 
     # -- steps of GoalExchange -----------------------------------------------------------------
 
-    def _do(self, goal: _Goal, step: int) -> None:
+    def _do(self, goal: _OpenGoal, step: int) -> None:
         """Carry out the steps that `GoalExchange` has returned."""
-        if step & Step.ASK:  # first: its round trip goes on while the client is notified
+        if step & Duty.ASK:  # first: its round trip goes on while the client is notified
             self._ask_result(goal)
-        if step & Step.NOTIFY:
+        if step & Duty.NOTIFY:
             self._notify(goal)
-        if not step & ~(Step.ASK | Step.NOTIFY):
+        if not step & ~(Duty.ASK | Duty.NOTIFY):
             return
-        if step & Step.QUEUE:
+        if step & Duty.QUEUE:
             self._enqueue(goal)
-        if step & Step.ASK_LATER:
+        if step & Duty.ASK_LATER:
             self._clock.call_later(goal.pause, partial(self._ask_again, goal))
-            goal.pause = min(2 * goal.pause, LONGEST_PAUSE_S)
-        if step & Step.CANCEL:
+            goal.pause = min(2 * goal.pause, MAX_PAUSE_S)
+        if step & Duty.CANCEL:
             self._ask_cancel(goal)
-        if step & Step.KEEPS_RUNNING:
+        if step & Duty.KEEPS_RUNNING:
             log.warning("action '%s': the server refused to cancel goal %s", self._name, goal.id)
         for end, status, text in ENDS:
             if step & end:
                 self._end(goal, status, text)
 
-    def _notify(self, goal: _Goal) -> None:
+    def _notify(self, goal: _OpenGoal) -> None:
         """Report the goal's status to the client."""
         # The client takes the sender of a status for a server, so none is reported before a
         # server's tokens are there; `_on_token` does it then.
@@ -348,7 +354,7 @@ class RosClientPort:
             report([StatusEntry(goal.id, 0, Status.PENDING, "")])
         report([StatusEntry(goal.id, 0, status, "")])
 
-    def _end(self, goal: _Goal, status: Status, text: str) -> None:
+    def _end(self, goal: _OpenGoal, status: Status, text: str) -> None:
         self._drop(goal)
         entry = StatusEntry(goal.id, 0, status, text)
         if status is not Status.LOST:
@@ -358,7 +364,7 @@ class RosClientPort:
         else:
             self._listener.on_statuses([entry], goal.server, whole=False)
 
-    def _enqueue(self, goal: _Goal) -> None:
+    def _enqueue(self, goal: _OpenGoal) -> None:
         """Put a goal into the queue, if the client still follows it."""
         if not self._listener.follows(goal.id):
             self._drop(goal)
@@ -386,19 +392,19 @@ class RosClientPort:
                 partial(self._on_sent_done, goal),
             )
 
-    def _on_sent_answer(self, goal: _Goal, stamp_ns: int | None, reply: Reply) -> None:
+    def _on_sent_answer(self, goal: _OpenGoal, stamp_ns: int | None, reply: Reply) -> None:
         with self._lock:
             self._note_sender(goal, reply.source)
             step = goal.exchange.on_answer(accepted=stamp_ns is not None)
         self._do(goal, step)
 
-    def _on_sent_done(self, goal: _Goal, answered: bool) -> None:
+    def _on_sent_done(self, goal: _OpenGoal, answered: bool) -> None:
         with self._lock:
-            step = Step.NOTHING if answered else goal.exchange.on_unanswered()
+            step = Duty.NOTHING if answered else goal.exchange.on_unanswered()
         self._do(goal, step)
         self._send_next()
 
-    def _ask_result(self, goal: _Goal) -> None:
+    def _ask_result(self, goal: _OpenGoal) -> None:
         self._probe.watch()
         self._ask(
             goal,
@@ -409,13 +415,13 @@ class RosClientPort:
             partial(self._on_result_done, goal),
         )
 
-    def _on_result(self, goal: _Goal, code: int, reply: Reply) -> None:
+    def _on_result(self, goal: _OpenGoal, code: int, reply: Reply) -> None:
         self._feedback.flush()  # the user gets feedback before the result
         with self._lock:
             step = goal.exchange.on_result(code, self._clock.now())
             status = goal.exchange.status
             goal.open.pop(self._result, None)  # it ends by itself, so `_drop` need not close it
-        if not step & Step.END:
+        if not step & Duty.END:
             self._do(goal, step)
             return
         self._drop(goal)
@@ -430,26 +436,26 @@ class RosClientPort:
         except (ValueError, ActionlibError):  # reported when the result is read
             return ""
 
-    def _on_result_done(self, goal: _Goal, answered: bool) -> None:
+    def _on_result_done(self, goal: _OpenGoal, answered: bool) -> None:
         with self._lock:
             callbacks, goal.on_done = goal.on_done, []
-            step = Step.NOTHING if answered else goal.exchange.on_no_result()
+            step = Duty.NOTHING if answered else goal.exchange.on_no_result()
         for on_done in callbacks:
             on_done()
         self._do(goal, step)
 
-    def _ask_again(self, goal: _Goal) -> None:
+    def _ask_again(self, goal: _OpenGoal) -> None:
         """Request a result again, if there is a server to answer."""
         with self._lock:
             known = not self._closed and self._goals.get(goal.id) is goal
-            step = goal.exchange.ask_again() if known and self._present else Step.NOTHING
+            step = goal.exchange.ask_again() if known and self._present else Duty.NOTHING
         # A goal that the client has given up is dropped instead of being requested for ever.
         if step and not self._listener.follows(goal.id):
             self._drop(goal)
         else:
             self._do(goal, step)
 
-    def _ask_cancel(self, goal: _Goal) -> None:
+    def _ask_cancel(self, goal: _OpenGoal) -> None:
         self._ask(
             goal,
             self._cancel,
@@ -459,13 +465,13 @@ class RosClientPort:
             partial(self._on_cancel_done, goal),
         )
 
-    def _on_cancel_answer(self, goal: _Goal, answer: CancelResponse, _: Reply) -> None:
+    def _on_cancel_answer(self, goal: _OpenGoal, answer: CancelResponse, _: Reply) -> None:
         listed = any(uuid == goal.uuid for uuid, _ in answer.goals)
         with self._lock:
             step = goal.exchange.on_cancel_answer(answer.code, listed=listed)
         self._do(goal, step)
 
-    def _on_cancel_done(self, goal: _Goal, answered: bool) -> None:
+    def _on_cancel_done(self, goal: _OpenGoal, answered: bool) -> None:
         with self._lock:
             if not answered:
                 goal.exchange.on_no_cancel_answer()
@@ -476,8 +482,8 @@ class RosClientPort:
 
     def _ask(
         self,
-        goal: _Goal | None,
-        end: End,
+        goal: _OpenGoal | None,
+        end: RosEnd,
         request: bytes,
         read: Callable[[bytes], T],
         on_answer: Callable[[T, Reply], object],
@@ -526,7 +532,7 @@ class RosClientPort:
                 request,
                 attachment=end.attachment(),
                 best=True,  # one server: a goal must not run in two
-                timeout=ANSWER_S,
+                timeout=self._network.patience(),
                 on_reply=take,
                 on_done=done,
             )
@@ -599,7 +605,7 @@ class RosClientPort:
         entry = StatusEntry(goal.id, 0, status, "")
         self._listener.on_feedback(entry, sample.payload, goal.server)
 
-    def _note_sender(self, goal: _Goal, session: str) -> None:
+    def _note_sender(self, goal: _OpenGoal, session: str) -> None:
         """Note which of several servers has a goal, if known. Needs the lock."""
         if session != goal.server and any(server.session == session for server in self._present):
             goal.server = session

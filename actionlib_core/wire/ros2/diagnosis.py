@@ -10,8 +10,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 from actionlib_core.exceptions import TypeMismatchError
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces import ros2
-from actionlib_core.suggest import did_you_mean
 from actionlib_core.wire.ros2.names import (
     HASH_NOT_SUPPORTED,
     Kind,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 CLOCK_OFF_S = 0.1  # Nav2's usual tolerance for transforms
 SLOW_S = 0.5
-MOST_NAMED = 5  # names shown in one finding; the rest is counted
+MAX_NAMED = 5  # names shown in one finding; the rest is counted
 START = "ros2 run rmw_zenoh_cpp rmw_zenohd"
 
 
@@ -308,8 +308,8 @@ def _named(names: Iterable[str]) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:MOST_NAMED])
-    return shown if len(names) <= MOST_NAMED else f"{shown} and {len(names) - MOST_NAMED} more"
+    shown = ", ".join(names[:MAX_NAMED])
+    return shown if len(names) <= MAX_NAMED else f"{shown} and {len(names) - MAX_NAMED} more"
 
 
 __all__ = [

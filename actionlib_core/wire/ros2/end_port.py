@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import DeserializationError, FieldError
 from actionlib_core.transport import Quality
+from actionlib_core.transport.tokens import Endpoint
+from actionlib_core.transport.tokens import Kind as EndKind
 from actionlib_core.wire.end_port import Sender
-from actionlib_core.wire.presence import Endpoint
-from actionlib_core.wire.presence import Kind as EndKind
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
 from actionlib_core.wire.ros2.mapping import message_on_ros2, name_on_ros2, service_on_ros2
 from actionlib_core.wire.ros2.names import LATCHED, Kind, parse_token, token_pattern
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from actionlib_core.node import Node
-    from actionlib_core.transport import Closable, Presence, Query, Reply, Sample
+    from actionlib_core.transport import Closable, Presence, Query, Reply, Sample, Transport
     from actionlib_core.wire.end_port import OnEnd
     from actionlib_core.wire.ros2.mapping import MessageOnRos2
     from actionlib_core.wire.ros2.names import Token
@@ -65,6 +65,10 @@ class RosEndPort:
 
     def _convert(self, token: Token) -> Endpoint:
         return _endpoint(token, self._name)
+
+    @property
+    def transport(self) -> Transport:
+        return self._network.transport
 
     def show(self) -> Closable:
         self._end.show()

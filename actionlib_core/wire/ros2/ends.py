@@ -6,37 +6,72 @@ their endpoint of its feedback topic. Names that ROS 2's tools hide are left out
 
 from __future__ import annotations
 
+import logging
+import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.exceptions import ConfigError, InterfaceError
+from actionlib_core.exceptions import ConfigError, InterfaceError, NodeError, TransportError
 from actionlib_core.interfaces import ros2
-from actionlib_core.wire.presence import Endpoint, Kind
+from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire.ros2 import diagnosis
 from actionlib_core.wire.ros2.names import Kind as RosKind
 from actionlib_core.wire.ros2.names import action_of
 from actionlib_core.wire.ros2.network import choose_network, name_here, network_of, ros_network
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
+    from actionlib_core.config import Ros2
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable
     from actionlib_core.wire.ros2.names import Token
     from actionlib_core.wire.ros2.network import RosNetwork
 
+log = logging.getLogger(__name__)
+
+AGAIN_S = 5.0  # interval of attempts to join a network
 _FEEDBACK = "_FeedbackMessage"
 
 
-def networks(node: Node) -> Iterator[RosNetwork]:
-    """Yield the networks of ROS 2 that the configuration names, joined.
+def networks(
+    node: Node, name: str | None = None
+) -> tuple[list[RosNetwork], list[tuple[Ros2, TransportError]]]:
+    """Return the ROS 2 networks in the configuration that can be joined, and errors of the others.
 
-    Raises:
-        TransportError: one cannot be joined.
+    Args:
+        node: The node.
+        name: Only the network that has this full name, if one has it; None: all.
 
-    Blocks: the first time, until they are.
+    Blocks: the first time, until they are joined, all at the same time: `Config.connect_timeout` at
+        most.
     """
-    for settings in node.config.ros2:
-        yield network_of(node, settings)
+    wanted = list(node.config.ros2)
+    if name is not None:
+        try:
+            wanted = [choose_network(wanted, name)] if wanted else []
+        except ConfigError:  # the name is on none of them
+            return [], []
+    found: dict[Ros2, RosNetwork] = {}
+    errors: dict[Ros2, TransportError] = {}
+
+    def join(settings: Ros2) -> None:
+        try:
+            found[settings] = network_of(node, settings)
+        except TransportError as error:
+            errors[settings] = error
+
+    tasks = [
+        node.clock.spawn(partial(join, settings), name="join a network") for settings in wanted[1:]
+    ]
+    if wanted:
+        join(wanted[0])
+    for task in tasks:
+        task.join()
+    return (
+        [found[settings] for settings in wanted if settings in found],
+        [(settings, errors[settings]) for settings in wanted if settings in errors],
+    )
 
 
 def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
@@ -76,29 +111,83 @@ def end_of(network: RosNetwork, token: Token) -> Endpoint | None:
     )
 
 
-def watch_ends(node: Node, on_end: Callable[[Endpoint, str, bool], object]) -> list[Closable]:
+def watch_ends(
+    node: Node, on_end: Callable[[Endpoint, str, bool], object], name: str | None = None
+) -> list[Closable]:
     """Call a function for each endpoint on a node's ROS 2 networks, and for every change.
+
+    A network that cannot be joined is logged, and joined when that is possible.
 
     Args:
         node: The node.
         on_end: Gets an endpoint, the key of its token, and whether it is there; called on the
             networks' threads, must not wait.
+        name: Only on the network that has this full name; None: on all.
 
-    Raises:
-        TransportError: a network cannot be joined.
+    Blocks: as `networks`.
+    """
+    joined, errors = networks(node, name)
+    watches: list[Closable] = [_watch(network, on_end) for network in joined]
+    for settings, error in errors:
+        log.warning("%s Its names are missing until it can be joined.", error)
+        watches.append(_LateWatch(node, settings, on_end))
+    return watches
 
-    Blocks: the first time, until they are joined.
+
+def _watch(network: RosNetwork, on_end: Callable[[Endpoint, str, bool], object]) -> Closable:
+    def on_token(token: Token, key: str, alive: bool) -> None:
+        end = end_of(network, token)
+        if end is not None:
+            on_end(end, key, alive)
+
+    return network.ros.watch(on_token)
+
+
+class _LateWatch:
+    """The watch of a network that could not be joined; it tries again every `AGAIN_S`.
+
+    Threads: any.
     """
 
-    def watch(network: RosNetwork) -> Closable:
-        def on_token(token: Token, key: str, alive: bool) -> None:
-            end = end_of(network, token)
-            if end is not None:
-                on_end(end, key, alive)
+    def __init__(
+        self, node: Node, settings: Ros2, on_end: Callable[[Endpoint, str, bool], object]
+    ) -> None:
+        self._node = node
+        self._settings = settings
+        self._on_end = on_end
+        self._lock = threading.Lock()
+        self._watch: Closable | None = None
+        self._closed = False
+        self._try_later()
 
-        return network.ros.watch(on_token)
+    def close(self) -> None:
+        with self._lock:
+            self._closed = True
+            watch = self._watch
+        if watch is not None:
+            watch.close()
 
-    return [watch(network) for network in networks(node)]
+    def _try_later(self) -> None:
+        clock = self._node.clock
+        clock.call_later(AGAIN_S, partial(clock.spawn, self._try, name="join a network"))
+
+    def _try(self) -> None:
+        if self._closed or self._node.closed:
+            return
+        try:
+            network = network_of(self._node, self._settings)
+            watch = _watch(network, self._on_end)
+        except TransportError:  # logged before; it may come up at any time
+            self._try_later()
+            return
+        except NodeError:  # the node was closed in the meantime
+            return
+        log.info("ros2: the network of %s is joined.", self._settings.router)
+        with self._lock:
+            self._watch = watch
+            closed: bool = self._closed
+        if closed:  # meanwhile
+            watch.close()
 
 
 def explain_absence(node: Node, full: str) -> str:

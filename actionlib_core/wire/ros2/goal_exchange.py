@@ -28,7 +28,7 @@ TEXT_UNSETTLED = (
 )
 
 
-class Phase(enum.Enum):
+class ExchangePhase(enum.Enum):
     """What is known about the whereabouts of a goal."""
 
     HERE = "no server can have it"
@@ -38,7 +38,7 @@ class Phase(enum.Enum):
     TAKEN = "the server has it, or had it"
 
 
-class Step:
+class Duty:
     """What the owner has to do next, as bits.
 
     They are plain integers: an `enum.Flag` takes ten times as long for each goal.
@@ -70,10 +70,10 @@ class Step:
 
 
 ENDS = (
-    (Step.REFUSED, Status.REJECTED, TEXT_REFUSED),
-    (Step.RECALLED, Status.RECALLED, TEXT_RECALLED),
-    (Step.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
-    (Step.UNSETTLED, Status.LOST, TEXT_UNSETTLED),
+    (Duty.REFUSED, Status.REJECTED, TEXT_REFUSED),
+    (Duty.RECALLED, Status.RECALLED, TEXT_RECALLED),
+    (Duty.UNKNOWN, Status.LOST, TEXT_UNKNOWN),
+    (Duty.UNSETTLED, Status.LOST, TEXT_UNSETTLED),
 )
 """The steps that end a goal without a result, with its final status and text."""
 
@@ -85,7 +85,7 @@ class GoalExchange:
         attached: An earlier process has sent it: its result is requested, and it is never sent.
 
     Attributes:
-        phase: See `Phase`.
+        phase: See `ExchangePhase`.
         code: The last state that the server has reported, see `GoalCode`. It never decreases.
         asking: A request for its result is open.
         sent_at: When it was last sent [s, clock].
@@ -109,7 +109,7 @@ class GoalExchange:
     )
 
     def __init__(self, *, attached: bool = False) -> None:
-        self.phase = Phase.TAKEN if attached else Phase.HERE
+        self.phase = ExchangePhase.TAKEN if attached else ExchangePhase.HERE
         self.code = GoalCode.UNKNOWN
         self.asking = False
         self.sent_at = 0.0
@@ -131,17 +131,17 @@ class GoalExchange:
 
     def want(self) -> int:
         """Start or continue to deliver the goal; called repeatedly until its status is known."""
-        if self.phase is Phase.HERE:
-            self.phase = Phase.QUEUED
-            return Step.QUEUE
-        if self.phase is Phase.TAKEN:
+        if self.phase is ExchangePhase.HERE:
+            self.phase = ExchangePhase.QUEUED
+            return Duty.QUEUE
+        if self.phase is ExchangePhase.TAKEN:
             # The state may have arrived before the server's tokens, when it could not be reported.
-            return Step.NOTIFY if self.code else Step.NOTHING
+            return Duty.NOTIFY if self.code else Duty.NOTHING
         return self.ask_again()
 
     def on_sent(self, now: float) -> None:
         """Note that the request is being sent."""
-        self.phase = Phase.SENT
+        self.phase = ExchangePhase.SENT
         self.sent_at = now
         self._sendings += 1
 
@@ -151,20 +151,20 @@ class GoalExchange:
             return self._take(GoalCode.ACCEPTED)
         # The first request is not a repetition, and a goal that was executing was not refused.
         if self._sendings == 1 and self.code <= GoalCode.ACCEPTED:
-            return Step.REFUSED
-        if self.phase is Phase.TAKEN:  # the server has it from the first request
-            return Step.NOTHING
+            return Duty.REFUSED
+        if self.phase is ExchangePhase.TAKEN:  # the server has it from the first request
+            return Duty.NOTHING
         # Either a real refusal, or the first request has arrived after all and this was refused as
         # a repetition. The request for the result tells which.
         self._refused = True
-        self.phase = Phase.UNSURE
+        self.phase = ExchangePhase.UNSURE
         return self.ask_again()
 
     def on_unanswered(self) -> int:
         """Handle the end of the request without an answer."""
-        if self.phase is not Phase.SENT:
-            return Step.NOTHING
-        self.phase = Phase.UNSURE
+        if self.phase is not ExchangePhase.SENT:
+            return Duty.NOTHING
+        self.phase = ExchangePhase.UNSURE
         return self.ask_again()
 
     # -- its state at the server -----------------------------------------------------------------
@@ -180,7 +180,7 @@ class GoalExchange:
             unbroken: The list before this one was received as well.
         """
         if code not in _STATES:
-            return Step.NOTHING
+            return Duty.NOTHING
         if code >= GoalCode.CANCELING > self.code:
             self._never_active = self._waits and unbroken
         self._waits = code == GoalCode.ACCEPTED >= self.code
@@ -191,71 +191,75 @@ class GoalExchange:
         return self._take(max(self.code, GoalCode.EXECUTING))
 
     def _take(self, code: int) -> int:
-        step = Step.NOTHING
+        step = Duty.NOTHING
         # The first sign that the server has the goal: request its result at once, since the server
         # keeps it only for a short time after the end, and send a cancel that had to wait.
-        if self.phase is not Phase.TAKEN:
-            self.phase = Phase.TAKEN
+        if self.phase is not ExchangePhase.TAKEN:
+            self.phase = ExchangePhase.TAKEN
             step |= self.ask_again()
             if self._cancel_wanted and not self._cancelling:
                 self._cancelling = True
-                step |= Step.CANCEL
+                step |= Duty.CANCEL
         if code > self.code:  # else the message was overtaken by a newer one
             self.code = GoalCode(code)
-            step |= Step.NOTIFY
+            step |= Duty.NOTIFY
         return step
 
     # -- the result ------------------------------------------------------------------------------
 
     def ask_again(self) -> int:
         """Request the result, unless a request is open or the server cannot have the goal."""
-        if self.asking or self.phase not in {Phase.UNSURE, Phase.TAKEN}:
-            return Step.NOTHING
+        if self.asking or self.phase not in {ExchangePhase.UNSURE, ExchangePhase.TAKEN}:
+            return Duty.NOTHING
         self.asking = True
-        return Step.ASK
+        return Duty.ASK
 
     def on_result(self, code: int, now: float) -> int:
         """Handle the answer to the request for the result."""
         self.asking = False
         if code in ENDED:
             self.code = GoalCode(code)
-            return Step.END
+            return Duty.END
         if code != GoalCode.UNKNOWN:
-            return self.on_state(code) | Step.ASK_LATER
+            return self.on_state(code) | Duty.ASK_LATER
         return self._on_unknown(now)
 
     def _on_unknown(self, now: float) -> int:
         """Handle the answer that the server does not know the goal."""
-        if self.phase is Phase.TAKEN:  # it knew the goal before
-            return Step.UNKNOWN
+        if self.phase is ExchangePhase.TAKEN:  # it knew the goal before
+            return Duty.UNKNOWN
         if now > self.sent_at + SETTLED_S:
-            return Step.UNSETTLED
+            return Duty.UNSETTLED
         if self._refused:
-            return Step.REFUSED
-        self.phase = Phase.HERE
+            return Duty.REFUSED
+        self.phase = ExchangePhase.HERE
         if self._cancel_wanted:
-            return Step.RECALLED
+            return Duty.RECALLED
         return self.want()
 
     def on_no_result(self) -> int:
         """Handle the end of that request without an answer."""
         self.asking = False
-        return Step.ASK_LATER
+        return Duty.ASK_LATER
 
     # -- its cancel ------------------------------------------------------------------------------
 
     def cancel(self, *, again: bool = False) -> int:
         """Cancel the goal; `again`: the client repeats an earlier cancel by itself."""
-        if self.phase in {Phase.HERE, Phase.QUEUED} and not self._attached:
-            return Step.RECALLED
+        if self.phase in {ExchangePhase.HERE, ExchangePhase.QUEUED} and not self._attached:
+            return Duty.RECALLED
         self._cancel_wanted = True
         # A goal that may be on its way is cancelled when the server has it, see `_take`.
-        if self.phase is not Phase.TAKEN or self._cancelling or self.code >= GoalCode.CANCELING:
-            return Step.NOTHING
+        if (
+            self.phase is not ExchangePhase.TAKEN
+            or self._cancelling
+            or self.code >= GoalCode.CANCELING
+        ):
+            return Duty.NOTHING
         if again and self._cancel_refused:
-            return Step.NOTHING
+            return Duty.NOTHING
         self._cancelling = True
-        return Step.CANCEL
+        return Duty.CANCEL
 
     def on_cancel_answer(self, code: int, *, listed: bool) -> int:
         """Handle the answer to a cancel request.
@@ -268,9 +272,9 @@ class GoalExchange:
         if listed:
             return self._take(GoalCode.CANCELING)
         if code in {CancelCode.UNKNOWN_GOAL, CancelCode.GOAL_TERMINATED}:
-            return Step.NOTHING  # the answer to the request for the result will tell how it ended
+            return Duty.NOTHING  # the answer to the request for the result will tell how it ended
         self._cancel_refused = True
-        return Step.KEEPS_RUNNING
+        return Duty.KEEPS_RUNNING
 
     def on_no_cancel_answer(self) -> None:
         """Handle the end of a cancel request without an answer: it may be repeated."""
@@ -279,10 +283,10 @@ class GoalExchange:
     def on_link_lost(self) -> None:
         """Handle the loss of the server: open requests will not be answered."""
         self.asking = self._cancelling = False
-        if self.phase is Phase.SENT:
-            self.phase = Phase.UNSURE
-        elif self.phase is Phase.QUEUED:
-            self.phase = Phase.HERE
+        if self.phase is ExchangePhase.SENT:
+            self.phase = ExchangePhase.UNSURE
+        elif self.phase is ExchangePhase.QUEUED:
+            self.phase = ExchangePhase.HERE
 
 
 _STATES = frozenset(code.value for code in GoalCode if code is not GoalCode.UNKNOWN)

@@ -48,7 +48,7 @@ class RosType(NamedTuple):
     hash: str
 
 
-class End:
+class RosEnd:
     """An endpoint of this program on a ROS 2 network, made by `RosNode.end`.
 
     Attributes:
@@ -143,7 +143,7 @@ class RosNode:
         if shown is not None:
             shown.close()
 
-    def end(self, kind: Kind, name: str, ros_type: RosType, qos: Qos = DEFAULT) -> End:
+    def end(self, kind: Kind, name: str, ros_type: RosType, qos: Qos = DEFAULT) -> RosEnd:
         """Return a new endpoint with the full name `name`; its token is not declared yet.
 
         Raises:
@@ -157,7 +157,7 @@ class RosNode:
             type_hash=ros_type.hash,
             qos=qos,
         )
-        return End(self, token)
+        return RosEnd(self, token)
 
     def watch(
         self,

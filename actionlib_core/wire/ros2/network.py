@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import weakref
+from collections import deque
 from typing import TYPE_CHECKING
 
 from actionlib_core.config import Ros2
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Transport
+
+# The default of rmw_zenoh. It is not infinite, because Zenoh keeps 0.8 kB for each query until its
+# time is over, even when it was answered or cancelled. A request that ends without an answer is
+# repeated.
+ANSWER_S = 600.0
+MANY = 10_000  # requests within that time; beyond this number, each has less time
+MIN_ANSWER_S = 30.0
 
 _ids: weakref.WeakKeyDictionary[Transport, Iterator[int]] = weakref.WeakKeyDictionary()
 """Count the nodes and endpoints of each session, which several nodes may share."""
@@ -101,6 +109,7 @@ class RosNetwork:
         transport = _join(node, settings) if owned else node.transport
         self._owned = transport if owned else None
         self._parameters: list[Closable] = []
+        self._asked: deque[float] = deque(maxlen=MANY)  # when requests were sent [s, clock]
         try:
             ids = _ids.setdefault(transport, itertools.count())
             name = node.full_name
@@ -118,6 +127,17 @@ class RosNetwork:
     def transport(self) -> Transport:
         """The session on that network."""
         return self.ros.transport
+
+    def patience(self) -> float:
+        """Return how long a request about a goal, which is sent now, waits for its answer [s].
+
+        When there are many, their answers come quickly, and they would fill the memory.
+        """
+        now = self.ros.clock.now()
+        asked = self._asked
+        many = len(asked) == MANY and asked[0] > now - ANSWER_S
+        asked.append(now)
+        return MIN_ANSWER_S if many else ANSWER_S
 
     def name(self, name: str) -> str:
         """Return the name there of the full name `name` here."""

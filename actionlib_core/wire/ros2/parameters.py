@@ -110,8 +110,7 @@ def answer(service: str, distro: str, request: Any) -> Any:
         case "describe_parameters":
             descriptor: Any = ros2.get_message("rcl_interfaces/ParameterDescriptor", distro)
             response.descriptors = [
-                descriptor(name=OWN, type=BOOL, description=READ_ONLY, read_only=True)
-                for _ in request.names
+                descriptor(name=OWN, type=BOOL, read_only=True) for _ in request.names
             ]
     return response
 

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from actionlib_core.wire.action_types import ActionTypes
     from actionlib_core.wire.ros2.action_messages import CancelRequest
     from actionlib_core.wire.ros2.attachment import Attachment
-    from actionlib_core.wire.ros2.graph import End
+    from actionlib_core.wire.ros2.graph import RosEnd
     from actionlib_core.wire.ros2.names import Token
 
 log = logging.getLogger(__name__)
@@ -93,7 +93,7 @@ class _Undecided(NamedTuple):
     due: float
 
 
-class _Shown(NamedTuple):
+class _ShownGoal(NamedTuple):
     """A goal as the last status list showed it, with its bytes for the next list."""
 
     status: int
@@ -101,7 +101,7 @@ class _Shown(NamedTuple):
     packed: bytes
 
     @classmethod
-    def make(cls, entry: StatusEntry, code: GoalCode) -> _Shown:
+    def make(cls, entry: StatusEntry, code: GoalCode) -> _ShownGoal:
         packed = pack_state(GoalState(goal_uuid(entry.id), entry.stamp_ns, code))
         return cls(entry.status, code, packed)
 
@@ -136,11 +136,11 @@ class RosServerPort:
         self._lock = threading.Lock()
         self._feedback_lock = threading.RLock()  # a signal's handler may publish, too
         self._status_due = self._status_busy = False
-        self._ends: dict[str, End] = {}
+        self._ends: dict[str, RosEnd] = {}
         self._declared: list[Closable] = []
         self._feedback: PublisherPort | None = None
         self._status: PublisherPort | None = None
-        self._shown: dict[str, _Shown] = {}
+        self._shown: dict[str, _ShownGoal] = {}
         self._undecided: dict[str, _Undecided] = {}
         self._waiting: dict[str, list[_Request]] = {}
         self._refused = Recent(REFUSED_KEPT)
@@ -266,8 +266,8 @@ class RosServerPort:
         Most goals in it have ended, so their bytes are taken from the list before.
         """
         before = self._shown
-        now: dict[str, _Shown] = {}
-        skipped: dict[str, _Shown] = {}  # goals in a state that no list has shown
+        now: dict[str, _ShownGoal] = {}
+        skipped: dict[str, _ShownGoal] = {}  # goals in a state that no list has shown
         for entry in listed:
             if entry.id in self._undecided:  # it may still be refused: then no list may show it
                 continue
@@ -278,10 +278,10 @@ class RosServerPort:
             code = self._code(entry)
             if code == GoalCode.UNKNOWN:
                 continue
-            now[entry.id] = _Shown.make(entry, code)
+            now[entry.id] = _ShownGoal.make(entry, code)
             earlier = _BEFORE_CANCEL.get(entry.status, GoalCode.UNKNOWN)
             if earlier > (known.code if known else GoalCode.UNKNOWN):
-                skipped[entry.id] = _Shown.make(entry, earlier)
+                skipped[entry.id] = _ShownGoal.make(entry, earlier)
         if now != before:
             # Clients see only from the list before a cancel whether the goal has been executing.
             for each in (now | skipped, now) if skipped else (now,):

@@ -8,10 +8,14 @@ import pytest
 
 from actionlib_core.cli import main
 from actionlib_core.config import Config, Ros2
+from actionlib_core.exceptions import TransportError
 from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
+from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.node import Node
+from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.transport import Quality
+from actionlib_core.wire.ros2 import ends
 from actionlib_core.wire.ros2.graph import RosNode, RosType
 from actionlib_core.wire.ros2.names import LATCHED, Kind
 from tests.ros2_server import Ros2Server
@@ -27,16 +31,23 @@ class Robot:
         self.clock, self._network, self._capsys = clock, network, capsys
         self.session = network.session()
         self.action = Ros2Server(self.session, clock, "arm/fib", Fibonacci, domain=42)
+        self.desk = Node("desk", transport=network.session(), clock=clock)
+        self.config = None
+
+    def node(self, **settings):
+        config = self.config or Config(ros2=(Ros2(domain=42, **settings),))
+        return Node("shell", transport=self._network.session(), clock=self.clock, config=config)
+
+    def both(self, *argv, code=0, **settings):
+        """Run a command; return what it printed, and its errors."""
+        self._capsys.readouterr()
+        with self.node(**settings) as node:
+            assert main(argv, node=node) == code
+        node.transport.close()
+        return self._capsys.readouterr()
 
     def __call__(self, *argv, code=0, **settings):
-        config = Config(ros2=(Ros2(domain=42, **settings),))
-        session = self._network.session()
-        node = Node("shell", transport=session, clock=self.clock, config=config)
-        self._capsys.readouterr()
-        with node:
-            assert main(argv, node=node) == code
-        session.close()
-        out, err = self._capsys.readouterr()
+        out, err = self.both(*argv, code=code, **settings)
         return out if not code else out + err
 
     def json(self, *argv, code=0, **settings):
@@ -49,6 +60,7 @@ def robot(clock, network, capsys):
     yield made
     assert made.action.problems == []
     made.action.close()
+    made.desk.close()
     made.session.close()
 
 
@@ -219,3 +231,91 @@ def test_an_option_of_the_whole_command_after_the_verb_is_told_where_it_belongs(
         main(["topic", "list", *words])
     assert caught.value.code == 2
     assert f"Try {words[0].partition('=')[0]} before the verb" in capsys.readouterr().err
+
+
+# -- a fleet of which one robot is off ---------------------------------------------------------
+
+
+@pytest.fixture
+def fleet(robot, monkeypatch):
+    """Commands with two robots in the configuration; the router of robot2 is off."""
+    off, joined, join = {"robot2"}, [], ends.network_of
+
+    def network_of(node, settings):
+        joined.append(settings.robot)
+        if settings.robot in off:
+            raise TransportError(f"cannot join tcp/{settings.robot}:7447")
+        return join(node, settings)
+
+    monkeypatch.setattr(ends, "network_of", network_of)
+    networks = tuple(
+        Ros2(domain=42, robot=name, router=f"tcp/{name}:7447") for name in ("robot1", "robot2")
+    )
+    monkeypatch.setattr(robot, "config", Config(ros2=networks))
+    robot.off, robot.joined = off, joined
+    robot.action.on_goal = robot.action.refuse
+    return robot
+
+
+@pytest.mark.parametrize("words", [("list", "-t"), ("topic", "list"), ("service", "list")])
+def test_list_shows_the_robots_that_are_on_and_names_the_other(fleet, words):
+    """All commands failed with the error of the robot that was off."""
+    node = RosNode(fleet.session, fleet.clock, domain=42, full_name="base")
+    shown = [
+        node.end(kind, "scan", RosType("std_msgs/msg/String", "RIHS01_" + "0" * 64))
+        for kind in (Kind.PUBLISHER, Kind.SERVICE)
+    ]
+    for end in shown:
+        end.show()
+    out, err = fleet.both(*words)
+    assert "/robot1/" in out
+    assert "actionlib: the names of robot 'robot2' are missing: cannot join tcp/robot2" in err
+    for end in shown:
+        end.close()
+
+
+def test_command_joins_the_network_of_its_name_only(fleet):
+    for words, code in (
+        (("info", "robot1/arm/fib"), 0),
+        (("goal", "list", "robot1/arm/fib"), 0),
+        (("send_goal", "robot1/arm/fib", "{order: 2}"), 1),
+    ):
+        _, err = fleet.both(*words, code=code)
+        assert "robot2" not in err
+    assert set(fleet.joined) == {"robot1"}
+    own = Publisher("status", String, node=fleet.desk)
+    fleet.joined.clear()
+    assert "Publisher count: 1" in fleet.both("topic", "info", "status")[0]
+    assert fleet.joined == []
+    own.unregister()
+
+
+def test_command_for_the_robot_that_is_off_says_so(fleet):
+    _, err = fleet.both("goal", "list", "robot2/arm/fib", code=2)
+    assert "cannot join tcp/robot2:7447" in err
+    assert set(fleet.joined) == {"robot2"}
+
+
+def test_watch_finds_a_robot_that_is_switched_on_later(fleet, caplog):
+    node, seen = fleet.node(), []
+    watches = ends.watch_ends(node, lambda end, _key, alive: seen.append((end.name, alive)))
+    fleet.clock.sleep(60.0)
+    assert {name.partition("/")[0] for name, _ in seen} == {"robot1"}
+    assert caplog.text.count("Its names are missing until it can be joined") == 1
+    fleet.off.clear()
+    fleet.clock.sleep(ends.AGAIN_S)
+    assert ("robot2/arm/fib", True) in seen
+    for watch in watches:
+        watch.close()
+    node.close()
+
+
+@pytest.mark.parametrize("what", ["watch", "node"])
+def test_watch_that_is_closed_tries_no_longer(fleet, what):
+    node = fleet.node()
+    watches = ends.watch_ends(node, lambda *_: None)
+    node.close() if what == "node" else [watch.close() for watch in watches]
+    fleet.joined.clear()
+    fleet.clock.sleep(60.0)
+    assert fleet.joined == []
+    node.close()

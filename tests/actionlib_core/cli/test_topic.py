@@ -279,7 +279,7 @@ def test_rates_of_a_publisher_that_speaks_only_when_heard(cli, robot, clock, cap
         (["pub", "a", "std_msgs/String", "{}", "-r", "0"], "'0'; expected a rate above 0"),
         (["pub", "a", "std_msgs/String", "{}", "-r", "nan"], "expected a rate above 0"),
         (["pub", "a", "std_msgs/String", "{}", "-t", "0"], "expected a whole number above 0"),
-        (["pub", "a", "std_msgs/String", "{}", "-w", "x"], "expected a whole number above 0"),
+        (["pub", "a", "std_msgs/String", "{}", "-w", "x"], "expected 0 or more"),
         (["echo", "a", "--timeout", "-1"], "'-1'; expected seconds above 0"),
         (["echo", "a", "-n", "0"], "expected a whole number above 0"),
         (["hz", "a", "-n", "two"], "'two'; expected a whole number above 0"),

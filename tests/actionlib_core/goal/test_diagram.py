@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from actionlib_core.goal.diagram import draw_life_cycles
+from tests.places import DOCS
 
-IMAGES = Path(__file__).parents[3] / "docs" / "images"
+IMAGES = DOCS / "images"
 
 
 def test_picture_in_the_docs_is_up_to_date():

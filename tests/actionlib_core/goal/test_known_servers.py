@@ -13,7 +13,7 @@ from actionlib_core.goal.client import (
     KnownServers,
     Receiver,
 )
-from actionlib_core.wire.presence import Endpoint, Kind
+from actionlib_core.transport.tokens import Endpoint, Kind
 
 
 def endpoint(session):

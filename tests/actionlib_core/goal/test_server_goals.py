@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from actionlib_core.goal import server as server_goals
-from actionlib_core.goal.server import FUTURE_NS, Arrival, ServerGoal, ServerGoals
+from actionlib_core.goal.server import ON_ITS_WAY_S, Arrival, ServerGoal, ServerGoals
 from actionlib_core.goal.states import Status
 
 
@@ -43,19 +43,19 @@ def test_goal_arriving_twice_is_new_once():
 )
 def test_cancel_rules(goal_id, stamp, asked):
     goals = book(("a", 10), ("b", 20), ("c", 30), ("d", 40))
-    assert "".join(goal.id for goal in goals.on_cancel(goal_id, stamp, 0.0, 100)) == asked
+    assert "".join(goal.id for goal in goals.on_cancel(goal_id, stamp, 0.0)) == asked
 
 
 def test_cancel_asks_each_goal_once_and_no_ended_one():
     goals = book(("a", 10), ("b", 20))
     end(goals, "a")
-    assert [goal.id for goal in goals.on_cancel("", 0, 0.0, 100)] == ["b"]
-    assert goals.on_cancel("", 0, 0.0, 100) == []
+    assert [goal.id for goal in goals.on_cancel("", 0, 0.0)] == ["b"]
+    assert goals.on_cancel("", 0, 0.0) == []
 
 
 def test_cancel_before_goal_recalls_it_and_lists_it_meanwhile():
     goals = book()
-    assert goals.on_cancel("late", 0, 0.0, 100) == []
+    assert goals.on_cancel("late", 0, 0.0) == []
     assert [(g.id, g.status) for g in goals.listed()] == [("late", Status.RECALLING)]
     arrival, goal = goals.on_goal(ServerGoal("late", 7, client="c"), 1.0)
     assert arrival is Arrival.RECALLED
@@ -65,17 +65,51 @@ def test_cancel_before_goal_recalls_it_and_lists_it_meanwhile():
 
 def test_cancel_before_goal_is_forgotten_after_its_time():
     goals = book()
-    goals.on_cancel("late", 0, 0.0, 100)
+    goals.on_cancel("late", 0, 0.0)
     assert goals.expire(4.0) == server_goals.LISTED_S
     assert goals.expire(5.0) is None
     assert goals.on_goal(ServerGoal("late", 7), 6.0)[0] is Arrival.NEW
 
 
-def test_goal_stamped_before_the_last_cancel_is_recalled():
+@pytest.mark.parametrize(
+    ("stamp", "made_at", "recalled"),
+    [
+        (50, 9.0, True),
+        (49, 10.0 + ON_ITS_WAY_S, True),  # it may have been on its way
+        (51, 9.0, False),
+        (50, 10.01 + ON_ITS_WAY_S, False),  # sent after the cancel: its client's clock is behind
+        (0, 9.0, False),  # without a stamp
+    ],
+)
+def test_goal_sent_and_stamped_before_a_cancel_that_came_first_is_recalled(
+    stamp, made_at, recalled
+):
     goals = book(("a", 10))
-    goals.on_cancel("", 50, 0.0, 100)
-    assert goals.on_goal(ServerGoal("old", 50), 0.0)[0] is Arrival.RECALLED
-    assert goals.on_goal(ServerGoal("new", 51), 0.0)[0] is Arrival.NEW
+    goals.on_cancel("", 50, 10.0)
+    arrival, _ = goals.on_goal(ServerGoal("late", stamp, made_at=made_at), 20.0)
+    assert arrival is (Arrival.RECALLED if recalled else Arrival.NEW)
+
+
+def test_each_cancel_by_stamp_counts_for_itself():
+    goals = book()
+    goals.on_cancel("", 100, 10.0)
+    goals.on_cancel("", 50, 20.0)
+    sent = {"both": (40, 5.0), "first": (80, 5.0), "second": (40, 15.0), "none": (80, 15.0)}
+    recalled = [
+        name
+        for name, (stamp, made_at) in sent.items()
+        if goals.on_goal(ServerGoal(name, stamp, made_at=made_at), 30.0)[0] is Arrival.RECALLED
+    ]
+    assert recalled == ["both", "first", "second"]
+
+
+def test_remembered_cancels_are_bounded():
+    goals = book()
+    for stamp in range(1000, 0, -1):
+        goals.on_cancel("", stamp, 10.0)
+    assert len(goals._cancels) == server_goals.CANCELS
+    goals.on_cancel("", 2000, 10.0)
+    assert len(goals._cancels) == 1
 
 
 def test_result_is_kept_until_acknowledged_and_its_id_for_good():
@@ -154,7 +188,7 @@ def test_released_goal_becomes_lost():
 
 def test_server_that_takes_no_more_goals_still_knows_those_it_has():
     goals = book(("a", 1))
-    goals.on_cancel("cancelled", 0, 0.0, 100)
+    goals.on_cancel("cancelled", 0, 0.0)
     goals.close()
     assert goals.on_goal(ServerGoal("a", 1), 1.0)[0] is Arrival.REPEAT
     for late in ("b", "cancelled"):
@@ -176,23 +210,14 @@ def test_goals_taken_are_those_whose_end_is_not_acknowledged():
     ]
 
 
-def test_cancel_from_the_future_counts_as_one_from_now():
+def test_cancel_from_the_future_recalls_no_later_goal():
     goals = ServerGoals("demo")
     day_ns = 86_400 * 10**9
-    early = ServerGoal("early", day_ns)
+    early = ServerGoal("early", day_ns, made_at=0.0)
     goals.on_goal(early, 0.0)
-    assert goals.on_cancel("", 2 * day_ns, 0.0, day_ns) == [early]
-    arrivals = [
-        goals.on_goal(ServerGoal(str(after_ns), day_ns + after_ns), 0.0)[0]
-        for after_ns in (-1, 0, 1)
-    ]
-    assert arrivals == [Arrival.RECALLED, Arrival.RECALLED, Arrival.NEW]
-
-
-def test_cancel_of_a_clock_that_is_a_little_ahead_holds():
-    goals = ServerGoals("demo")
-    goals.on_cancel("", FUTURE_NS, 0.0, 0)
-    assert goals.on_goal(ServerGoal("before", FUTURE_NS), 0.0)[0] is Arrival.RECALLED
+    assert goals.on_cancel("", 2 * day_ns, 10.0) == [early]
+    later = ServerGoal("later", day_ns + 1, made_at=11.0)
+    assert goals.on_goal(later, 11.0)[0] is Arrival.NEW
 
 
 def test_goals_from_the_future_are_cancelled_as_the_cancel_says():
@@ -200,4 +225,4 @@ def test_goals_from_the_future_are_cancelled_as_the_cancel_says():
     goals = ServerGoals("demo")
     ahead = ServerGoal("ahead", 10**18)
     goals.on_goal(ahead, 0.0)
-    assert goals.on_cancel("", 10**18, 0.0, 100) == [ahead]
+    assert goals.on_cancel("", 10**18, 0.0) == [ahead]

@@ -6,7 +6,7 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
-from actionlib_core.goal.server import ServerGoal
+from actionlib_core.goal.server import REPEATED_S, ServerGoal
 from actionlib_core.goal.single import POLICIES, SingleGoal
 from actionlib_core.goal.states import Status
 
@@ -19,7 +19,7 @@ class Goal(str):  # noqa: SLOT000  it has an attribute
 
 
 class Policy(SingleGoal):
-    """The policy, with goals called by their names."""
+    """The policy, with goals called by their names; each of them is a repetition."""
 
     def __init__(self, *policy):
         super().__init__(*policy)
@@ -28,8 +28,10 @@ class Policy(SingleGoal):
     def named(self, name):
         return self.goals.setdefault(name, Goal(name))
 
-    def on_goal(self, name, stamp_ns):
-        return super().on_goal(self.named(name), stamp_ns)
+    def on_goal(self, name, made_at):
+        goal = self.named(name)
+        goal.record.made_at, goal.record.age = float(made_at), REPEATED_S
+        return super().on_goal(goal)
 
     def on_cancel(self, name, *, recall_waiting):
         return super().on_cancel(self.named(name), recall_waiting=recall_waiting)
@@ -52,7 +54,7 @@ def test_newer_goal_preempts_and_the_waiting_one_is_recalled():
     assert not policy.preempt_requested
 
 
-def test_goal_with_an_older_stamp_is_recalled():
+def test_older_goal_that_comes_late_is_recalled():
     policy = Policy()
     policy.on_goal("a", 5)
     policy.accept()
@@ -60,6 +62,44 @@ def test_goal_with_an_older_stamp_is_recalled():
     assert decision.recall == ("old",)
     assert not decision.preempt
     assert policy.on_goal("same", 5).announce
+
+
+@pytest.mark.parametrize("age", [REPEATED_S, 100.0])
+@pytest.mark.parametrize("client", ["", "one", "two"])
+def test_goal_that_was_sent_again_is_placed_by_its_age_or_its_client_s_stamps(client, age):
+    running = ServerGoal("running", 50, client="one", made_at=1000.0)
+    goals = [
+        ServerGoal("late", stamp, client=client, made_at=1000.0 + shift, age=age)
+        for stamp in (49, 50, 51)
+        for shift in (-0.1, 0.0, 0.1)
+    ]
+    older = [goal.is_older_than(running) for goal in goals]
+    by_stamp, by_age = [True] * 3 + [False] * 6, [True, False, False] * 3
+    assert older == (by_stamp if client == "one" else by_age)
+
+
+def test_first_copy_of_a_goal_is_never_older_whatever_its_stamp():
+    running = ServerGoal("running", 50, client="one", made_at=1000.0)
+    for client in ("one", "two"):
+        goal = ServerGoal("new", 1, client=client, made_at=0.0, age=REPEATED_S * 0.99)
+        assert not goal.is_older_than(running)
+
+
+@pytest.mark.parametrize("made_at", [0, 1, 2])
+def test_goals_that_have_ended_count_for_nothing(made_at):
+    """After a clock was put back, an idle server recalled every goal."""
+    policy = Policy()
+    policy.on_goal("a", 1)
+    policy.accept()
+    policy.end("a")
+    assert policy.on_goal("b", made_at).announce
+
+
+def test_goal_older_than_the_waiting_one_is_recalled_and_stops_nothing():
+    policy = Policy()
+    policy.on_goal("waiting", 5)
+    assert policy.on_goal("old", 4).recall == ("old",)
+    assert policy.accept() == ("waiting", None)
 
 
 def test_accepting_while_one_runs_pushes_it_aside():

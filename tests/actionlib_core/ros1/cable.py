@@ -8,7 +8,7 @@ import selectors
 import socket
 import threading
 
-from actionlib_core.wire.ros1 import links
+from actionlib_core.ros1 import links
 
 _connect = socket.create_connection
 
@@ -120,12 +120,12 @@ class Cable:
 def lay(monkeypatch) -> Cable:
     """Lay a cable between this process and all others on this computer, both ways."""
     cable = Cable()
-    listen = links.Listener.__init__
+    listen = links.TcpListener.__init__
 
     def listen_behind(listener, *args, **kwargs):
         listen(listener, *args, **kwargs)
         listener.port = cable.port(listener.port)
 
-    monkeypatch.setattr(links.Listener, "__init__", listen_behind)
+    monkeypatch.setattr(links.TcpListener, "__init__", listen_behind)
     monkeypatch.setattr(socket, "create_connection", cable.connect)
     return cable

@@ -12,15 +12,15 @@ from actionlib_core.exceptions import Ros1Error
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import get_action, get_message
-from actionlib_core.wire.presence import Endpoint, Kind
-from actionlib_core.wire.ros1 import answers, frames
-from actionlib_core.wire.ros1.actions import action_type
-from actionlib_core.wire.ros1.answers import Names, SystemState
-from actionlib_core.wire.ros1.goals import GoalsOfClients, GoalsOfServer, Verdict
-from actionlib_core.wire.ros1.node import check_master
-from actionlib_core.wire.ros1.plan import Plan, Wanted, make_plan, without
-from actionlib_core.wire.ros1.publishers import Publishers
-from actionlib_core.wire.ros1.sides import Sides, Typed, type_of
+from actionlib_core.ros1 import answers, frames
+from actionlib_core.ros1.actions import action_type
+from actionlib_core.ros1.answers import Names, SystemState
+from actionlib_core.ros1.goals import Admission, GoalsOfClients, GoalsOfServer
+from actionlib_core.ros1.node import check_master
+from actionlib_core.ros1.plan import BridgePlan, Wanted, make_plan, without
+from actionlib_core.ros1.publishers import Publishers
+from actionlib_core.ros1.sides import Sides, Typed, type_of
+from actionlib_core.transport.tokens import Endpoint, Kind
 
 TEXT = st.text(st.characters(codec="utf-8"), min_size=1).filter(lambda text: "=" not in text)
 
@@ -117,35 +117,35 @@ def entry(goal_id, status, text=""):
 
 def test_a_goal_is_passed_until_the_server_speaks_of_it():
     goals = GoalsOfServer()
-    assert goals.on_goal("g") is Verdict.PASS
+    assert goals.on_goal("g") is Admission.PASS
     goals.on_statuses([entry("g", Status.RECALLING)])
-    assert goals.on_goal("g") is Verdict.PASS
+    assert goals.on_goal("g") is Admission.PASS
     goals.on_statuses([entry("g", Status.ACTIVE)])
-    assert goals.on_goal("g") is Verdict.DROP
+    assert goals.on_goal("g") is Admission.DROP
     goals.on_statuses([])
-    assert goals.on_goal("g") is Verdict.DROP  # ended long ago: the server would run it again
-    assert goals.on_goal("") is Verdict.PASS
+    assert goals.on_goal("g") is Admission.DROP  # ended long ago: the server would run it again
+    assert goals.on_goal("") is Admission.PASS
 
 
 def test_of_a_goal_that_comes_both_ways_the_second_is_dropped():
     goals = GoalsOfServer()
-    assert goals.on_direct_goal("g") is Verdict.PASS
+    assert goals.on_direct_goal("g") is Admission.PASS
     goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=0.0)
-    assert goals.on_goal("g") is Verdict.DROP
-    assert goals.on_goal("g") is Verdict.REPEAT_RESULT
-    assert goals.on_goal("h") is Verdict.PASS
-    assert goals.on_direct_goal("h") is Verdict.DROP
-    assert goals.on_goal("h") is Verdict.PASS  # sent again: the server has not spoken of it
+    assert goals.on_goal("g") is Admission.DROP
+    assert goals.on_goal("g") is Admission.REPEAT_RESULT
+    assert goals.on_goal("h") is Admission.PASS
+    assert goals.on_direct_goal("h") is Admission.DROP
+    assert goals.on_goal("h") is Admission.PASS  # sent again: the server has not spoken of it
 
 
 def test_a_result_is_sent_again_until_it_is_acknowledged_or_old():
     goals = GoalsOfServer()
     goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=0.0)
-    assert goals.on_goal("g") is Verdict.REPEAT_RESULT
+    assert goals.on_goal("g") is Admission.REPEAT_RESULT
     assert goals.result("g") == b"result"
     goals.on_acknowledged(["g", "unknown"])
     assert goals.result("g") is None
-    assert goals.on_goal("g") is Verdict.DROP
+    assert goals.on_goal("g") is Admission.DROP
     goals.on_result(entry("h", Status.ABORTED), b"", now=0.0)
     goals.on_result(entry("i", Status.ABORTED), b"", now=61.0)
     assert goals.result("h") is None
@@ -297,12 +297,12 @@ def test_what_is_used_here_is_bridged():
 
 def test_on_demand_nothing_is_bridged_that_nobody_uses():
     wanted = Wanted(on_demand=True)
-    assert plan(wanted) == Plan({}, {}, {})
+    assert plan(wanted) == BridgePlan({}, {}, {})
     ends = [end(Kind.SUBSCRIBER, "/scan"), end(Kind.ACTION_CLIENT, "/nav")]
     made = plan(wanted, ends, looked_for=["/clear", "/nowhere"])
-    assert made == Plan({"/nav": "m/NavAction"}, {"/scan": True}, {"/clear": True})
+    assert made == BridgePlan({"/nav": "m/NavAction"}, {"/scan": True}, {"/clear": True})
     left = plan(Wanted(on_demand=True, leave_out=("/sc*", "*av")), ends, looked_for=["/clear"])
-    assert left == Plan({}, {}, {"/clear": True})
+    assert left == BridgePlan({}, {}, {"/clear": True})
 
 
 def test_all_is_all_but_the_log_and_the_topics_of_actions():

@@ -16,8 +16,8 @@ from actionlib_core import ros1
 from actionlib_core.exceptions import InterfaceError, NameSetupError, Ros1Error
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.pubsub.topic import Subscriber
-from actionlib_core.wire.ros1.frames import pack_header
-from actionlib_core.wire.ros1.rpc import RpcServer
+from actionlib_core.ros1.frames import pack_header
+from actionlib_core.ros1.rpc import RpcServer
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import socket
+import threading
 
 import pytest
 
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import Ros1Error
-from actionlib_core.wire.ros1 import links
-from actionlib_core.wire.ros1.frames import pack_frame
-from actionlib_core.wire.ros1.links import Connection, Listener
-from actionlib_core.wire.ros1.rpc import RpcServer, call
+from actionlib_core.ros1 import links, rpc
+from actionlib_core.ros1 import node as node_module
+from actionlib_core.ros1.frames import pack_frame
+from actionlib_core.ros1.links import Budget, Connection, TcpListener
+from actionlib_core.ros1.node import Ros1Node
+from actionlib_core.ros1.rpc import RpcServer, call
 
 WAIT_S = 40.0
 ANSWERS = {
@@ -39,7 +42,7 @@ def listen(clock):
     opened = []
 
     def listen(handle):
-        opened.append(Listener("127.0.0.1", clock, "test", handle))
+        opened.append(TcpListener("127.0.0.1", clock, "test", handle))
         return opened[-1].port
 
     yield listen
@@ -92,7 +95,7 @@ def pair(clock):
     with socket.create_server(("127.0.0.1", 0)) as server:
         theirs = socket.create_connection(server.getsockname())
         ours, _ = server.accept()
-    with theirs, Connection(ours, "/peer", clock) as connection:
+    with theirs, Connection(ours, "/peer", clock, Budget(1 << 30)) as connection:
         connection.limit(None)
         yield connection, theirs
 
@@ -131,7 +134,7 @@ def test_of_messages_that_come_together_the_last_is_read(pair, monkeypatch):
     connection, theirs = pair
     theirs.sendall(b"".join(pack_frame(b"%d" % number) for number in range(10)))
     assert connection.read_latest(0.01) == b"9"
-    monkeypatch.setattr(links, "MOST_SKIPPED", 3)
+    monkeypatch.setattr(links, "MAX_SKIPPED", 3)
     theirs.sendall(b"".join(pack_frame(b"%d" % number) for number in range(6)))
     assert [connection.read_latest(0.01) for _ in range(2)] == [b"3", b"5"]
     theirs.sendall(pack_frame(b"end"))
@@ -148,7 +151,7 @@ def test_a_message_that_is_too_long_is_an_error(pair):
 
 
 def test_connections_beyond_the_limit_are_refused(listen, clock, monkeypatch):
-    monkeypatch.setattr(links, "MOST_CONNECTIONS", 1)
+    monkeypatch.setattr(links, "MAX_CONNECTIONS", 1)
     over = clock.event()
     port = listen(lambda _sock, _peer: over.wait(WAIT_S))
     with (
@@ -157,3 +160,96 @@ def test_connections_beyond_the_limit_are_refused(listen, clock, monkeypatch):
     ):
         assert refused.recv(1) == b""
         over.set()
+
+
+def test_connection_for_which_no_thread_can_be_started_is_refused_alone(listen, clock, monkeypatch):
+    """In a container with few threads left, one more caller made a bridge deaf for ever."""
+    heard = clock.event()
+    port = listen(lambda _sock, _peer: heard.set())
+    spawn = clock.spawn
+
+    def fail(*_args, **_options):
+        monkeypatch.setattr(clock, "spawn", spawn)
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(clock, "spawn", fail)
+    with socket.create_connection(("127.0.0.1", port), WAIT_S) as refused:
+        assert refused.recv(1) == b""
+    with socket.create_connection(("127.0.0.1", port), WAIT_S):
+        assert heard.wait(WAIT_S)
+
+
+def test_one_call_with_many_publishers_starts_few_threads(clock, caplog):
+    """Anybody who reaches the port may send it; each publisher has a thread."""
+    node = Ros1Node("/bridge", "http://127.0.0.1:9", clock=clock)
+    subscription = node.subscribe("/chatter", lambda _header: None)
+    before = threading.active_count()
+    try:
+        uris = [f"http://127.0.0.1:1/{i}" for i in range(3_000)]
+        call(node.uri, "publisherUpdate", "/x", "/chatter", uris)
+        assert threading.active_count() <= before + 110
+        assert "publishers: got 2900 more; expected at most 100" in caplog.text
+    finally:
+        subscription.close()
+        node.close()
+
+
+def test_publishers_of_all_topics_together_start_few_threads(clock, caplog, monkeypatch):
+    monkeypatch.setattr(node_module, "MAX_LINKS", 50)
+    node = Ros1Node("/bridge", "http://127.0.0.1:9", clock=clock)
+    made = [node.subscribe(f"/t{n}", lambda _header: None) for n in range(10)]
+    try:
+        for number, subscription in enumerate(made):
+            subscription.update([f"http://127.0.0.1:1/{number}/{i}" for i in range(20)])
+        assert len(node._tasks) <= 50
+        assert "links to publishers: got 50; expected fewer" in caplog.text
+    finally:
+        for subscription in made:
+            subscription.close()
+        node.close()
+
+
+@pytest.mark.parametrize(
+    "sent", [b"", b"POST / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nContent-Length"]
+)
+def test_call_that_does_not_end_is_given_up(clock, monkeypatch, sent):
+    monkeypatch.setattr(rpc, "REQUEST_S", 0.2)
+    server = RpcServer("127.0.0.1", clock, {})
+    try:
+        with socket.create_connection(("127.0.0.1", server.port), WAIT_S) as link:
+            link.sendall(sent)
+            link.settimeout(WAIT_S)
+            while link.recv(1000):
+                pass
+    finally:
+        server.close(WAIT_S)
+
+
+def test_call_with_entities_is_refused(clock):
+    server = RpcServer("127.0.0.1", clock, {"f": lambda: 1})
+    body = b"<?xml version='1.0'?><!DOCTYPE a [<!ENTITY a 'f'>]><methodCall/>"
+    try:
+        with socket.create_connection(("127.0.0.1", server.port), WAIT_S) as link:
+            head = f"POST / HTTP/1.1\r\nContent-Length: {len(body)}\r\n\r\n"
+            link.sendall(head.encode() + body)
+            link.settimeout(WAIT_S)
+            assert b" 400 " in link.recv(1000)
+    finally:
+        server.close(WAIT_S)
+
+
+def test_header_that_comes_byte_by_byte_has_no_more_time(pair, monkeypatch):
+    connection, theirs = pair
+    monkeypatch.setattr(links, "WHOLE_HEADER_S", 0.2)
+    theirs.sendall((1000).to_bytes(4, "little"))
+    with pytest.raises(Ros1Error, match="connection header: got none"):
+        connection.read_header()
+
+
+def test_message_for_which_the_node_has_no_room_is_refused(pair):
+    connection, theirs = pair
+    connection._budget = Budget(100)
+    theirs.sendall(pack_frame(b"x" * 60) + pack_frame(b"y" * 200))
+    assert connection.read_frame() == b"x" * 60
+    with pytest.raises(Ros1Error, match="got 200 bytes; expected fewer beside 0 of others"):
+        connection.read_frame()

@@ -10,8 +10,9 @@ from actionlib_core.exceptions import InterfaceError, ServiceUnavailableError
 from actionlib_core.interfaces import get_message
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
+from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.definitions import ask_definition, define, split_definition
-from actionlib_core.wire.presence import Kind, list_endpoints
+from actionlib_core.wire.presence import list_endpoints
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 

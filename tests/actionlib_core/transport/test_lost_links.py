@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -18,7 +19,7 @@ from actionlib_core.config import Config
 from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.node import Node
 from actionlib_core.transport._keys import is_for_another_key, key_mark
-from actionlib_core.transport._zenoh_config import new_session_id
+from actionlib_core.transport._zenoh_config import is_local, new_session_id
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.zenoh import ZenohTransport
 from tests.free_port import free_port
@@ -96,14 +97,35 @@ def wait_until(condition):
 
 
 @pytest.mark.zenoh
-def test_of_two_peers_the_later_one_dials():
+@pytest.mark.parametrize("set_by", [0.0, -3600.0])
+def test_of_two_peers_the_later_one_dials(monkeypatch, set_by):
+    """Also if the computer's clock was put back: the later one was then found within 8 s only."""
     config = Config(domain=DOMAIN)
-    with sessions(config, config, config) as opened:
-        links = [session.session.info.links for session in opened]
-        wait_until(lambda: all(len(of()) == 2 for of in links))
-        # Who was dialled has its listener's port at its end of every link, who dials a new one.
-        ports = [len({link.src for link in of()}) for of in links]
-    assert (ports[0], ports[2]) == (1, 2)
+    with sessions(config) as earlier:
+        monkeypatch.setattr(
+            RealClock, "time_ns", staticmethod(lambda: time.time_ns() + int(set_by * 1e9))
+        )
+        with sessions(config, config) as later:
+            links = [session.session.info.links for session in (*earlier, *later)]
+            wait_until(lambda: all(len(of()) == 2 for of in links))
+            # Who was dialled has its listener's port at its end of every link.
+            listeners = {link.src for link in links[0]()}
+            dialled = [{link.dst for link in of()} for of in links[1:]]
+    assert len(listeners) == 1
+    assert all(listeners <= ports for ports in dialled)
+
+
+def test_only_a_session_on_loopback_is_local():
+    assert is_local(Config())
+    others = [
+        {"discovery": "auto"},
+        {"discovery": "off"},
+        {"listen": ("tcp/0.0.0.0:7447",)},
+        {"connect": ("tcp/robot:7447",)},
+        {"connect": ("tcp/robot:7447",), "mode": "client"},
+        {"mode": "router"},
+    ]
+    assert not any(is_local(Config(**other)) for other in others)
 
 
 @pytest.mark.zenoh
@@ -249,6 +271,7 @@ class Network:
     def __init__(self, session, rediscovery: float) -> None:
         self._session = session
         self.rediscovery = rediscovery
+        self.is_local = False
 
     def __getattr__(self, name):
         return getattr(self._session, name)

@@ -1,0 +1,1 @@
+"""What the commands `smachpy` and `actionlib` share: numbers and options of the command line."""
