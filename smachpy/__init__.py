@@ -24,7 +24,15 @@ import sys as _sys
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.compat import alias_modules as _alias_modules
+from smachpy.base.log import logdebug as logdebug
+from smachpy.base.log import logerr as logerr
+from smachpy.base.log import loginfo as loginfo
+from smachpy.base.log import logwarn as logwarn
+from smachpy.base.log import set_loggers as set_loggers
 from smachpy.compat import MODULES as _SMACH_MODULES
+from smachpy.engine.cleanup import Ending as Ending
+from smachpy.engine.cleanup import current_ending as current_ending
+from smachpy.engine.options import Retry as Retry
 from smachpy.exceptions import InconsistentMachineError as InconsistentMachineError
 from smachpy.exceptions import InvalidConstructionError as InvalidConstructionError
 from smachpy.exceptions import InvalidStateError as InvalidStateError
@@ -34,40 +42,34 @@ from smachpy.exceptions import ReadOnlyError as ReadOnlyError
 from smachpy.exceptions import SmachError as SmachError
 from smachpy.exceptions import UserDataKeyError as UserDataKeyError
 from smachpy.exceptions import UserDataTypeError as UserDataTypeError
-from smachpy.introspection import Kind as Kind
-from smachpy.introspection import StateRecord as StateRecord
-from smachpy.introspection import describe as describe
-from smachpy.log import logdebug as logdebug
-from smachpy.log import logerr as logerr
-from smachpy.log import loginfo as loginfo
-from smachpy.log import logwarn as logwarn
-from smachpy.log import set_loggers as set_loggers
 from smachpy.machines.concurrence import Concurrence as Concurrence
 from smachpy.machines.concurrence import Rule as Rule
 from smachpy.machines.concurrence import all_of as all_of
 from smachpy.machines.concurrence import any_of as any_of
 from smachpy.machines.concurrence import n_of as n_of
 from smachpy.machines.container import Container as Container
+from smachpy.machines.guards import When as When
+from smachpy.machines.guards import when as when
 from smachpy.machines.iterator import Iterator as Iterator
+from smachpy.machines.mission_info import mission as mission
+from smachpy.machines.preempt_handler import set_preempt_handler as set_preempt_handler
 from smachpy.machines.state import CBState as CBState
 from smachpy.machines.state import Options as Options
 from smachpy.machines.state import State as State
+from smachpy.machines.state import current_state as current_state
 from smachpy.machines.state import get_options as get_options
 from smachpy.machines.state import set_options as set_options
 from smachpy.machines.state import state as state
 from smachpy.machines.state_machine import Sequence as Sequence
 from smachpy.machines.state_machine import StateMachine as StateMachine
-from smachpy.mission_info import mission as mission
-from smachpy.run.frame import current_state as current_state
-from smachpy.run.options import Retry as Retry
-from smachpy.run.preempt_handler import set_preempt_handler as set_preempt_handler
+from smachpy.machines.util import CBInterface as CBInterface
+from smachpy.machines.util import cb_interface as cb_interface
+from smachpy.machines.util import has_smach_interface as has_smach_interface
+from smachpy.machines.util import is_shutdown as is_shutdown
+from smachpy.machines.util import set_shutdown_check as set_shutdown_check
+from smachpy.userdata.secret import Secret as Secret
 from smachpy.userdata.user_data import Remapper as Remapper
 from smachpy.userdata.user_data import UserData as UserData
-from smachpy.util import CBInterface as CBInterface
-from smachpy.util import cb_interface as cb_interface
-from smachpy.util import has_smach_interface as has_smach_interface
-from smachpy.util import is_shutdown as is_shutdown
-from smachpy.util import set_shutdown_check as set_shutdown_check
 
 if TYPE_CHECKING:
     from smachpy.actions.action_server_wrapper import ActionServerWrapper as ActionServerWrapper
@@ -79,9 +81,14 @@ if TYPE_CHECKING:
     from smachpy.durable.codec import NotDurableError as NotDurableError
     from smachpy.durable.mission import run_durable as run_durable
     from smachpy.durable.once import once as once
+    from smachpy.events.introspection import Kind as Kind
+    from smachpy.events.introspection import StateRecord as StateRecord
+    from smachpy.events.introspection import describe as describe
+    from smachpy.files.reading import load as load
     from smachpy.network.client import IntrospectionClient as IntrospectionClient
     from smachpy.network.server import IntrospectionServer as IntrospectionServer
     from smachpy.userdata.kept_types import register_type as register_type
+    from smachpy.viz import render as render
 
 __all__ = [
     "ActionServerWrapper",
@@ -90,6 +97,7 @@ __all__ = [
     "Concurrence",
     "ConditionState",
     "Container",
+    "Ending",
     "InconsistentMachineError",
     "IntrospectionClient",
     "IntrospectionServer",
@@ -106,6 +114,7 @@ __all__ = [
     "Remapper",
     "Retry",
     "Rule",
+    "Secret",
     "Sequence",
     "ServiceState",
     "SimpleActionState",
@@ -116,14 +125,17 @@ __all__ = [
     "UserData",
     "UserDataKeyError",
     "UserDataTypeError",
+    "When",
     "all_of",
     "any_of",
     "cb_interface",
+    "current_ending",
     "current_state",
     "describe",
     "get_options",
     "has_smach_interface",
     "is_shutdown",
+    "load",
     "logdebug",
     "logerr",
     "loginfo",
@@ -132,27 +144,34 @@ __all__ = [
     "n_of",
     "once",
     "register_type",
+    "render",
     "run_durable",
     "set_loggers",
     "set_options",
     "set_preempt_handler",
     "set_shutdown_check",
     "state",
+    "when",
 ]
 
-# Names of states that need actionlib_core -> module that defines them; imported on first use.
+# Names that a plain machine does not need -> module that defines them; imported on first use.
 _LAZY: dict[str, str] = {
     "ActionServerWrapper": "smachpy.actions.action_server_wrapper",
     "ConditionState": "smachpy.actions.condition_state",
     "IntrospectionClient": "smachpy.network.client",
     "IntrospectionServer": "smachpy.network.server",
+    "Kind": "smachpy.events.introspection",
     "MonitorState": "smachpy.actions.monitor_state",
     "NotDurableError": "smachpy.durable.codec",
     "ServiceState": "smachpy.actions.service_state",
     "SimpleActionState": "smachpy.actions.simple_action_state",
+    "StateRecord": "smachpy.events.introspection",
     "check": "smachpy.checks",
+    "describe": "smachpy.events.introspection",
+    "load": "smachpy.files.reading",
     "once": "smachpy.durable.once",
     "register_type": "smachpy.userdata.kept_types",
+    "render": "smachpy.viz",
     "run_durable": "smachpy.durable.mission",
 }
 
@@ -168,6 +187,11 @@ def __getattr__(name: str) -> Any:
         from importlib import import_module
 
         return getattr(import_module(_LAZY[name]), name)
+    home = "smachpy.viz" if name == "viz" else _SMACH_MODULES.get(f"smachpy.{name}")
+    if home is not None:
+        from importlib import import_module
+
+        return import_module(home)
     raise AttributeError(f"module 'smachpy' has no attribute {name!r}")
 
 

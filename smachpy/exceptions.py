@@ -20,7 +20,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from actionlib_core import suggest
+from actionlib_core.exceptions import Documented
+from actionlib_core.inputs import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -37,8 +38,10 @@ def error_text(error: BaseException) -> str:
         return f"{kind}: <its str raised {type(failure).__name__}>"
 
 
-class SmachError(Exception):
+class SmachError(Documented):
     """Root of all errors that smachpy raises on purpose.
+
+    Try: see the error's own class; `except SmachError` catches them all.
 
     Attributes:
         message: The text.
@@ -50,15 +53,23 @@ class SmachError(Exception):
 
 
 class MissionError(SmachError):
-    """A mission, command or simulated robot got wrong arguments or files, or cannot proceed."""
+    """A mission, command or simulated robot got wrong arguments or files, or cannot proceed.
+
+    Try: correct the argument or the file that is named.
+    """
 
 
 class InvalidConstructionError(SmachError):
-    """A container is built in a wrong way."""
+    """A container is built in a wrong way.
+
+    Try: build the container as the text says; it cannot change while it runs.
+    """
 
 
 class InvalidStateError(SmachError):
     """A state, its label, its arguments or its options are wrong.
+
+    Try: correct each argument that is listed.
 
     Attributes:
         problems: One text per problem, "argument: got ...; expected ...", or none: see `message`.
@@ -70,11 +81,16 @@ class InvalidStateError(SmachError):
 
 
 class InvalidTransitionError(SmachError):
-    """An outcome or the target of a transition does not exist."""
+    """An outcome or the target of a transition does not exist.
+
+    Try: add the missing state or outcome, or correct the label in `transitions`.
+    """
 
 
 class InconsistentMachineError(InvalidTransitionError, InvalidStateError):
     """A machine has problems; with all of them.
+
+    Try: correct each problem that is listed; `smachpy check` finds more of them.
 
     Attributes:
         problems: One text per problem, "path: what: got …; expected …".
@@ -92,6 +108,8 @@ class InconsistentMachineError(InvalidTransitionError, InvalidStateError):
 class InvalidUserCodeError(SmachError):
     """A state or a callback raised, or used the library wrongly; the cause is chained.
 
+    Try: look at the exception above it, which your code raised, at the path that is named.
+
     Attributes:
         path: Path of the state that raised ("/PATROL/DRIVE"), or "".
     """
@@ -103,6 +121,8 @@ class InvalidUserCodeError(SmachError):
 
 class UserDataKeyError(InvalidUserCodeError, KeyError, AttributeError):
     """A userdata key was not declared, or has no value.
+
+    Try: declare the key in `input_keys` or `output_keys`, or write a value before it is read.
 
     It is a `KeyError` and an `AttributeError`, so that `in`, `hasattr` and `getattr` with a
     default work.
@@ -127,6 +147,8 @@ class UserDataKeyError(InvalidUserCodeError, KeyError, AttributeError):
 class UserDataTypeError(InvalidUserCodeError, TypeError):
     """A value does not fit the field of typed userdata.
 
+    Try: write a value of the field's type, or change the annotation.
+
     Attributes:
         key: The field.
         value: The value that was written.
@@ -147,6 +169,8 @@ class UserDataTypeError(InvalidUserCodeError, TypeError):
 
 class ReadOnlyError(InvalidUserCodeError, TypeError):
     """A state tried to change a value that it declared as input only.
+
+    Try: declare the key in `output_keys`, too, or change a copy.
 
     Attributes:
         key: The userdata key, or "" for a view of `get_const`.

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.wire.action_types import ActionTypes
-from smachpy import log
+from smachpy.base import log
+from smachpy.base.problems import Problems
+from smachpy.base.slips import accepts
+from smachpy.engine.preempt import asking, request_soon
 from smachpy.events import UserdataWritten
 from smachpy.exceptions import did_you_mean
-from smachpy.machines.problems import Problems
-from smachpy.run.grace import asking, request_soon
-from smachpy.slips import accepts
 from smachpy.userdata.user_data import Remapper, UserData
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from actionlib_core.action.server import OnClientLost
     from actionlib_core.goal.single import Policy
     from actionlib_core.node import Node
+    from smachpy.base.names import Names
     from smachpy.events import Event
     from smachpy.machines.container import Container
 
@@ -29,6 +31,8 @@ __all__ = ["ActionServerWrapper"]
 
 class ActionServerWrapper:
     """Runs a container for each goal of an action. It is not a state itself.
+
+    The way to offer a machine as an action; others: docs/howto/which_way.md.
 
     The goal is written to the userdata before a run, and the result is read from it afterwards.
     Feedback is sent whenever the container's feedback key, or a key of `feedback_slots_map`, is
@@ -44,10 +48,12 @@ class ActionServerWrapper:
         preempted_outcomes: Its outcomes that mean PREEMPTED.
         goal_key: Key that gets the goal (XGoal).
         feedback_key: Key of the feedback (XFeedback), which is empty at the start of each goal.
-        result_key: Key of the result (XResult), which is empty at the start of each goal.
+        result_key: Key of the result (XResult), which is empty at the start of each goal. So are
+            the keys of the two maps below: each has the value that it had before the first goal.
         goal_slots_map: Field of the goal -> key that gets it.
         feedback_slots_map: Field of the feedback -> key from which it is read.
-        result_slots_map: Field of the result -> key from which it is read.
+        result_slots_map: Field of the result -> key from which it is read. A key without a value
+            is an error after one of `succeeded_outcomes`; else its field has its default value.
         expand_goal_slots: Write every field of the goal to the key of the same name.
         pack_result_slots: Read every field of the result from the key of the same name, if it has
             a value.
@@ -72,9 +78,9 @@ class ActionServerWrapper:
         server_name: str,
         action_spec: Any,
         wrapped_container: Container,
-        succeeded_outcomes: Iterable[str] = (),
-        aborted_outcomes: Iterable[str] = (),
-        preempted_outcomes: Iterable[str] = (),
+        succeeded_outcomes: Names = (),
+        aborted_outcomes: Names = (),
+        preempted_outcomes: Names = (),
         goal_key: str = "action_goal",
         feedback_key: str = "action_feedback",
         result_key: str = "action_result",
@@ -119,6 +125,7 @@ class ActionServerWrapper:
         self.__lock = threading.Lock()
         self.__executing = False
         self.__feedback_sent = b""
+        self.__before: list[tuple[UserData, dict[str, Any]]] = []
         self.__unsubscribe: Callable[[], None] | None = None
         self.__action_server = SimpleActionServer(
             server_name,
@@ -157,12 +164,12 @@ class ActionServerWrapper:
             ("feedback_slots_map", self.__feedback_slots_map, self.__types.feedback),
             ("result_slots_map", self.__result_slots_map, self.__types.result),
         ):
-            known = list(message.__slots__)
+            known = message.__slots__
             for slot in slots:
                 if isinstance(slot, str) and slot not in known:
                     yield (
-                        f"{name}: got field {slot!r}; expected fields of {message._type}: {known}."
-                        f"{did_you_mean(slot, known)}"
+                        f"{name}: got field {slot!r}; expected fields of {message._type}: "
+                        f"{list(known)}.{did_you_mean(slot, known)}"
                     )
 
     # -- start and stop ------------------------------------------------------------------------
@@ -221,9 +228,10 @@ class ActionServerWrapper:
             with self.__lock:  # a late preempt must not hit the next goal
                 self.__executing = False
                 self.wrapped_container.recall_preempt()
-        result = self.__make_result()
+        succeeded = outcome in self.__outcomes["succeeded_outcomes"]
+        result = self.__make_result(complete=succeeded)
         text = f"the machine ended with {outcome!r}"
-        if outcome in self.__outcomes["succeeded_outcomes"]:
+        if succeeded:
             server.set_succeeded(result, text)
         elif self.__means_preempted(outcome):
             server.set_preempted(result, text)
@@ -241,6 +249,7 @@ class ActionServerWrapper:
         container = self.wrapped_container
         inputs = container.get_registered_input_keys()
         outputs = container.get_registered_output_keys()
+        self.__forget_former_goal()
         self.__fill_userdata(goal)
         for key in (self.__feedback_key, self.__result_key):
             if key in outputs or _is_used(container, key):
@@ -248,12 +257,24 @@ class ActionServerWrapper:
         self.__feedback_sent = self.userdata[self.__feedback_key].to_bytes()
         return container.execute(Remapper(self.userdata, inputs, outputs))
 
+    def __forget_former_goal(self) -> None:
+        """Give the keys of feedback and result the values that they had before the first goal."""
+        keys = {*self.__feedback_slots_map.values(), *self.__result_slots_map.values()}
+        if self.__pack_result_slots:
+            keys.update(self.__types.result.__slots__)
+        if not self.__before:
+            for userdata in (self.userdata, self.wrapped_container.userdata):
+                had = {key: _copied(userdata[key]) for key in keys if key in userdata}
+                self.__before.append((userdata, had))
+        for userdata, had in self.__before:
+            for key in keys:
+                if key in had:
+                    userdata[key] = _copied(had[key])
+                elif key in userdata:
+                    del userdata[key]
+
     def __fill_userdata(self, goal: Any) -> None:
         userdata = self.userdata
-        if self.__pack_result_slots:  # values of an earlier goal must not become a result
-            for slot in self.__types.result.__slots__:
-                if slot in userdata:
-                    del userdata[slot]
         if self.__expand_goal_slots:
             for slot in goal.__slots__:
                 userdata[slot] = getattr(goal, slot)
@@ -263,7 +284,8 @@ class ActionServerWrapper:
         userdata[self.__feedback_key] = self.__types.feedback()
         userdata[self.__result_key] = self.__types.result()
 
-    def __make_result(self) -> Any:
+    def __make_result(self, *, complete: bool) -> Any:
+        """Return the result of this goal; with `complete`, each key of the map needs a value."""
         userdata = self.userdata
         result = userdata[self.__result_key]
         if self.__pack_result_slots:
@@ -271,7 +293,8 @@ class ActionServerWrapper:
                 if slot in userdata:
                     setattr(result, slot, userdata[slot])
         for slot, key in self.__result_slots_map.items():
-            setattr(result, slot, userdata[key])
+            if complete or key in userdata:
+                setattr(result, slot, userdata[key])
         return result
 
     def preempt_cb(self) -> None:
@@ -338,6 +361,14 @@ class ActionServerWrapper:
             keys = {self.__feedback_key, *self.__feedback_slots_map.values()}
             if event.key in keys and self.__executing:
                 self.publish_feedback(self.wrapped_container.userdata)
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy, which a state may change in place; the value itself if it has no copy."""
+    try:
+        return copy.deepcopy(value)
+    except Exception:  # noqa: BLE001  of any kind: the value's own code decides
+        return value
 
 
 def _is_used(container: Container, key: str) -> bool:

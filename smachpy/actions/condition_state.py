@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
-from smachpy.machines.problems import Problems, name_of
+from smachpy.base.problems import Problems, name_of
 from smachpy.machines.state import State
 
 if TYPE_CHECKING:
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from smachpy.actions.interface import UntimedOptions
-    from smachpy.introspection import Kind
+    from smachpy.base.names import Names
+    from smachpy.events.introspection import Kind
 
 __all__ = ["ConditionState"]
 
@@ -50,7 +51,7 @@ class ConditionState(State):
     def __init__(
         self,
         cond_cb: Callable[..., object],
-        input_keys: Iterable[str] = (),
+        input_keys: Names = (),
         poll_rate: float | Duration | None = 0.05,
         timeout: float | Duration | None = None,
         max_checks: int = 1,

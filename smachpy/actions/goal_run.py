@@ -1,10 +1,10 @@
 """One goal of an action state: when to cancel or abandon it, and which outcome follows.
 
-    RUNNING --preempt, failure, exec_timeout--> CANCELLING --goal's end, preempt_timeout--> ENDED
-       |                                                                                      ^
-       +------------------------------------- goal's end -------------------------------------+
+    RUNNING --preempt, failure, a timeout--> CANCELLING --goal's end, preempt_timeout--> ENDED
+       |                                                                                   ^
+       +------------------------------------ goal's end -----------------------------------+
 
-`GoalRun` decides; it gets the time as an argument and never waits. `GoalExchange` sends the goal,
+`GoalRun` decides; it gets the time as an argument and never waits. `GoalFollower` sends the goal,
 watches it and carries out the decisions, so that no goal keeps running by accident.
 """
 
@@ -15,8 +15,10 @@ import math
 import threading
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.shutdown import current_shutdown
+from smachpy.engine.interrupt import Interruption
+from smachpy.engine.journal import NO_JOURNAL
 from smachpy.events import GoalDone, GoalFeedback, GoalSent
-from smachpy.run.interrupt import Interruption
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Timer
     from actionlib_core.goal.states import CommState
     from smachpy.actions.wakeup import Wakeup
-    from smachpy.run.frame import Frame, Scope
+    from smachpy.engine.frame import Frame, Scope
 
 SUCCEEDED = "succeeded"
 ABORTED = "aborted"
@@ -37,8 +39,8 @@ STOPPED_S = 0.2  # time for the rest of the feedback after this state has cancel
 STOPPED = frozenset({"PREEMPTED", "RECALLED", "LOST"})
 
 
-class Step(enum.Enum):
-    """What `GoalExchange` has to do now."""
+class GoalDuty(enum.Enum):
+    """What `GoalFollower` has to do now."""
 
     WAIT = enum.auto()
     CANCEL = enum.auto()
@@ -50,15 +52,17 @@ class GoalRun:
     """The state of the goal of one execution.
 
     Args:
+        accept_timeout: Time after which a goal is cancelled that a server has acknowledged but not
+            accepted, because it waits there behind others [s]; None for no limit.
         exec_timeout: Time after which the goal is cancelled, from its acceptance by a server [s];
             None for no limit.
         preempt_timeout: Time that a cancelled goal has to end before it is abandoned [s]; None for
             no limit.
 
     Attributes:
-        taken_at: When a server accepted it [s]; None before.
+        begun_at: When a server accepted it [s]; None before.
         preempted: The state was asked to stop while the goal ran.
-        timed_out: `exec_timeout` passed while the goal ran.
+        timed_out: The timeout that passed while the goal ran or waited, for people; "" for none.
         status: Name of its final goal status; "" while it runs, "LOST" if it was abandoned.
         text: The text of the server, or of the client in its place, about the end.
         abandoned: The state no longer waits for the goal; it may still run on the server.
@@ -67,27 +71,35 @@ class GoalRun:
     """
 
     __slots__ = (
+        "_accept_timeout",
         "_deadline",
         "_failed",
         "_preempt_timeout",
         "abandoned",
+        "begun_at",
         "cancelling",
         "exec_timeout",
         "preempted",
         "status",
-        "taken_at",
         "text",
         "timed_out",
     )
 
-    def __init__(self, *, exec_timeout: float | None, preempt_timeout: float | None) -> None:
+    def __init__(
+        self,
+        *,
+        accept_timeout: float | None,
+        exec_timeout: float | None,
+        preempt_timeout: float | None,
+    ) -> None:
+        self._accept_timeout = accept_timeout
         self.exec_timeout = exec_timeout
         self._preempt_timeout = preempt_timeout
         self._deadline: float | None = None
-        self.taken_at: float | None = None
+        self.begun_at: float | None = None
         self._failed = False
         self.preempted = False
-        self.timed_out = False
+        self.timed_out = ""
         self.cancelling = False
         self.abandoned = False
         self.status = ""
@@ -100,16 +112,22 @@ class GoalRun:
 
     def left(self, now: float) -> float:
         """Return the rest of `exec_timeout` [s]; infinity if there is none or it has not begun."""
-        if self.exec_timeout is None or self.taken_at is None:
+        if self.exec_timeout is None or self.begun_at is None:
             return math.inf
-        return max(0.0, self.taken_at + self.exec_timeout - now)
+        return max(0.0, self.begun_at + self.exec_timeout - now)
 
-    def on_taken(self, at: float) -> None:
+    def on_acknowledged(self, sent_at: float) -> None:
+        """Record that a server has the goal, which was sent at a time [s]."""
+        waits = self.begun_at is None and not self.cancelling
+        if waits and self._deadline is None and self._accept_timeout is not None:
+            self._deadline = sent_at + self._accept_timeout
+
+    def on_begun(self, at: float) -> None:
         """Record when a server accepted the goal [s]; `exec_timeout` begins at that moment."""
-        if self.taken_at is None:
-            self.taken_at = at
-            if self.exec_timeout is not None and not self.cancelling:
-                self._deadline = at + self.exec_timeout
+        if self.begun_at is None:
+            self.begun_at = at
+            if not self.cancelling:
+                self._deadline = None if self.exec_timeout is None else at + self.exec_timeout
 
     def on_preempt(self) -> None:
         """Record that the state was asked to stop."""
@@ -126,27 +144,33 @@ class GoalRun:
         if not self.status:
             self.status, self.text = status, text
 
-    def step(self, now: float) -> Step:
+    def step(self, now: float) -> GoalDuty:
         """Return what to do now; call it after every event and at `deadline`."""
         if self.status:
-            return Step.FINISH
-        # One deadline: that of `exec_timeout` first, after the cancel that of `preempt_timeout`.
+            return GoalDuty.FINISH
+        # One deadline: that of the acceptance, then `exec_timeout`, after a cancel
+        # `preempt_timeout`.
         late = self._deadline is not None and now >= self._deadline
         asked = self.preempted or self._failed
         if not self.cancelling and (asked or late):
-            self.timed_out = late and not asked
+            if late and not asked:
+                self.timed_out = (
+                    f"not accepted within server_wait_timeout={self._accept_timeout:g} s"
+                    if self.begun_at is None
+                    else f"cancelled after exec_timeout={self.exec_timeout:g} s"
+                )
             self.cancelling = True
             grace = self._preempt_timeout
             self._deadline = None if grace is None else now + grace
-            return Step.CANCEL
+            return GoalDuty.CANCEL
         if self.cancelling and late:
             self.abandoned = True
             self.status = "LOST"
             self.text = (
                 f"the action server has not ended it {self._preempt_timeout:g} s after the cancel"
             )
-            return Step.ABANDON
-        return Step.WAIT
+            return GoalDuty.ABANDON
+        return GoalDuty.WAIT
 
     @property
     def outcome(self) -> str:
@@ -167,13 +191,13 @@ class GoalRun:
         """The reason of 'aborted' or 'preempted', for people."""
         words = [self.status]
         if self.timed_out:
-            words.append(f"cancelled after exec_timeout={self.exec_timeout:g} s")
+            words.append(self.timed_out)
         if self.text:
             words.append(self.text)
         return ": ".join(words)
 
 
-class GoalExchange:
+class GoalFollower:
     """Carries out the decisions of a `GoalRun` about one goal.
 
     This happens in the state's thread. While that thread is inside a callback or a listener, which
@@ -198,6 +222,7 @@ class GoalExchange:
         result: The result message once it has arrived, else None.
         unanswered: No server has acknowledged the goal.
         adopted: An earlier process has sent it.
+        lost_link: What connects the client with all servers, while that is lost.
 
     Threads: all methods belong to the state's thread except `hurry` and the callbacks of the
         client, which run under the client's lock and only set flags.
@@ -225,10 +250,12 @@ class GoalExchange:
         self._on_late = on_late
         self._wants_feedback = wants_feedback
         self._frame = frame
-        self._journal = None if frame is None else frame.run.journal
-        self._is_taken_kept = False
+        self._journal = NO_JOURNAL if frame is None else frame.run.journal
+        self._ending = current_shutdown()
+        self._kept: set[str] = set()  # of "taken" and "begun" what is in the journal
         self._kept_result: Any = None
         self._handle: ClientGoalHandle | None = None
+        self._sent_at = 0.0
         self._lock = threading.Lock()  # guards `run` and the timer
         self._inside = False  # the state's thread is in the user's code, or about to be
         self._timer: Timer | None = None
@@ -252,6 +279,11 @@ class GoalExchange:
         """See the class."""
         return self._handle is not None and not self._handle.goal.acknowledged
 
+    @property
+    def lost_link(self) -> str:
+        """See the class."""
+        return self._client.manager.port.lost_link
+
     def send(self, goal: Any, *, ack_timeout: float | None) -> None:
         """Send `goal`; it is LOST if no server acknowledges it within `ack_timeout` [s].
 
@@ -261,7 +293,7 @@ class GoalExchange:
             TransportError: the node is closed.
         """
         handle = self._client.make_goal(goal, ack_timeout)
-        if self._journal is not None and self._frame is not None:
+        if self._frame is not None:
             self._journal.goal_sent(self._frame, self._client.ns, handle.goal.id)
         self._begin(handle, goal)
 
@@ -274,11 +306,14 @@ class GoalExchange:
         """
         self.adopted = True
         if kept["taken_ns"] is not None:
+            self._kept.add("taken")
+        begun_ns = kept.get("begun_ns", kept["taken_ns"])  # old journals do not have it
+        if begun_ns is not None:
             # `exec_timeout` counts from the acceptance, the outage included. The journal has wall
             # time, because the monotonic clock of another process means nothing here.
             clock = self._wake.clock
-            self.run.on_taken(clock.now() - (clock.time_ns() - kept["taken_ns"]) / 1e9)
-            self._is_taken_kept = True
+            self.run.on_begun(clock.now() - max(0.0, (clock.time_ns() - begun_ns) / 1e9))
+            self._kept.add("begun")
         if kept["status"]:  # it had ended before the outage
             self.goal_id = kept["id"]
             if self._preempt_requested():
@@ -290,9 +325,13 @@ class GoalExchange:
 
     def _begin(self, handle: ClientGoalHandle, goal: Any) -> None:
         self._handle = handle
-        handle.keeps_result = self._journal is not None
+        self._sent_at = self._wake.clock.now()
+        handle.keeps_result = self._journal.is_durable
         handle.on_state = self._note_state
         handle.on_feedback = self._note_feedback
+        handle.wants_feedback = self._wants_feedback
+        if not self._journal.is_durable:  # else the next process follows the goal
+            self._ending.cancels.add(self.cancel)
         handle.manager.begin(handle)
         self.goal_id = handle.goal.id
         self._inside = True
@@ -326,8 +365,8 @@ class GoalExchange:
             # Set before `_act`: what becomes due after that is done by `hurry` in another thread.
             self._inside = feedback is not None
             step = self._act()
-            self._keep_taken(handle)
-            if step is not Step.WAIT:
+            self._keep_progress(handle)
+            if step is not GoalDuty.WAIT:
                 break
             if feedback is not None:
                 started = self._wake.clock.now()
@@ -355,13 +394,18 @@ class GoalExchange:
         if failure is not None:
             raise failure
 
-    def _keep_taken(self, handle: ClientGoalHandle) -> None:
-        """Write to the journal, once, that a server has the goal."""
-        if self._is_taken_kept or not handle.goal.acknowledged:
+    def _keep_progress(self, handle: ClientGoalHandle) -> None:
+        """Write to the journal, once each, that a server has the goal and that it has begun it."""
+        if self._frame is None:
             return
-        if self._journal is not None and self._frame is not None:
-            self._is_taken_kept = True
-            self._journal.goal_taken(self._frame, self.goal_id)
+        begun = handle.goal.begun
+        if begun and "begun" not in self._kept:
+            self._kept |= {"taken", "begun"}
+        elif handle.goal.acknowledged and not self._kept:
+            self._kept.add("taken")
+        else:
+            return
+        self._journal.goal_taken(self._frame, self.goal_id, begun=begun)
 
     def _keep_end(self, handle: ClientGoalHandle) -> None:
         """Write the goal's end to the journal; only then acknowledge it to the server.
@@ -372,7 +416,7 @@ class GoalExchange:
         run = self.run
         if run.status == "LOST" and self.unanswered:
             return  # a resumed process must decide again what to do about it
-        if self._journal is not None and self._frame is not None:
+        if self._frame is not None:
             facts = (self.goal_id, run.status, run.text, self.result)
             self._journal.goal_done(self._frame, *facts, preempted=run.preempted)
             if handle.goal.over and run.status != "LOST":
@@ -386,6 +430,7 @@ class GoalExchange:
 
     def close(self) -> None:
         """Stop other threads from acting for the state."""
+        self._ending.cancels.discard(self.cancel)
         self._inside = False
         with self._lock:
             if self._timer is not None:
@@ -405,7 +450,7 @@ class GoalExchange:
         if self._inside:
             self._act()
 
-    def _act(self) -> Step:
+    def _act(self) -> GoalDuty:
         """Do what is due, set a timer for what will be, and return the last step."""
         handle = self._handle
         assert handle is not None
@@ -413,16 +458,18 @@ class GoalExchange:
         with self._lock:
             if self._preempt_requested():
                 self.run.on_preempt()
-            if handle.goal.acknowledged:
-                self.run.on_taken(clock.now())
+            if handle.goal.begun:
+                self.run.on_begun(clock.now())
+            elif handle.goal.acknowledged:
+                self.run.on_acknowledged(self._sent_at)
             if handle.goal.over and not self.run.status:
-                step = Step.WAIT  # `follow` handles the rest of the feedback first
+                step = GoalDuty.WAIT  # `follow` handles the rest of the feedback first
             else:
                 step = self.run.step(clock.now())
-            if step is Step.CANCEL:
+            if step is GoalDuty.CANCEL:
                 handle.cancel()
                 step = self.run.step(clock.now())
-            if step is Step.ABANDON:
+            if step is GoalDuty.ABANDON:
                 handle.manager.forget(handle)
             late = self._inside and not self.run.left(clock.now())
             due = self.run.deadline
@@ -437,7 +484,7 @@ class GoalExchange:
 
     def _note_state(self, _state: CommState) -> None:
         self._wake.set()
-        self.hurry()  # `exec_timeout` begins when a server has taken the goal
+        self.hurry()  # `exec_timeout` begins when a server has accepted the goal
 
     def _note_feedback(self) -> None:
         scope = self._scope

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from smachpy.util import has_smach_interface
+from smachpy.machines.util import has_smach_interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ class UntimedOptions(TypedDict, total=False):
     retry: RetrySpec
     on_exception: Mapping[type[BaseException], str] | None
     on_enter: Callable[[Any], object] | None
-    on_exit: Callable[[Any, str], object] | None
+    on_exit: Callable[[Any, Any], object] | None
 
 
 def adopt_interface(state: State, callback: object, *, outcomes: bool = True) -> None:

@@ -13,7 +13,7 @@ from smachpy.userdata.readonly import writable
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from smachpy.machines.problems import Problems
+    from smachpy.base.problems import Problems
     from smachpy.machines.state import State
 
 

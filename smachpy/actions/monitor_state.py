@@ -6,23 +6,24 @@ from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core.pubsub.topic import NotingSubscriber
-from smachpy import log
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
+from smachpy.base import log
+from smachpy.base.problems import Problems, name_of
+from smachpy.engine.frame import current_scope
 from smachpy.events import CallbackFailed
 from smachpy.exceptions import error_text
-from smachpy.machines.problems import Problems, name_of
 from smachpy.machines.state import State
-from smachpy.run.frame import current_scope
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
     from typing import Unpack
 
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from smachpy.actions.interface import UntimedOptions
-    from smachpy.introspection import Kind
+    from smachpy.base.names import Names
+    from smachpy.events.introspection import Kind
 
 __all__ = ["MonitorState"]
 
@@ -60,8 +61,8 @@ class MonitorState(State):
         msg_type: Any,
         cond_cb: Callable[[Any, Any], object],
         max_checks: int = -1,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
         *,
         timeout: float | Duration | None = None,
         timeout_outcome: str = "aborted",
@@ -102,7 +103,8 @@ class MonitorState(State):
                 waiting.append(message)
                 wake.set()
 
-            with NotingSubscriber(self.__topic, self.__msg_type, note, node=self.__node):
+            subscriber = NotingSubscriber(self.__topic, self.__msg_type, note, node=self.__node)
+            with subscriber, subscriber.telling():
                 return self.__watch(ud, wake, waiting)
 
     def __watch(self, ud: Any, wake: Wakeup, waiting: deque[Any]) -> str:

@@ -13,14 +13,14 @@ from actionlib_core.exceptions import (
 )
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import CALL_TIMEOUT_S, ServiceProxy
-from smachpy import log
 from smachpy.actions.messages import Incoming, Outgoing, UserCallback
 from smachpy.actions.wakeup import Wakeup, answer_preempt
-from smachpy.machines.problems import Problems
+from smachpy.base import log
+from smachpy.base.problems import Problems
+from smachpy.base.slips import accepting
+from smachpy.engine.frame import current_scope
 from smachpy.machines.state import State
-from smachpy.run.frame import current_scope
-from smachpy.slips import accepting
-from smachpy.util import is_shutdown
+from smachpy.machines.util import is_shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from smachpy.actions.interface import UntimedOptions
-    from smachpy.introspection import Kind
+    from smachpy.base.names import Names
+    from smachpy.events.introspection import Kind
 
 __all__ = ["ServiceState"]
 
@@ -91,9 +92,9 @@ class ServiceState(State):
         response_cb_kwargs: Mapping[str, Any] | None = None,
         response_key: str | None = None,
         response_slots: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        outcomes: Iterable[str] = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        outcomes: Names = (),
         *,
         timeout: float | Duration | None = CALL_TIMEOUT_S,
         timeout_outcome: str = "aborted",

@@ -3,36 +3,42 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING, Any, ClassVar, TypedDict
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, TypeVar
 
 from actionlib_core.action.client import ActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import get_node
 from actionlib_core.wire.action_types import ActionTypes
-from smachpy import log
-from smachpy.actions.goal_run import ABORTED, OUTCOMES, PREEMPTED, STOPPED, GoalExchange, GoalRun
+from smachpy.actions.goal_run import ABORTED, OUTCOMES, PREEMPTED, STOPPED, GoalFollower, GoalRun
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.messages import Incoming, Outgoing, UserCallback
 from smachpy.actions.wakeup import Wakeup, answer_preempt
-from smachpy.context import current_frame
-from smachpy.machines.problems import Problems
+from smachpy.base import log
+from smachpy.base.context import current_frame
+from smachpy.base.problems import Problems
+from smachpy.engine.frame import current_scope
+from smachpy.engine.interrupt import Interruption
+from smachpy.engine.preempt import inherited_grace, on_preempt
+from smachpy.engine.step import Timeout
 from smachpy.machines.state import Shown, State, get_options
-from smachpy.run.frame import current_scope
-from smachpy.run.grace import inherited_grace, on_preempt
-from smachpy.run.interrupt import Interruption
-from smachpy.run.step import Timeout
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from typing import Unpack
 
+    from actionlib_core.action._action_spec import ActionSpec as Spec
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
-    from smachpy.introspection import Kind
+    from smachpy.base.names import Names
+    from smachpy.engine.frame import Frame
+    from smachpy.events.introspection import Kind
     from smachpy.machines.state import Grace, RetrySpec
-    from smachpy.run.frame import Frame
 
 __all__ = ["ActionStateOptions", "SimpleActionState"]
+
+G = TypeVar("G")
+R = TypeVar("R")
+F = TypeVar("F")
 
 SHORTEST_ACK_S = 1.0
 """Lower limit of `server_wait_timeout`: time for the acknowledgement of a running server [s]."""
@@ -48,9 +54,8 @@ The state normally ends when its goal is abandoned; the interruption is only for
 block. The second value is for a grace set by a container, which must not be exceeded by much.
 """
 
-DEFAULT_PREEMPT_S = float("60")
-"""The default of `preempt_timeout`. Recognised by identity, because SMACH's signature has 60.0: a
-60.0 given by the caller takes precedence over the container's, the default does not."""
+DEFAULT_PREEMPT_S = 60.0
+"""The longest time that a cancelled goal has to end if nobody has said more [s], as in SMACH."""
 
 
 class ActionStateOptions(TypedDict, total=False):
@@ -61,14 +66,17 @@ class ActionStateOptions(TypedDict, total=False):
     retry: RetrySpec
     on_exception: Mapping[type[BaseException], str] | None
     on_enter: Callable[[Any], object] | None
-    on_exit: Callable[[Any, str], object] | None
+    on_exit: Callable[[Any, Any], object] | None
     resume: str | Callable[[Any], str | None] | None
     on_resume: Callable[[Any], object] | None
     idempotent: bool
+    success: Iterable[str] | None
 
 
 class SimpleActionState(State):
     """Sends a goal and waits for its end. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    The way to send a goal in a mission; others: docs/howto/which_way.md.
 
     Each run builds a new goal from `goal` or `goal_key`, then `goal_slots`, then `goal_cb`. All
     callbacks run in the state's thread, without a lock. They may raise: a running goal is cancelled
@@ -99,15 +107,16 @@ class SimpleActionState(State):
         input_keys: More keys to read, for the callbacks.
         output_keys: More keys to write, for the callbacks.
         outcomes: More outcomes, for `result_cb`.
-        exec_timeout: Time that the goal has to end, from its acceptance by a server [s]. After that
-            it is cancelled, and the outcome is 'aborted'; None for no limit. A callback that still
-            runs `preempt_timeout` and a few seconds later is interrupted (docs/preemption.md), with
-            the same outcome.
+        exec_timeout: Time that the goal has to end, from its acceptance by a server [s], when it
+            becomes ACTIVE. After that it is cancelled, and the outcome is 'aborted'; None for no
+            limit. A callback that still runs `preempt_timeout` and a few seconds later is
+            interrupted (docs/preemption.md), with the same outcome.
         preempt_timeout: Time that a cancelled goal has to end [s]. After that it is abandoned and
-            reported; it may still run on the server. None for no limit. If it is not given, a
-            container's `preempt_timeout` is used if that is shorter.
-        server_wait_timeout: Time for a server to accept the goal [s], at least one second; after
-            that the outcome is 'aborted'. None for no limit.
+            reported; it may still run on the server. None for no limit. "inherit", the default,
+            takes 60 s, or a container's `preempt_timeout` if that is shorter.
+        server_wait_timeout: Time for a server to appear and accept the goal [s], which may have to
+            wait there behind others; at least one second. After that it is cancelled, and the
+            outcome is 'aborted'. None for no limit.
         feedback_cb: Called as `feedback_cb(userdata, feedback)` for each XFeedback. While it runs,
             a preempt or `exec_timeout` still cancels the goal. If it is slower than the feedback,
             up to 100,000 messages wait, and the oldest are dropped. Messages that are still waiting
@@ -133,8 +142,8 @@ class SimpleActionState(State):
     def __init__(
         self,
         action_name: str,
-        action_spec: Any,
-        goal: Any = None,
+        action_spec: type[Spec[G, R, F]],
+        goal: G | None = None,
         goal_key: str | None = None,
         goal_slots: Iterable[str] = (),
         goal_cb: Callable[..., Any] | None = None,
@@ -145,14 +154,14 @@ class SimpleActionState(State):
         result_cb: Callable[..., str | None] | None = None,
         result_cb_args: Iterable[Any] = (),
         result_cb_kwargs: Mapping[str, Any] | None = None,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        outcomes: Iterable[str] = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        outcomes: Names = (),
         exec_timeout: float | Duration | None = None,
-        preempt_timeout: float | Duration | None = DEFAULT_PREEMPT_S,
+        preempt_timeout: float | Duration | Literal["inherit"] | None = "inherit",
         server_wait_timeout: float | Duration | None = 60.0,
         *,
-        feedback_cb: Callable[[Any, Any], object] | None = None,
+        feedback_cb: Callable[[Any, F], object] | None = None,
         feedback_key: str | None = None,
         node: Node | None = None,
         **options: Unpack[ActionStateOptions],
@@ -193,10 +202,9 @@ class SimpleActionState(State):
         self.__feedback_key = feedback_key
         self.__exec_s = problems.seconds("exec_timeout", exec_timeout)
         self.__server_wait_s = problems.seconds("server_wait_timeout", server_wait_timeout)
-        if preempt_timeout is not DEFAULT_PREEMPT_S:
-            self._smachpy_set_options({"preempt_timeout": preempt_timeout}, problems)
+        self._smachpy_set_options({"preempt_timeout": preempt_timeout}, problems)
         self.__node = node
-        self.__exchange: GoalExchange | None = None
+        self.__exchange: GoalFollower | None = None
         problems.add(*self.__goal.problems(), *self.__result.problems())
         problems.raise_all()
         self._smachpy.code = (self.__goal,)
@@ -242,8 +250,7 @@ class SimpleActionState(State):
         `limit` asks the state to stop if `exec_timeout` passes while the user's code runs.
         """
         frame: Frame | None = current_frame()
-        journal = None if frame is None else frame.run.journal
-        kept = None if journal is None or frame is None else journal.goal_of(frame)
+        kept = None if frame is None else frame.run.journal.goal_of(frame)
         if kept is not None and frame is not None:
             outcome = self.__resume(ud, limit, frame, kept)
             if outcome is not None:
@@ -253,8 +260,6 @@ class SimpleActionState(State):
 
     def __resume(self, ud: Any, limit: Timeout | None, frame: Frame, kept: Any) -> str | None:
         """Follow the goal that an earlier process has sent; None: send a new one."""
-        journal = frame.run.journal
-        assert journal is not None
         if kept.get("preempted") and not kept["stopped"]:
             # It had ended because its state was asked to stop. Whoever asked is resumed too and
             # asks again: a concurrence, for instance, once all its children have been entered.
@@ -272,7 +277,7 @@ class SimpleActionState(State):
         exchange.call_off(kept["id"])
         options = get_options(self)
         if options.resume is not None:
-            decided: str | None = journal.decide(frame, ud)
+            decided: str | None = frame.run.journal.decide(frame, ud)
             return decided
         if options.idempotent or kept["taken_ns"] is None:
             return None
@@ -280,7 +285,7 @@ class SimpleActionState(State):
 
     def __exchange_goal(
         self, ud: Any, limit: Timeout | None, frame: Frame | None, kept: Any
-    ) -> GoalExchange | None:
+    ) -> GoalFollower | None:
         """Send a goal, or follow the `kept` one, until its end; None if preempted before that."""
         with Wakeup(self) as wake:
             if kept is None and answer_preempt(self):
@@ -291,14 +296,16 @@ class SimpleActionState(State):
                 return None
             own = self._smachpy.options.preempt_timeout
             grace = _shorter(inherited_grace(current_frame())) if own == "inherit" else own
-            run = GoalRun(exec_timeout=self.__exec_s, preempt_timeout=grace)
+            wait_s = self.__server_wait_s
+            wait_s = None if wait_s is None else max(wait_s, SHORTEST_ACK_S)
+            run = GoalRun(accept_timeout=wait_s, exec_timeout=self.__exec_s, preempt_timeout=grace)
             wanted = self.__feedback_cb is not None or self.__feedback_key is not None
 
             def is_asked() -> bool:
                 # A request of `exec_timeout` alone is not a preempt: its outcome is 'aborted'.
                 return self._preempt_requested and (limit is None or not limit.is_alone())
 
-            exchange = GoalExchange(
+            exchange = GoalFollower(
                 client,
                 wake,
                 current_scope(),
@@ -310,8 +317,6 @@ class SimpleActionState(State):
             )
             self.__exchange = exchange
             forget = on_preempt(self, exchange.hurry)
-            wait_s = self.__server_wait_s
-            wait_s = None if wait_s is None else max(wait_s, SHORTEST_ACK_S)
             try:
                 if kept is None:
                     exchange.send(goal, ack_timeout=wait_s)
@@ -322,15 +327,15 @@ class SimpleActionState(State):
             except BaseException as error:
                 # Nobody waits for the goal now. In a durable run it goes on if the process is
                 # ending (KeyboardInterrupt, SystemExit): the next process follows it.
-                if frame is None or frame.run.journal is None or _is_of_run(error):
+                if frame is None or not frame.run.journal.is_durable or _is_of_run(error):
                     exchange.cancel()
                 raise
             finally:
                 forget()
                 exchange.close()
             # The rest of `exec_timeout` is for `result_cb`.
-            if limit is not None and not run.preempted:
-                limit.start(run.left(wake.clock.now()))
+            if limit is not None and self.__exec_s is not None and not run.preempted:
+                limit.start(min(self.__exec_s, run.left(wake.clock.now())))
         return exchange
 
     def _smachpy_grace(self, inherited: Grace) -> Grace:
@@ -353,7 +358,7 @@ class SimpleActionState(State):
         if self.__feedback_cb is not None:
             self.__feedback_cb(ud, feedback)
 
-    def __finish(self, ud: Any, exchange: GoalExchange) -> str:
+    def __finish(self, ud: Any, exchange: GoalFollower) -> str:
         """Store the result and choose the outcome."""
         run, result = exchange.run, exchange.result
         # Otherwise the goal ended by itself first: the request stays, and the machine ends by it.
@@ -369,12 +374,14 @@ class SimpleActionState(State):
         )
         return run.outcome if chosen is None else chosen
 
-    def __explain(self, exchange: GoalExchange) -> str:
+    def __explain(self, exchange: GoalFollower) -> str:
         run, scope = exchange.run, current_scope()
         where = f"{type(self).__name__} {self.__action_name!r}" if scope is None else scope.path
         text = f"{where}: goal {exchange.goal_id} on '{self.__action_name}': {run.reason}"
         if run.abandoned:
             return f"{text}. It was abandoned and may still run."
+        if exchange.lost_link:
+            return text
         if exchange.unanswered and exchange.adopted:
             return (
                 f"{text}. An earlier process had sent it. Try idempotent=True where a goal that "

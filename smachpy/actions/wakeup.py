@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from smachpy.run.frame import clock_of_run
-from smachpy.run.grace import on_preempt
+from smachpy.engine.frame import clock_of_run
+from smachpy.engine.preempt import on_preempt
 
 if TYPE_CHECKING:
     from typing import Self

@@ -5,19 +5,19 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from smachpy import log
-from smachpy.events.buffer import LONGEST, EventBuffer
+from smachpy.base import log
+from smachpy.base.problems import Problems, name_of
+from smachpy.engine.callback import call_bounded
+from smachpy.engine.described import EPOCH
+from smachpy.events.buffer import MAX_BUFFER_EVENTS, EventBuffer
 from smachpy.exceptions import error_text
-from smachpy.machines.problems import Problems, name_of
-from smachpy.run.callback import call_bounded
-from smachpy.run.child import EPOCH
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from smachpy.engine.described import Callback
     from smachpy.events import Event
     from smachpy.events.buffer import SubscriberKind
-    from smachpy.run.child import Callback
     from smachpy.userdata.user_data import UserData
 
 
@@ -80,7 +80,7 @@ class Callbacks:
         self.__call(self._smachpy.termination_cbs, terminal_states, outcome)
 
     def __call(self, callbacks: list[Callback], *arguments: object) -> None:
-        frame = self._smachpy.frame
+        frame = self._smachpy.live.frame
         for callback, extra in tuple(callbacks):  # a copy: a callback may register another one
             given = (self.userdata, *arguments, *extra)
             try:
@@ -112,7 +112,11 @@ class Callbacks:
         return partial(self._smachpy_detach, "listeners", listener)
 
     def event_buffer(
-        self, on_news: Callable[[], object] | None = None, *, limit: int = LONGEST, name: str = ""
+        self,
+        on_news: Callable[[], object] | None = None,
+        *,
+        limit: int = MAX_BUFFER_EVENTS,
+        name: str = "",
     ) -> EventBuffer:
         """Return a buffer that keeps every event of this container and of all below it.
 
@@ -130,17 +134,17 @@ class Callbacks:
     tape = event_buffer  # its name in the first release
 
     def _smachpy_attach(self, kind: SubscriberKind, subscriber: object) -> None:
-        data = self._smachpy
-        setattr(data, kind, (*getattr(data, kind), subscriber))
+        live = self._smachpy.live
+        setattr(live, kind, (*getattr(live, kind), subscriber))
         self.__subscriptions_changed()
 
     def _smachpy_detach(self, kind: SubscriberKind, subscriber: object) -> None:
-        data = self._smachpy
-        setattr(data, kind, tuple(x for x in getattr(data, kind) if x is not subscriber))
+        live = self._smachpy.live
+        setattr(live, kind, tuple(x for x in getattr(live, kind) if x is not subscriber))
         self.__subscriptions_changed()
 
     def __subscriptions_changed(self) -> None:
         EPOCH.value = object()
-        frame = self._smachpy.frame or self._smachpy.root
+        frame = self._smachpy.live.frame or self._smachpy.live.root
         if frame is not None:
             frame.run.watched = True

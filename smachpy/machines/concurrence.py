@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy import log
+from smachpy.base import log
+from smachpy.base.problems import Problems, name_of, plain, unknown_name
+from smachpy.base.slips import accepts
+from smachpy.engine.callback import call_bounded
+from smachpy.engine.described import ContainerData
+from smachpy.engine.errors import raised
+from smachpy.engine.interrupt import Interruption
+from smachpy.engine.preempt import asking
+from smachpy.engine.step import Plan
+from smachpy.engine.threads import Group
 from smachpy.exceptions import (
     InvalidConstructionError,
     InvalidStateError,
@@ -13,30 +22,21 @@ from smachpy.exceptions import (
     InvalidUserCodeError,
     did_you_mean,
 )
-from smachpy.introspection import RuleRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import NO_STATES, Container, below
-from smachpy.machines.problems import Problems, name_of, unknown_name
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.state import DataOf
-from smachpy.run.callback import call_bounded
-from smachpy.run.child import ContainerData
-from smachpy.run.grace import asking
-from smachpy.run.interrupt import Interruption
-from smachpy.run.step import Plan, raised
-from smachpy.run.threads import Group
-from smachpy.run.visit import End
-from smachpy.slips import accepts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from collections.abc import Sequence as SequenceOf
     from typing import Unpack
 
-    from smachpy.introspection import Kind, Structure
+    from smachpy.base.names import Names
+    from smachpy.engine.frame import Frame
+    from smachpy.engine.threads import ChildBranch
+    from smachpy.events.introspection import Kind, Structure
     from smachpy.machines.state import State, StateOptions
-    from smachpy.run.frame import Frame
-    from smachpy.run.threads import ChildBranch
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
@@ -73,6 +73,8 @@ class Concurrence(Container):
             after a child or the callback itself has raised.
         name: Name of the machine when it is the root.
         userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
+        userdata: Key -> value with which every run begins; a copy, so no run sees what the one
+            before it has made of it.
         **options: See `StateOptions`.
 
     Raises:
@@ -89,22 +91,29 @@ class Concurrence(Container):
 
     def __init__(
         self,
-        outcomes: Iterable[str],
+        outcomes: Names,
         default_outcome: str,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
         outcome_map: Mapping[str, Any] | None = None,
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
         child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None,
         *,
         name: str | None = None,
         userdata_type: type | None = None,
+        userdata: Mapping[str, Any] | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
         problems = Problems(type(self).__name__)
         with problems:
             super().__init__(
-                outcomes, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+                outcomes,
+                input_keys,
+                output_keys,
+                name=name,
+                userdata_type=userdata_type,
+                userdata=userdata,
+                **options,
             )
         known = self._smachpy.outcomes
         outcome_map = problems.mapping("outcome_map", outcome_map, "outcome -> rule")
@@ -126,7 +135,7 @@ class Concurrence(Container):
             "child_termination_cb", child_termination_cb, f"child_termination_cb{ended}", 1
         )
         problems.raise_all()
-        self._smachpy.default_outcome = default_outcome
+        self._smachpy.default_outcome = default_outcome and plain(default_outcome)
         self._smachpy.outcome_cb = outcome_cb
         self._smachpy.child_termination_cb = child_termination_cb
 
@@ -152,7 +161,7 @@ class Concurrence(Container):
                 wrong form.
             InvalidConstructionError: called on the class while no concurrence is open, or it runs.
         """
-        if self._smachpy.frame is not None:
+        if self._smachpy.live.frame is not None:
             raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
         # One object in two threads would share its attributes and its preempt flag.
         for other, child in self._smachpy.children.items():
@@ -166,6 +175,33 @@ class Concurrence(Container):
         self._smachpy_store_child(label, state, remapping)
         return state
 
+    @construction_method
+    def add_cleanup(
+        self: Concurrence, label: str, state: State, remapping: Mapping[str, str] | None = None
+    ) -> State:
+        """Add a state or machine that runs at every end of this container, once.
+
+        It runs after success and failure, an exception, a timeout, a preempt, and a shutdown by the
+        first Ctrl-C, before the container ends as it would without it. A request to stop that
+        comes while it runs gives it its `preempt_timeout` to finish, and asks it only then.
+        `smachpy.current_ending()` tells it how the container ends. See docs/cleanup.md.
+
+        Args:
+            label: Its name here; unique.
+            state: The state.
+            remapping: Key of the state -> key of this container's userdata.
+
+        Returns:
+            The state.
+
+        Raises:
+            InvalidStateError: there is a clean-up already, the label is taken, or an argument has a
+                wrong form.
+            InvalidConstructionError: called on the class while no such container is open, or it
+                runs.
+        """
+        return self._smachpy_add_cleanup(label, state, remapping)
+
     # -- structure -----------------------------------------------------------------------------
 
     def set_initial_state(
@@ -177,12 +213,12 @@ class Concurrence(Container):
             InvalidStateError: an unknown label.
         """
         super().set_initial_state(initial_states, userdata)
-        if initial_states and set(initial_states) != set(self._smachpy.children):
+        if initial_states and set(initial_states) != set(self._smachpy.others()):
             log.logwarn("Concurrence.set_initial_state: all children start together; ignored.")
 
     def get_active_states(self) -> list[str]:
         """Return the labels of the children that are running."""
-        frame = self._smachpy.frame
+        frame = self._smachpy.live.frame
         group = None if frame is None else frame.group
         return [] if group is None else [branch.step.label for branch in group.running()]
 
@@ -196,7 +232,7 @@ class Concurrence(Container):
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this concurrence itself."""
-        nothing = () if self._smachpy.children else (f"{where}: {NO_STATES}",)
+        nothing = () if self._smachpy.others() else (f"{where}: {NO_STATES}",)
         found = (f"{where}: {problem}" for problem in (*self.__unknown(), *self.__shared_states()))
         return (*nothing, *(problem for problem in found if not accepts(problem)))
 
@@ -210,8 +246,8 @@ class Concurrence(Container):
                 yield unknown_name("outcome map", outcome, data.outcomes)
             what = f"outcome map: {outcome!r}"
             for label, wanted in rule.conditions:
-                if label not in data.children:
-                    yield unknown_name(what, label, data.children)
+                if label not in data.others():
+                    yield unknown_name(what, label, data.others())
                     continue
                 known = dict.fromkeys((*data.children[label]._smachpy.outcomes, "preempted"))
                 for one in wanted:
@@ -220,10 +256,11 @@ class Concurrence(Container):
 
     def __shared_states(self) -> Iterator[str]:
         """Yield a problem for each state that two branches would run at the same time."""
-        if len(self._smachpy.children) == 1:
+        branches = self._smachpy.others()
+        if len(branches) == 1:
             return
         branch_of: dict[int, str] = {}
-        for label, child in self._smachpy.children.items():
+        for label, child in branches.items():
             for state in {id(state): state for state in below(child)}.values():
                 other = branch_of.setdefault(id(state), label)
                 if other != label:
@@ -234,6 +271,8 @@ class Concurrence(Container):
 
     def describe_structure(self) -> Structure:
         """Return the children and the rules."""
+        from smachpy.events.introspection import RuleRecord
+
         data = self._smachpy
         rules = tuple(
             RuleRecord(
@@ -256,7 +295,7 @@ class Concurrence(Container):
     def _smachpy_compile(self) -> Plan:
         plan = Plan(self)
         for step in plan.steps.values():
-            step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
+            step.end_always()
         return plan
 
     def _smachpy_run_children(self, frame: Frame, plan: Plan) -> str:
@@ -264,8 +303,7 @@ class Concurrence(Container):
         each = bool(self._smachpy.child_termination_cb or self._smachpy.transition_cbs)
         group = frame.group = Group(frame, [*plan.steps.values()], each=each)
         try:
-            journal = frame.run.journal
-            if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
+            if self._smachpy.start_cbs and not frame.run.journal.has_begun(frame.path):
                 self.call_start_cbs()
             if self._preempt_requested:
                 return frame.end_preempted()
@@ -352,7 +390,7 @@ class Concurrence(Container):
         labels = [answer] if isinstance(answer, str) else answer
         if not isinstance(labels, (list, tuple, set, frozenset)):
             return group.running() if answer else []
-        known = self._smachpy.children
+        known = self._smachpy.others()
         unknown = sorted(set(labels) - set(known))
         if unknown:
             raise InvalidUserCodeError(
@@ -398,7 +436,7 @@ class Concurrence(Container):
         known = self._smachpy.outcomes
         if answer and answer not in known:
             raise InvalidTransitionError(unknown_name(f"{frame.path}: outcome_cb", answer, known))
-        return answer or None
+        return plain(answer) if answer else None
 
 
 def _outcomes(group: Group) -> dict[str, str | None]:

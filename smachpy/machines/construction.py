@@ -12,8 +12,8 @@ import types
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, NoReturn, ParamSpec, TypeVar
 
+from smachpy.base.slips import accepts
 from smachpy.exceptions import InconsistentMachineError, InvalidConstructionError
-from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -38,7 +38,7 @@ class construction_method(Generic[P, R_co]):  # noqa: N801  a decorator
     """A method that works on the innermost open container if it is called on the class."""
 
     def __init__(self, function: Callable[Concatenate[Any, P], R_co]) -> None:
-        self._function = function
+        self._function = self.__wrapped__ = function
         self.__doc__ = function.__doc__
 
     def __set_name__(self, owner: type, name: str) -> None:

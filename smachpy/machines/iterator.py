@@ -5,35 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from smachpy.base.problems import Problems, name_of, unknown_name
+from smachpy.base.slips import accepts
+from smachpy.engine.callback import call_bounded
+from smachpy.engine.child import run_child
+from smachpy.engine.described import ContainerData
+from smachpy.engine.errors import unknown_outcome
+from smachpy.engine.step import Plan
+from smachpy.engine.visit import End, Why, following
 from smachpy.events import Iterated
 from smachpy.exceptions import (
     InvalidStateError,
     InvalidUserCodeError,
-    SmachError,
     error_text,
 )
-from smachpy.introspection import RuleRecord, TransitionRecord
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import Container
-from smachpy.machines.problems import Problems, name_of, unknown_name
 from smachpy.machines.state import DataOf
-from smachpy.run.callback import call_bounded
-from smachpy.run.child import ContainerData
-from smachpy.run.grace import end_visit, unknown_outcome
-from smachpy.run.interrupt import Interruption
-from smachpy.run.step import Plan, run_watched, user_error
-from smachpy.run.visit import End, Why
-from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from collections.abc import Iterator as IteratorOf
     from typing import Unpack
 
-    from smachpy.introspection import Kind, Structure
+    from smachpy.base.names import Names
+    from smachpy.engine.frame import Frame
+    from smachpy.engine.step import Step
+    from smachpy.events.introspection import Kind, Structure
     from smachpy.machines.state import State, StateOptions
-    from smachpy.run.frame import Frame
-    from smachpy.run.step import Step
 
 __all__ = ["Iterator"]
 
@@ -70,6 +69,8 @@ class Iterator(Container):
         exhausted_outcome: Outcome when no item is left.
         name: Name of the machine when it is the root.
         userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
+        userdata: Key -> value with which every run begins; a copy, so no run sees what the one
+            before it has made of it.
         **options: See `StateOptions`.
     """
 
@@ -78,15 +79,16 @@ class Iterator(Container):
 
     def __init__(
         self,
-        outcomes: Iterable[str],
-        input_keys: Iterable[str],
-        output_keys: Iterable[str],
+        outcomes: Names,
+        input_keys: Names,
+        output_keys: Names,
         it: Iterable[Any] | Callable[[], Iterable[Any]] = (),
         it_label: str = "it_data",
         exhausted_outcome: str = "exhausted",
         *,
         name: str | None = None,
         userdata_type: type | None = None,
+        userdata: Mapping[str, Any] | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
         problems = Problems(type(self).__name__)
@@ -94,7 +96,13 @@ class Iterator(Container):
         names = (*problems.names("outcomes", outcomes), exhausted)
         with problems:
             super().__init__(
-                names, input_keys, output_keys, name=name, userdata_type=userdata_type, **options
+                names,
+                input_keys,
+                output_keys,
+                name=name,
+                userdata_type=userdata_type,
+                userdata=userdata,
+                **options,
             )
         self.__set_items(it, it_label, problems)
         problems.raise_all()
@@ -123,8 +131,8 @@ class Iterator(Container):
         self: Iterator,
         label: str,
         state: State,
-        loop_outcomes: Iterable[str] = (),
-        break_outcomes: Iterable[str] = (),
+        loop_outcomes: Names = (),
+        break_outcomes: Names = (),
         final_outcome_map: Mapping[str, str] | None = None,
         *,
         remapping: Mapping[str, str] | None = None,
@@ -181,7 +189,7 @@ class Iterator(Container):
 
     def get_active_states(self) -> list[str]:
         """Return the child's label while the iterator runs."""
-        return list(self._smachpy.children) if self._smachpy.frame is not None else []
+        return list(self._smachpy.children) if self._smachpy.live.frame is not None else []
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this iterator itself."""
@@ -214,6 +222,8 @@ class Iterator(Container):
 
     def describe_structure(self) -> Structure:
         """Return the child, its edges and the loop's rules."""
+        from smachpy.events.introspection import RuleRecord, TransitionRecord
+
         structure, data = super().describe_structure(), self._smachpy
         if not data.children:
             return structure
@@ -238,14 +248,13 @@ class Iterator(Container):
         plan, breaks = Plan(self), self.__breaks()
         for step in plan.steps.values():  # it leads to itself for the next item, or to an end
             step.next = {
-                outcome: End(outcome) if outcome in breaks else step
+                outcome: following(outcome, End(outcome) if outcome in breaks else step)
                 for outcome in step.state._smachpy.outcomes
             }
         return plan
 
     def _smachpy_run_children(self, frame: Frame, plan: Plan) -> str:
-        journal = frame.run.journal
-        if self._smachpy.start_cbs and (journal is None or not journal.resumes(frame)):
+        if self._smachpy.start_cbs and not frame.run.journal.has_begun(frame.path):
             self.call_start_cbs()
         (step,) = plan.steps.values()
         outcome = self.__loop(frame, step)
@@ -258,22 +267,20 @@ class Iterator(Container):
         """Run the child for item after item; return its last outcome, or the exhausted one."""
         run = frame.run
         for index in self.__numbers(frame):
-            frame.step = step  # first write the step, then read the flag: see `grace.ask`
-            if self._preempt_requested:
+            if self._preempt_requested:  # asked between two items
                 return frame.end_preempted(step.label)
             if run.watched:
                 frame.emit_own(Iterated, index)
-            again = True
-            while again:
-                outcome, why = self.__visit(frame, step)
-                # An operator jumps to the child itself after a pause that cancelled it.
-                again = why is Why.JUMPED
-            if why is Why.STOPPED:
+            decision = run_child(frame, step)
+            while decision.why is Why.JUMPED:  # after a pause that cancelled the child
+                decision = run_child(frame, step)
+            if decision.why is Why.STOPPED:
                 return frame.end_preempted(step.label)
-            if why is Why.ANSWERED:
+            outcome: str = decision.outcome
+            if decision.why is Why.ANSWERED:
                 frame.answered = True
                 return outcome
-            if step.next[outcome].final:
+            if decision.target.final:
                 return outcome
             if self._smachpy.transition_cbs:
                 self.call_transition_cbs()
@@ -286,43 +293,12 @@ class Iterator(Container):
         """
         journal, index = frame.run.journal, -1
         for index, item in enumerate(self.__iterate(frame)):
-            place = 1 if journal is None else journal.item(frame, index)
+            place = journal.item(frame, index)
             if place > 0:
                 self.userdata[self._smachpy.items_label] = item
             if place >= 0:
                 yield index
-        if journal is not None:
-            journal.check_items(frame, index + 1)
-
-    def __visit(self, frame: Frame, step: Step) -> tuple[str, Why]:
-        """Run the child once; return its outcome, or an operator's, and the reason."""
-        try:
-            outcome: Any = self.__run_child(frame, step)
-        except SmachError:
-            raise
-        except Interruption:
-            if frame.dead:
-                raise
-            outcome = "preempted"
-        except Exception as error:
-            raise user_error(step.path_in(frame), step.state, error) from error
-        visit = frame.visit
-        override = None if visit is None else visit.override
-        asked = self._preempt_requested or visit is not None or step.state._preempt_requested
-        if not asked and isinstance(outcome, str) and outcome in step.next:
-            return outcome, Why.FOLLOWED
-        why = end_visit(frame, outcome).why
-        if why is Why.FORCED and override is not None and override.outcome is not None:
-            outcome = override.outcome
-        return outcome, why
-
-    def __run_child(self, frame: Frame, step: Step) -> Any:
-        run = frame.run
-        if run.control is not None:
-            run.control.pass_gate(frame, step)
-            if self._preempt_requested or frame.visit is not None:  # called off during the pause
-                return "preempted"
-        return run_watched(frame, step) if run.watched else step.execute(step.userdata)
+        journal.check_items(frame, index + 1)
 
     def __iterate(self, frame: Frame) -> IteratorOf[Any]:
         """Yield the items; an exception of the user's iterable names the iterator."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from smachpy.base.slips import accepts
 from smachpy.machines.state import State
-from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

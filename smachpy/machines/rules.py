@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from smachpy.base.problems import as_number, plain, unique_names
 from smachpy.exceptions import InvalidStateError
-from smachpy.machines.problems import as_number, unique_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -77,7 +77,7 @@ def n_of(n: int, conditions: Mapping[str, str | Iterable[str]]) -> Rule:
 def as_rules(outcome_map: Mapping[str, Any]) -> tuple[tuple[str, Rule], ...]:
     """Convert an `outcome_map` to pairs (container outcome, rule)."""
     return tuple(
-        (outcome, rule if isinstance(rule, Rule) else all_of(rule))
+        (plain(outcome), rule if isinstance(rule, Rule) else all_of(rule))
         for outcome, rule in outcome_map.items()
     )
 
@@ -105,8 +105,8 @@ def _conditions(
         )
     made = []
     for label, wanted in conditions.items():
-        names = (wanted,) if isinstance(wanted, str) else unique_names(wanted, f"rule {label!r}")
+        names = unique_names([wanted] if isinstance(wanted, str) else wanted, f"rule {label!r}")
         if not names:  # it would never hold
             raise InvalidStateError(f"rule {label!r}: got no outcome; expected at least one.")
-        made.append((label, names))
+        made.append((plain(label) if isinstance(label, str) else label, names))
     return tuple(made)

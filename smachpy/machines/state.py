@@ -17,36 +17,48 @@ from typing import (
 )
 
 from actionlib_core.clock import current_clock
-from smachpy.context import THREAD, current_path
-from smachpy.exceptions import InvalidStateError
-from smachpy.introspection import Structure
-from smachpy.machines.problems import Problems, as_number, name_of, unique_names, unknown_arguments
-from smachpy.run.child import StateData
-from smachpy.run.frame import clock_of_run, current_scope
-from smachpy.run.grace import (
+from smachpy.base.context import THREAD, current_path
+from smachpy.base.problems import Problems, as_number, name_of, unique_names, unknown_arguments
+from smachpy.base.slips import accepts
+from smachpy.engine import frame as frames
+from smachpy.engine import step as steps
+from smachpy.engine.described import StateData
+from smachpy.engine.frame import clock_of_run, current_scope
+from smachpy.engine.options import NAMES, NO_OPTIONS, Options, Retry, changed
+from smachpy.engine.preempt import (
     REQUESTING,
     PreemptNotice,
     mark_preempt,
     note_serviced,
     on_preempt,
+    recall,
     wait_for_preempt,
 )
-from smachpy.run.options import NAMES, NO_OPTIONS, Options, Retry, changed
-from smachpy.run.step import get_options
-from smachpy.slips import accepts
-from smachpy.util import has_smach_interface
+from smachpy.events import Noted
+from smachpy.exceptions import InvalidStateError
+from smachpy.machines.util import has_smach_interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterable, Mapping
     from typing import Self, Unpack
 
     from actionlib_core.clock import Clock
-    from smachpy.introspection import Kind
-    from smachpy.run.frame import Frame, Scope
-    from smachpy.run.options import Result
+    from smachpy.base.names import Names
+    from smachpy.engine.frame import Frame, Scope
+    from smachpy.engine.options import Result
+    from smachpy.events.introspection import Kind, Structure
     from smachpy.userdata.user_data import Remapper, UserData
 
-__all__ = ["CBState", "Options", "Retry", "State", "StateOptions", "get_options", "set_options"]
+__all__ = [
+    "CBState",
+    "Options",
+    "Retry",
+    "State",
+    "StateOptions",
+    "current_state",
+    "get_options",
+    "set_options",
+]
 
 Data_co = TypeVar("Data_co", bound=StateData, covariant=True)
 T_co = TypeVar("T_co", covariant=True)
@@ -56,6 +68,10 @@ Grace: TypeAlias = float | Literal["inherit"] | None
 RetrySpec: TypeAlias = (
     "Retry | tuple[int, float, Result | Iterable[Result]] | tuple[int, float] | int | None"
 )
+
+
+LONGEST_NOTE = 200
+"""Characters of a note that are kept."""
 
 
 class StateOptions(TypedDict, total=False):
@@ -70,7 +86,7 @@ class StateOptions(TypedDict, total=False):
         retry: `Retry(attempts, backoff, on)`, or that as a tuple, or the number of attempts.
         on_exception: Exception type -> outcome; the outcomes are registered automatically.
         on_enter: Called with the userdata before the state runs.
-        on_exit: Called with the userdata and the outcome after it ran.
+        on_exit: Called with the userdata and the outcome after it ran; None if it has raised.
         resume: What a resumed durable run does with this state if it was active when the process
             ended, instead of executing it again: "skip:OUTCOME" ends it with that outcome, "ask"
             pauses the machine until an operator decides, `resume(userdata)` returns the outcome or
@@ -79,6 +95,9 @@ class StateOptions(TypedDict, total=False):
             container with its own userdata.
         idempotent: For an action state: its goal may be sent again if the server does not know it.
         transient: For a container: keys of its userdata that the journal does not keep.
+        success: The outcomes that are good. All others count as failures, or as preempts if they
+            are called so. None, the default, goes by their names (docs/outcomes.md). Exit codes,
+            colours, statistics and reports use it.
     """
 
     timeout: float | None
@@ -87,11 +106,12 @@ class StateOptions(TypedDict, total=False):
     retry: RetrySpec
     on_exception: Mapping[type[BaseException], str] | None
     on_enter: Callable[[Any], object] | None
-    on_exit: Callable[[Any, str], object] | None
+    on_exit: Callable[[Any, Any], object] | None
     resume: str | Callable[[Any], str | None] | None
     on_resume: Callable[[Any], object] | None
     idempotent: bool
     transient: Iterable[str]
+    success: Iterable[str] | None
 
 
 class DataOf(Generic[Data_co]):
@@ -139,6 +159,8 @@ class Shown(Generic[T_co]):
 class State:
     """One thing a robot does: it reads userdata, runs, and ends with one of its outcomes.
 
+    For what has attributes, helper methods or hooks; other ways: docs/howto/which_way.md.
+
     Subclass it and define `execute(self, userdata)`, plain or `async`; the rest is optional. The
     options (see `StateOptions`) work for every state, including containers, when a container runs
     it. You may use any attribute name in a state; `get_options` and `set_options` read and change
@@ -173,10 +195,10 @@ class State:
 
     def __init__(
         self,
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        outcomes: Names = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        io_keys: Names = (),
         **options: Unpack[StateOptions],
     ) -> None:
         problems = Problems(type(self).__name__)
@@ -284,8 +306,13 @@ class State:
                 note_serviced(self)
 
     def recall_preempt(self) -> None:
-        """Withdraw a request."""
-        self._preempt_requested = False
+        """Withdraw a request; called by the state itself, that ends its grace too.
+
+        A later request starts a new one. What was told already, such as the children of a container
+        or a goal that was cancelled, stays so. An `async` state that goes on after this also calls
+        `uncancel()` of its task, or a later request does not cancel it.
+        """
+        recall(self)
 
     def preempt_requested(self) -> bool:
         """Return whether the state was asked to stop."""
@@ -316,6 +343,17 @@ class State:
         Blocks: for `seconds`, or until the preempt.
         """
         return _wait_preempt(self, "sleep: seconds", seconds)
+
+    def note(self, text: str) -> None:
+        """Say in a few words what the state is about now: `self.note("aisle 7")`.
+
+        The page, the list of runs, the log and the terminal show it beside the state's name until
+        the next note or visit. Recordings have it as an event `Noted`. The first 200 characters
+        are kept.
+        """
+        scope = current_scope()
+        if scope is not None:
+            scope.emit(Noted, str(text)[:LONGEST_NOTE])
 
     def on_preempt(self, callback: Callable[[], object]) -> Callable[[], None]:
         """Call `callback` on each request to stop, and at once if there is one already.
@@ -376,7 +414,9 @@ class State:
 
     def describe_structure(self) -> Structure:
         """Return the children and transitions; a leaf has none."""
-        return Structure()
+        from smachpy.events.introspection import Structure
+
+        return Structure(success=self._smachpy.options.success)
 
     def _smachpy_set_options(self, options: Mapping[str, Any], problems: Problems) -> None:
         """Set options; invalid values are added to `problems`.
@@ -400,6 +440,26 @@ def _read_only(state: State) -> InvalidStateError:
         "a preempt is noted in one. Try the dataclass without frozen=True."
     )
     return InvalidStateError(f"{name}: {problem}", [problem])
+
+
+# These two are here for their types: the engine knows a state only as what it runs.
+def current_state() -> State | Any:
+    """Return the state that runs in this thread or task; None outside of any state."""
+    return frames.current_state()
+
+
+def get_options(state: State) -> Options:
+    """Return the options of `state`, including hooks that are methods of its class.
+
+    The hooks are `on_enter(self, userdata)`, `on_exit(self, userdata, outcome)`,
+    `resume(self, userdata)` and `on_resume(self, userdata)`; further arguments may have defaults. A
+    method of one of these names that cannot be called so belongs to the user, and is not called.
+
+    Raises:
+        InvalidStateError: a hook is `async` or a generator, so that nothing would run its body.
+    """
+    found: Any = state
+    return steps.get_options(found)
 
 
 def set_options(state: State, **options: Unpack[StateOptions]) -> None:
@@ -440,6 +500,8 @@ def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
 class CBState(State):
     """A state that calls a function.
 
+    For functions of programs for SMACH; in new code `@smachpy.state`: docs/howto/which_way.md.
+
     Args:
         cb: Called as `cb(userdata, *cb_args, **cb_kwargs)`; returns the outcome. May be `async`.
         cb_args: Positional arguments.
@@ -458,10 +520,10 @@ class CBState(State):
         cb: Callable[..., Any],
         cb_args: Iterable[Any] = (),
         cb_kwargs: Mapping[str, Any] | None = None,
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        outcomes: Names = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        io_keys: Names = (),
         **options: Unpack[StateOptions],
     ) -> None:
         problems = Problems(type(self).__name__)
@@ -470,6 +532,7 @@ class CBState(State):
         self.__args = problems.values("cb_args", cb_args)
         self.__kwargs = problems.mapping("cb_kwargs", cb_kwargs, "name -> value")
         self._smachpy.code = (cb,)
+        self._smachpy.is_function = type(self).__module__ == __name__  # no subclass of the user's
         self._smachpy.is_async = inspect.iscoroutinefunction(cb)
         call = "cb(userdata, *cb_args, **cb_kwargs)"
         count = 1 + len(self.__args)
@@ -497,10 +560,10 @@ class FunctionState(CBState):
     def __init__(
         self,
         function: Callable[..., Any],
-        outcomes: Iterable[str] = (),
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        outcomes: Names = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
+        io_keys: Names = (),
         **options: Unpack[StateOptions],
     ) -> None:
         super().__init__(function, (), None, outcomes, input_keys, output_keys, io_keys, **options)
@@ -526,13 +589,15 @@ class _StateDecorator:
 
     def __call__(
         self,
-        outcomes: Iterable[str],
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
-        io_keys: Iterable[str] = (),
+        outcomes: Names,
+        input_keys: Names = (),
+        output_keys: Names = (),
+        io_keys: Names = (),
         **options: Unpack[StateOptions],
-    ) -> Callable[[Callable[..., Any]], FunctionState]:
+    ) -> Callable[[Callable[[Any], str | Coroutine[Any, Any, str]]], FunctionState]:
         """Turn a function `f(userdata) -> outcome`, plain or `async`, into a state.
+
+        For functions without a memory; other ways: docs/howto/which_way.md.
 
             @smachpy.state(outcomes=["charged", "failed"], output_keys=["level"])
             def charge(userdata):
@@ -557,7 +622,7 @@ class _StateDecorator:
         Threads: the function runs in the thread of its container.
         """
 
-        def make(function: Callable[..., Any]) -> FunctionState:
+        def make(function: Callable[[Any], str | Coroutine[Any, Any, str]]) -> FunctionState:
             return FunctionState(function, outcomes, input_keys, output_keys, io_keys, **options)
 
         return make

@@ -7,8 +7,8 @@ Each is a state for `sm.add(...)`, or a function that makes one: `drive_to`, `tu
 from __future__ import annotations
 
 from smachpy.exceptions import MissionError
-from smachpy.sim.exceptions import InputFileError, NavigationError
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.exceptions import InputFileError, NavigationError
+from smachpy.places.pose import Pose2D
 from smachpy.states.ask_operator import AskOperator
 from smachpy.states.driving import (
     DRIVE_TIMEOUT,
@@ -18,9 +18,9 @@ from smachpy.states.driving import (
     drive_to,
     goal_at,
     locate,
-    pose_of,
     turn,
 )
+from smachpy.states.localising import pose_of
 from smachpy.states.nav2 import nav2_active
 from smachpy.states.progress import Progress
 from smachpy.states.questions import (

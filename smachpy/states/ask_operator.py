@@ -22,13 +22,13 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, Subscriber
-from smachpy import State, UserData
+from smachpy.base.log import logwarn
+from smachpy.base.problems import Problems, name_of
+from smachpy.engine.frame import current_scope
+from smachpy.engine.preempt import on_preempt
 from smachpy.events import QuestionAnswered, QuestionAsked
 from smachpy.exceptions import MissionError
-from smachpy.log import logwarn
-from smachpy.machines.problems import Problems, name_of
-from smachpy.run.frame import current_scope
-from smachpy.run.grace import on_preempt
+from smachpy.machines.state import State
 from smachpy.states.questions import (
     AnswerQuestion,
     AnswerRefusedError,
@@ -44,8 +44,9 @@ if TYPE_CHECKING:
 
     from actionlib_core.interfaces.std_srvs.srv import SetBoolRequest
     from actionlib_core.node import Node
-    from smachpy.introspection import Kind
-    from smachpy.run.frame import Scope
+    from smachpy.engine.frame import Scope
+    from smachpy.events.introspection import Kind
+    from smachpy.userdata.user_data import UserData
 
 YES_NO = ("yes", "no")
 NO_ANSWER = "no_answer"

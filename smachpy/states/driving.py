@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actionlib_core.interfaces.geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Header
-from smachpy import InvalidStateError, MonitorState, SimpleActionState
-from smachpy.context import current_path
-from smachpy.machines.problems import as_number
-from smachpy.sim.geometry import Pose2D, quaternion_of, yaw_of
+from smachpy.actions.simple_action_state import SimpleActionState
+from smachpy.actions.wakeup import Wakeup, answer_preempt
+from smachpy.base import log
+from smachpy.base.context import current_path
+from smachpy.base.problems import Problems, as_number
+from smachpy.exceptions import InvalidStateError
+from smachpy.machines.state import State
+from smachpy.places.pose import Pose2D, quaternion_of
+from smachpy.states.localising import MAP_FRAME, Localiser, pose_of, pose_problem
 
 if TYPE_CHECKING:
-    from smachpy import UserData
+    from smachpy.events.introspection import Kind
+    from smachpy.userdata.user_data import UserData
 
 SIGNAL_TIMEOUT: Final = 5.0  # [s] a robot's own topic that is silent for this long is not there
 DRIVE_TIMEOUT: Final = 600.0  # [s] longer than any drive in a building
 TURN_TIMEOUT: Final = 60.0  # [s]
 
 
-def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
+def goal_at(pose: Pose2D, frame: str = MAP_FRAME) -> MoveBaseGoal:
     """Return the `move_base` goal that drives to a pose.
 
     Args:
@@ -41,13 +47,6 @@ def goal_at(pose: Pose2D, frame: str = "map") -> MoveBaseGoal:
     heading = Quaternion(*quaternion_of(pose.yaw))
     there = Pose(position=Point(pose.x, pose.y, 0.0), orientation=heading)
     return MoveBaseGoal(target_pose=PoseStamped(header=Header(frame_id=frame), pose=there))
-
-
-def pose_of(message: Pose) -> Pose2D:
-    """Return position and heading [m, m, rad] of a pose message, in the message's frame."""
-    turned = message.orientation
-    yaw = yaw_of(turned.x, turned.y, turned.z, turned.w)
-    return Pose2D(message.position.x, message.position.y, yaw)
 
 
 def drive_to(
@@ -72,8 +71,13 @@ def drive_to(
         value = userdata[place]
         pose = getattr(value, "pose", value)
         header = getattr(value, "header", None)
-        frame = "map" if header is None else header.frame_id or "map"
-        return goal_at(pose if isinstance(pose, Pose2D) else pose_of(pose), frame)
+        frame = MAP_FRAME if header is None else header.frame_id or MAP_FRAME
+        if not isinstance(pose, Pose2D):
+            problem = pose_problem(pose)
+            if problem:
+                raise InvalidStateError(f"{current_path() or 'drive_to'}: {place}: {problem}.")
+            pose = pose_of(pose)
+        return goal_at(pose, frame)
 
     keys = [*options.pop("input_keys", ()), place]
     return SimpleActionState(action, MoveBaseAction, goal_cb=goal, input_keys=keys, **options)
@@ -106,28 +110,68 @@ def turn(degrees: float, **options: Any) -> SimpleActionState:
     return SimpleActionState("move_base", MoveBaseAction, goal=goal, **options)
 
 
-def locate(key: str = "here", topic: str = "odom") -> MonitorState:
-    """Return a state that writes the robot's pose to a userdata key.
+def locate(key: str = "here", topic: str = "odom") -> Locate:
+    """Return a state that writes the robot's pose in the map frame to a userdata key.
 
-    Outcomes: 'valid', 'invalid', 'preempted', and 'aborted' after 5 s without odometry.
+    Outcomes: 'valid', 'invalid', 'preempted', 'aborted'; see `Locate`.
 
     Args:
-        key: The userdata key that gets the pose, a `Pose2D` [m, m, rad]. It is in the odometry's
-            frame, usually "odom"; `drive_to` takes it for the map frame. With odometry that drifts,
-            name a topic with odometry in the map frame.
+        key: The userdata key that gets the pose, a `Pose2D` [m, m, rad].
+        topic: A topic of `nav_msgs/Odometry`. Its frame need not be the map: the transforms on
+            `/tf` and `/tf_static`, which a localisation sends, are applied.
+    """
+    return Locate(key, topic)
+
+
+class Locate(State):
+    """Writes the robot's pose in the map frame to a userdata key.
+
+    Outcomes: 'valid'; 'aborted' after 5 s without odometry; 'invalid' if there is odometry, but
+    after 5 s it still has no place in the map, which is logged with the reason; 'preempted'.
+
+    Args:
+        key: The userdata key that gets the pose, a `Pose2D` [m, m, rad].
         topic: A topic of `nav_msgs/Odometry`.
+
+    Raises:
+        InvalidStateError: an argument is wrong; all problems at once.
     """
 
-    def note(userdata: UserData, odometry: Odometry) -> bool:
-        userdata[key] = pose_of(odometry.pose.pose)
-        return True
+    _smachpy_kind: ClassVar[Kind] = "monitor"
 
-    return MonitorState(
-        topic,
-        Odometry,
-        note,
-        max_checks=1,
-        output_keys=[key],
-        timeout=SIGNAL_TIMEOUT,
-        latest=True,
-    )
+    def __init__(self, key: str = "here", topic: str = "odom") -> None:
+        problems = Problems("Locate")
+        self.__key = problems.word("key", key)
+        self.__topic = problems.network_name("topic", topic)
+        problems.raise_all()
+        super().__init__(["valid", "invalid", "preempted", "aborted"], output_keys=[key])
+
+    def execute(self, userdata: UserData) -> str:
+        """Wait for the pose.
+
+        Blocks: 5 s at most, or until a preempt.
+        """
+        with Wakeup(self) as wake:
+            localiser = Localiser(self.__topic, changed=wake.set)
+            try:
+                until = wake.clock.now() + SIGNAL_TIMEOUT
+                while not answer_preempt(self):
+                    wake.clear()
+                    pose, problem = localiser.pose()
+                    if pose is not None:
+                        userdata[self.__key] = pose
+                        return "valid"
+                    if wake.clock.now() >= until:
+                        log.logwarn(f"{current_path()}: {problem}.")
+                        return "invalid" if localiser.heard else "aborted"
+                    wake.wait_until(until)
+            finally:
+                localiser.close()
+        return "preempted"
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the topic and the limit."""
+        kind, details = super().describe_details()
+        limit = f"{SIGNAL_TIMEOUT:g} s -> aborted"
+        own = (("topic", self.__topic), ("type", Odometry._type), ("checks", "1"))
+        return kind, (*own, ("timeout", limit), *details)

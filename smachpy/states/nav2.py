@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.interfaces import ros2
-from smachpy import StateMachine
 from smachpy.actions.service_state import ServiceState
+from smachpy.machines.state_machine import StateMachine
 from smachpy.states.waiting import Wait
 
 if TYPE_CHECKING:
-    from smachpy import UserData
+    from smachpy.userdata.user_data import UserData
 
 ASKED_EVERY_S = 1.0
 ANSWER_S = 5.0

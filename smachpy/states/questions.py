@@ -17,12 +17,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.inputs.checked_data import checked
+from actionlib_core.inputs.json_text import load_json
 from actionlib_core.interfaces import define_service
 from actionlib_core.node import get_node
+from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.encoding import encoding_of
-from actionlib_core.wire.presence import Kind, list_endpoints
+from actionlib_core.wire.presence import list_endpoints
+from smachpy.base.log import logwarn
 from smachpy.exceptions import SmachError, did_you_mean
-from smachpy.log import logwarn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -48,8 +51,11 @@ uint8[] picture
 CALL_S: Final = 3.0
 """Time for a mission to accept an answer [s]."""
 
-LONGEST_BY: Final = 200
-MOST_BYTES: Final = 4_000_000
+MAX_AUTHOR_LENGTH: Final = 200
+MAX_QUESTION_LENGTH: Final = 1_000_000
+"""Longest text of a question [characters]."""
+
+MAX_PICTURE_BYTES: Final = 4_000_000
 """Limit of a picture [bytes]."""
 
 _MEDIA = (
@@ -57,11 +63,12 @@ _MEDIA = (
     (b"\xff\xd8\xff", "image/jpeg"),
     (b"GIF8", "image/gif"),
 )
-MEDIA_TYPES = frozenset(media for _, media in _MEDIA)
 
 
 class AnswerRefusedError(SmachError):
     """An answer was refused: it is not possible, it came too late, or the question is gone.
+
+    Try: give one of the answers that the question lists, before its time is over.
 
     Attributes:
         answer: The answer.
@@ -137,7 +144,7 @@ class Inbox:
                 over = f"answered {first!r} by {who}" if who else f"over: {first!r}"
                 reason = f"expected none: it is {over}."
                 raise AnswerRefusedError(self._where, text, reason)
-            self.answer = meant, by[:LONGEST_BY] or "somebody"
+            self.answer = meant, by[:MAX_AUTHOR_LENGTH] or "somebody"
         self._on_answer()
         return meant
 
@@ -175,7 +182,7 @@ def find_questions(node: Node | None = None) -> list[Question]:
                 reply = _call(node, end.name, AnswerQuestion._request_class())
                 if reply is not None:  # else it has just been answered
                     found.append(_read(reply.question, end.name))
-            except (ActionlibError, ValueError, TypeError, KeyError) as error:
+            except (ActionlibError, ValueError) as error:
                 logwarn(f"{end.name}: not read: {type(error).__name__}: {error}")
     return sorted(found, key=lambda one: (one.path, one.service))
 
@@ -217,9 +224,13 @@ def fetch_picture(service: str, *, node: Node | None = None) -> tuple[str, bytes
     """
     make: Any = AnswerQuestion._request_class
     reply = _call(node or get_node(), service, make(picture=True))
-    if reply is None or reply.media_type not in MEDIA_TYPES:
+    if reply is None or not reply.picture:
         return None
-    return reply.media_type, bytes(reply.picture)
+    try:
+        return read_picture(bytes(reply.picture))  # by its bytes: the named type may be wrong
+    except ValueError as error:
+        logwarn(f"{service}: picture: {error}")
+        return None
 
 
 def question_text(question: Question, left: float) -> str:
@@ -242,15 +253,15 @@ def read_picture(value: Any) -> tuple[str, bytes]:
     """
     if hasattr(value, "__fspath__") or isinstance(value, str):
         with Path(value).open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+            data = file.read(MAX_PICTURE_BYTES + 1)
     else:
         data = getattr(value, "data", value)
         if not isinstance(data, (bytes, bytearray, memoryview)):
             kind = type(value).__name__
             raise ValueError(f"got {kind}; expected bytes, a path or a CompressedImage.")
         data = bytes(data)
-    if len(data) > MOST_BYTES:
-        raise ValueError(f"got more than {MOST_BYTES} bytes; expected fewer.")
+    if len(data) > MAX_PICTURE_BYTES:
+        raise ValueError(f"got more than {MAX_PICTURE_BYTES} bytes; expected fewer.")
     media = next((media for start, media in _MEDIA if data.startswith(start)), None)
     if media is None:
         raise ValueError(f"got bytes that begin with {data[:8]!r}; expected PNG, JPEG or GIF.")
@@ -258,9 +269,11 @@ def read_picture(value: Any) -> tuple[str, bytes]:
 
 
 def _read(text: str, service: str) -> Question:
-    told = json.loads(text)
-    told["answers"], told["words"] = tuple(told["answers"]), tuple(told["words"])
-    return Question(**told, service=service)
+    told = load_json(text, longest=MAX_QUESTION_LENGTH)
+    if isinstance(told, dict):
+        told["service"] = service
+    question: Question = checked(Question, told, known_only=True)
+    return question
 
 
 def _call(node: Node, service: str, request: Any) -> Any:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
-from smachpy import State, StateMachine, UserData
-from smachpy.machines.problems import Problems
+from smachpy.base.problems import Problems
+from smachpy.machines.state import State
+from smachpy.machines.state_machine import StateMachine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from smachpy.machines.container import Container
+    from smachpy.userdata.user_data import UserData
 
 
 class Closeable(Protocol):

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.pubsub.topic import Subscriber
-from smachpy import State, UserData
-from smachpy.machines.problems import Problems
-from smachpy.run.frame import clock_of_run
-from smachpy.run.grace import on_preempt
+from smachpy.base.problems import Problems
+from smachpy.engine.frame import clock_of_run
+from smachpy.engine.preempt import on_preempt
+from smachpy.machines.state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from smachpy.introspection import Kind
+    from smachpy.events.introspection import Kind
+    from smachpy.userdata.user_data import UserData
 
 
 class AwaitMessage(State):
@@ -60,7 +61,8 @@ class AwaitMessage(State):
 
         forget = on_preempt(self, wake.set)
         try:
-            with Subscriber(self.__topic, self.__msg_type, on_message):
+            subscriber = Subscriber(self.__topic, self.__msg_type, on_message)
+            with subscriber, subscriber.telling():
                 wake.wait(self.__longest)
         finally:
             forget()

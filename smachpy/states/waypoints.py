@@ -7,19 +7,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits, parse_yaml
 from actionlib_core.exceptions import InvalidNameError
+from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Limits, parse_yaml
 from actionlib_core.names import check_name
-from smachpy.sim.config import SimConfig, load_config, read_file
-from smachpy.sim.exceptions import InputFileError, NavigationError
-from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.places.exceptions import InputFileError, NavigationError
+from smachpy.places.pose import Pose2D, wrap_angle
+from smachpy.places.robot_file import SimConfig, load_config, read_file
 from smachpy.userdata.kept_types import register_type
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from actionlib_core.checked_file import Section
-    from smachpy.sim.floor import Floor
+    from actionlib_core.inputs.checked_file import Section
+    from smachpy.places.floor import Floor
 
 _SHARE: Final = Limits(low=0.0, high=1.0)
 
@@ -83,7 +83,7 @@ class PlaceFile(CheckedFile):
     ) -> None:
         parse = parse_yaml
         if csv_rows and path.suffix.lower() == ".csv":
-            from smachpy.sim.checked_csv import parse_csv
+            from smachpy.places.checked_csv import parse_csv
 
             parse = partial(parse_csv, key=csv_rows, texts=csv_texts)
         super().__init__(path, InputFileError, parse)
@@ -91,8 +91,8 @@ class PlaceFile(CheckedFile):
         self.top.allow("map", "robot")
         robot = read_file(self.top, "robot", load_config) if "robot" in self.top else SimConfig()
         if "map" in self.top or map_file is not None:
-            from smachpy.sim.floor import Floor
-            from smachpy.sim.occupancy import load_map
+            from smachpy.places.floor import Floor
+            from smachpy.places.occupancy import load_map
 
             grid = read_file(self.top, "map", load_map, map_file)
             if grid is not None and robot is not None:

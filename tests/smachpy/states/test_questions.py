@@ -15,7 +15,7 @@ from smachpy.events import QuestionAnswered, QuestionAsked
 from smachpy.exceptions import MissionError
 from smachpy.states.ask_operator import AskOperator
 from smachpy.states.questions import (
-    MOST_BYTES,
+    MAX_PICTURE_BYTES,
     AnswerRefusedError,
     Inbox,
     fetch_picture,
@@ -200,7 +200,7 @@ def test_the_question_may_be_made_of_userdata_and_have_a_picture(ask, heard):
     [
         lambda _: 1 / 0,
         lambda _: b"<svg onload=alert(1)>",
-        lambda _: PNG + bytes(MOST_BYTES),
+        lambda _: PNG + bytes(MAX_PICTURE_BYTES),
         lambda _: 7,
         lambda _: "/nowhere/picture.png",
     ],

@@ -6,10 +6,20 @@ import math
 
 import pytest
 
+from actionlib_core.interfaces.geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    TransformStamped,
+    Vector3,
+)
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
-from actionlib_core.interfaces.std_msgs.msg import Bool
+from actionlib_core.interfaces.std_msgs.msg import Bool, Header
+from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from smachpy import InvalidStateError, StateMachine
+from smachpy.places.pose import quaternion_of
 from smachpy.states import (
     AwaitMessage,
     Pose2D,
@@ -159,6 +169,76 @@ def test_locating_writes_the_pose(mission):
     machine = alone(locate("home"))
     mission(machine).assert_outcome("valid")
     assert machine.userdata.home == pytest.approx(PLACE)
+
+
+def odometry(pose=PLACE, frame="odom", **orientation):
+    message = Odometry(header=Header(frame_id=frame))
+    message.pose.pose = Pose(Point(pose.x, pose.y, 0.0), Quaternion(*quaternion_of(pose.yaw)))
+    for field, value in orientation.items():
+        setattr(message.pose.pose.orientation, field, value)
+    return message
+
+
+NOWHERE = {
+    "NaN": odometry(Pose2D(math.nan, 2.0, 0.0), "map"),
+    "infinite": odometry(Pose2D(1.0, math.inf, 0.0), "map"),
+    "no orientation": odometry(frame="map", z=0.0, w=0.0),
+    "NaN orientation": odometry(frame="map", z=math.nan),
+    "another frame": odometry(),
+}
+
+
+@pytest.mark.parametrize("name", NOWHERE)
+def test_locating_writes_no_place_that_is_none(mission, name, caplog):
+    mission.topic("odom", Odometry).publish(NOWHERE[name], latch=True)
+    machine = alone(locate("home"))
+    run = mission(machine)
+    run.assert_outcome("invalid")
+    assert run.duration == 5.0
+    assert "home" not in machine.userdata
+
+
+def test_locating_waits_until_the_robot_is_localised(mission):
+    topic = mission.topic("odom", Odometry)
+    topic.publish(NOWHERE["NaN"], latch=True)
+    topic.publish_at(2.0, odometry(frame="/map"))
+    machine = alone(locate())
+    run = mission(machine)
+    run.assert_outcome("valid")
+    assert run.duration == 2.0
+    assert machine.userdata.here == pytest.approx(PLACE)
+
+
+def localisation(parent="map", child="odom", **rotation):
+    made = TransformStamped(Header(frame_id=parent), child)
+    made.transform.translation = Vector3(10.0, 20.0, 0.0)
+    made.transform.rotation = Quaternion(*quaternion_of(math.pi / 2))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "frames"),
+    [
+        ("/tf", [localisation()]),
+        ("/tf_static", [localisation()]),
+        ("/robot_0/tf", [localisation()]),
+        ("/tf", [localisation(child="bad/"), localisation("map", "world"), localisation("map")]),
+    ],
+)
+def test_locating_applies_the_transforms_of_a_localisation(mission, name, frames):
+    mission.topic("/robot_0/odom", Odometry).publish(odometry(), latch=True)
+    mission.topic(name, TFMessage).publish(TFMessage(frames), latch=True)
+    machine = alone(locate(topic="robot_0/odom"))
+    mission(machine).assert_outcome("valid")
+    assert machine.userdata.here == pytest.approx((8.0, 21.0, math.pi / 2 + 0.5))
+
+
+@pytest.mark.parametrize("orientation", [{"z": 0.0, "w": 0.0}, {"z": math.nan}])
+def test_no_goal_is_sent_for_a_pose_that_nobody_has_filled_in(mission, base, orientation):
+    place = odometry(**orientation).pose.pose
+    with pytest.raises(InvalidStateError, match="place: got"):
+        mission(alone(drive_to("place"), place=PoseStamped(Header(frame_id="map"), place)))
+    assert not base.goals
 
 
 def test_locating_gives_up_without_odometry(mission):

@@ -1,0 +1,268 @@
+"""The library's data of one state or container; all other attributes of it belong to the user.
+
+`smachpy.engine` runs what is described here and imports no states; `smachpy.machines` builds them.
+A description holds what the user said. What belongs to its runs is in one object beside it, `Live`,
+which no copy, comparison or file of a machine concerns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+from smachpy.base.problems import unique_names
+from smachpy.engine.journal import NO_JOURNAL, RunJournal
+from smachpy.engine.options import NO_OPTIONS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from typing import Self, TypeAlias
+
+    from actionlib_core.clock import Event as ClockEvent
+    from smachpy.engine.frame import Frame, Gate
+    from smachpy.engine.options import Options
+    from smachpy.engine.visit import Origin
+    from smachpy.events import Event
+    from smachpy.events.buffer import EventBuffer
+    from smachpy.userdata.user_data import UserData
+
+    Callback: TypeAlias = tuple[Callable[..., object], tuple[Any, ...]]
+
+
+class _Epoch:
+    """Its value is replaced whenever anything changes that a run keeps in a compiled form.
+
+    These are the interfaces of states, and the callbacks, initial states, subscribers and control
+    of machines. A run compares one object instead of asking every state below it whether it has
+    changed. It is no counter, because two threads that increase one at once may count one change
+    only.
+    """
+
+    value = object()
+
+
+EPOCH = _Epoch()
+NESTED = _Epoch()
+"""The same for the structure of what is inside of any container."""
+
+
+@dataclass(slots=True, eq=False)
+class StateData:
+    """The library's data of one state.
+
+    Attributes:
+        outcomes: Its outcomes.
+        input_keys: Keys that it reads.
+        output_keys: Keys that it writes.
+        options: Its options.
+        version: Increases with each change of the above.
+        with_hooks: Its options, and the same options with the hooks of its class; None until
+            needed.
+        preempt_callbacks: Called on each request to stop.
+        is_async: Its callback is a coroutine function.
+        code: The user's functions that get its userdata, and the messages made from it.
+        is_function: It is nothing but a function of the user, so that a copy does the same.
+        made_from: How a file names it; see `smachpy.files`. None for a state from code.
+        is_shared: Two machines that run at the same time have it: each runs a copy.
+        is_child: It is, or was, in a container.
+    """
+
+    outcomes: tuple[str, ...] = ()
+    input_keys: tuple[str, ...] = ()
+    output_keys: tuple[str, ...] = ()
+    options: Options = NO_OPTIONS
+    version: int = 0
+    with_hooks: tuple[Options, Options] | None = None
+    is_async: bool = False
+    code: tuple[Any, ...] = ()
+    is_function: bool = False
+    is_shared: bool = False
+    is_child: bool = False
+    made_from: Any = None
+    preempt_callbacks: list[Callable[[], object]] = field(default_factory=list)
+
+    def add(self, name: str, names: Iterable[str]) -> None:
+        """Add outcomes or keys to the attribute `name`."""
+        argument = name.replace("_", " ")
+        more = unique_names(names, argument)
+        setattr(self, name, unique_names((*getattr(self, name), *more), argument))
+        self.changed()
+
+    def changed(self) -> None:
+        """Mark the plans of all machines with this state as stale."""
+        self.version += 1
+        EPOCH.value = object()
+        self.restructured()
+
+    def restructured(self) -> None:
+        """Mark what was found out about the structure of containers above it as stale."""
+        if self.is_child:
+            NESTED.value = object()
+
+    def copy(self) -> Self:
+        """Return the data for a copy of the state, without anything that belongs to a run."""
+        made = type(self)()
+        flags = ("is_async", "is_function", "made_from")
+        for name in ("outcomes", "input_keys", "output_keys", "options", "version", "code", *flags):
+            setattr(made, name, getattr(self, name))
+        return made
+
+
+@dataclass(slots=True, eq=False)
+class Live:
+    """What belongs to the runs of one container: where it runs, who watches and controls it.
+
+    Attributes:
+        frame: Where it runs; None between runs, and between two attempts of one run.
+        root: The root's frame while it runs as the root of a machine.
+        callback: The frame of its callback or hook that runs now, or None.
+        plan: Its children, compiled; None when they have changed.
+        listeners: Called with each event of it and of all below it.
+        buffers: Event buffers that take the same events.
+        control: The operator's control, once it was used.
+        journal: The journal of its next run as a root.
+        origin: Who asked it to stop before its run.
+        runs: Number of its runs that have begun.
+        is_passing_on: A request to stop is being passed on to its children.
+        end_waiters: Events to set when it stops running.
+        goes_on: Its next run goes on where the last one was interrupted: with its userdata.
+    """
+
+    frame: Frame | None = None
+    root: Frame | None = None
+    callback: Any = None  # a smachpy.engine.callback.CallbackFrame, which imports this module
+    plan: Any = None
+    listeners: tuple[Callable[[Event], object], ...] = ()
+    buffers: tuple[EventBuffer, ...] = ()
+    control: Gate | None = None
+    journal: RunJournal = NO_JOURNAL
+    origin: Origin | None = None
+    runs: int = 0
+    is_passing_on: bool = False
+    end_waiters: list[ClockEvent] = field(default_factory=list)
+    goes_on: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class ContainerData(StateData):
+    """The library's data of one container.
+
+    Attributes:
+        children: Label -> child, in the order in which they were added.
+        remappings: Label -> key of the child -> key of the container.
+        cleanup: The label of the child that runs at every end of the others; "" for none.
+        begins_with: Key -> value of its userdata at the start of each run.
+        start_cbs: Called at the start of each run; each with its extra arguments.
+        transition_cbs: The same, after each transition.
+        termination_cbs: The same, at the end.
+        open_tokens: One for each `with` block in which it is open.
+        context_kwargs: The arguments of `opened`.
+        checked: The `NESTED.value` for which it and all below it had no problems.
+        depth: Levels of containers then, itself included.
+        live: Its side of the runs.
+    """
+
+    children: dict[str, Any] = field(default_factory=dict)
+    remappings: dict[str, dict[str, str]] = field(default_factory=dict)
+    cleanup: str = ""
+    begins_with: dict[str, Any] = field(default_factory=dict)
+    start_cbs: list[Callback] = field(default_factory=list)
+    transition_cbs: list[Callback] = field(default_factory=list)
+    termination_cbs: list[Callback] = field(default_factory=list)
+    open_tokens: list[Any] = field(default_factory=list)
+    context_kwargs: dict[str, Any] = field(default_factory=dict)
+    checked: object = None
+    depth: int = 0
+    live: Live = field(default_factory=Live)
+
+    _kept: ClassVar[tuple[str, ...]] = ()
+
+    def restructured(self) -> None:
+        """As that of a state; also what was found out about this container."""
+        self.checked = None
+        StateData.restructured(self)  # no `super()`: a dataclass with slots is another class
+
+    def copy(self) -> Self:
+        """Return the data for a copy of the container: its structure and callbacks only."""
+        made = StateData.copy(self)
+        made.is_child = self.is_child
+        callbacks = ("start_cbs", "transition_cbs", "termination_cbs")
+        kept = ("cleanup", *callbacks, *self._kept)
+        for name in ("children", "remappings", "begins_with", *kept):
+            value = getattr(self, name)
+            setattr(made, name, value.copy() if isinstance(value, (dict, list)) else value)
+        return made
+
+    def others(self) -> dict[str, Any]:
+        """Return label -> child of all children except the clean-up."""
+        if not self.cleanup:
+            return self.children
+        return {label: child for label, child in self.children.items() if label != self.cleanup}
+
+
+class Child(Protocol):
+    """The part of a state that `smachpy.engine` uses."""
+
+    _preempt_requested: bool
+    _smachpy_request_preempt: ClassVar[object]
+
+    @property
+    def _smachpy(self) -> StateData: ...
+    @property
+    def _smachpy_is_container(self) -> bool: ...
+    @property
+    def execute(self) -> Callable[[Any], Any]:
+        """Runs the state and returns the outcome; may be a coroutine function."""
+
+    def request_preempt(self) -> None:
+        """Ask it to stop; may be overridden by the user."""
+
+    @property
+    def _smachpy_grace(self) -> Callable[[Any], Any] | None:
+        """Computes its grace from that of its containers; None to use its option."""
+
+
+class Parent(Child, Protocol):
+    """The part of a container that `smachpy.engine` uses."""
+
+    @property
+    def _smachpy(self) -> ContainerData: ...
+    @property
+    def name(self) -> str | None:
+        """Name of the machine when it is the root."""
+
+    @property
+    def userdata(self) -> UserData:
+        """Its userdata."""
+
+    def get_initial_states(self) -> list[str]:
+        """Return the labels of the children that run first."""
+
+    def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str) -> None:
+        """Call the termination callbacks."""
+
+    def _smachpy_problems(self, where: str) -> tuple[str, ...]:
+        """Return its problems, not those of its children."""
+
+    def _smachpy_compile(self) -> Any:
+        """Return its children, compiled: a `smachpy.engine.step.Plan`."""
+
+    def _smachpy_run_children(self, frame: Frame, plan: Any) -> str:
+        """Run its children and return the outcome."""
+
+    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
+        """Return the children that ended last."""
+
+    def get_children(self) -> Mapping[str, Any]:
+        """Return label -> child."""
+
+
+def walk(state: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (path, state) for `state`, whose path is given, and for all states below it."""
+    left = [(path, state)]  # no recursion: a generator in a generator takes its time at each level
+    while left:
+        path, state = left.pop()
+        yield path, state
+        if state._smachpy_is_container:
+            children = state.get_children().items()
+            left += reversed([(f"{path}/{label}", child) for label, child in children])

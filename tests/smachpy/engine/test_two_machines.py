@@ -1,0 +1,113 @@
+"""Two machines of one program that run at the same time: a stop reaches the one that it is for."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+
+import smachpy
+from smachpy import CBState, Concurrence, State, StateMachine
+
+ENDS = ["done", "preempted"]
+
+
+def nap(_userdata):
+    return "preempted" if smachpy.current_state().sleep(10.0) else "done"
+
+
+@smachpy.state(outcomes=ENDS)
+def charge(_userdata):
+    return nap(_userdata)
+
+
+@smachpy.state(outcomes=ENDS)
+async def charge_async(_userdata):
+    import asyncio
+
+    await asyncio.sleep(10.0)
+    return "done"
+
+
+class Nap(State):
+    def __init__(self):
+        super().__init__(ENDS)
+
+    def execute(self, userdata):
+        return nap(userdata)
+
+
+def machine(name, state, *, nested):
+    sm = StateMachine(ENDS, name=name)
+    inner = StateMachine(ENDS)
+    inner.add("NAP", state)
+    sm.add("IN", inner if nested else state)
+    return sm
+
+
+def run_both(clock, first, second, at=2.0):
+    """Run both, the second one a second later; return their outcomes, or errors."""
+    ends = {}
+
+    def run(sm):
+        try:
+            ends[sm.name] = sm.execute()
+        except smachpy.SmachError as error:
+            ends[sm.name] = error
+
+    tasks = [clock.spawn(lambda: run(first), name="first")]
+    clock.sleep(1.0)
+    tasks.append(clock.spawn(lambda: run(second), name="second"))
+    clock.sleep(at - 1.0)
+    first.request_preempt()
+    for task in tasks:
+        task.join()
+    return ends
+
+
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize(
+    "state", [charge, charge_async, CBState(nap, outcomes=ENDS)], ids=["plain", "async", "callback"]
+)
+def test_functions_may_be_states_of_several_machines(clock, state, nested):
+    """The stop of one robot stopped the other, and the first drove on."""
+    first, second = (machine(name, state, nested=nested) for name in "AB")
+    assert run_both(clock, first, second) == {"A": "preempted", "B": "done"}
+    assert run_both(clock, second, first) == {"B": "preempted", "A": "done"}
+    smachpy.set_options(state, timeout=3.0, timeout_outcome="done")  # holds for both
+    begin = clock.now()
+    assert first.execute() == "done"
+    assert clock.now() - begin == 3.0
+    smachpy.set_options(state, timeout=None)
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_an_instance_with_attributes_belongs_to_one_running_machine(clock, nested):
+    state = Nap()
+    first, second = (machine(name, state, nested=nested) for name in "AB")
+    where = "/B/IN/NAP" if nested else "/B/IN"
+    ends = run_both(clock, first, second)
+    assert ends["A"] == "preempted"
+    assert str(ends["B"]).startswith(f"{where}: state: got the Nap that the running machine '/A'")
+    assert second.execute() == "done"  # one after the other is fine
+    assert first.execute() == "done"
+
+
+@pytest.mark.parametrize("state", [charge, CBState(nap, outcomes=ENDS)], ids=["plain", "callback"])
+def test_a_copy_of_a_function_state_is_one_as_well(clock, state):
+    """A copied machine was refused beside another that had its states."""
+    first = machine("A", copy.copy(state), nested=False)
+    second = machine("B", first.get_children()["IN"], nested=True)
+    assert run_both(clock, first, second) == {"A": "preempted", "B": "done"}
+
+
+def test_two_machines_that_share_nothing_run_as_ever(clock):
+    first, second = (machine(name, Nap(), nested=False) for name in "AB")
+    assert run_both(clock, first, second) == {"A": "preempted", "B": "done"}
+
+
+def test_branches_of_one_machine_that_share_a_function_are_refused_still():
+    both = Concurrence(ENDS, "done")
+    both.add("A", charge)
+    with pytest.raises(smachpy.InvalidStateError, match="of its own"):
+        both.add("B", charge)
