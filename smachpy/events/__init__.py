@@ -11,10 +11,11 @@ instead of `Left`. If another process resumes the run, its events begin with `Re
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from smachpy.userdata.shown import LONGEST_TEXT, MOST_TEXT, Room, plain
+from smachpy.userdata.secret import MASK as _MASK
+from smachpy.userdata.secret import hides as _hides
+from smachpy.userdata.shown import MAX_LIST_ITEMS, Room, short_text, shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -185,6 +186,15 @@ class Iterated(NamedTuple):
     t: float
     stamp_ns: int
     number: int
+
+
+class Noted(NamedTuple):
+    """A state says in a few words what it is about (`State.note`)."""
+
+    path: str
+    t: float
+    stamp_ns: int
+    text: str
 
 
 class CallbackFailed(NamedTuple):
@@ -365,6 +375,7 @@ Event: TypeAlias = (
     | TimedOut
     | Retried
     | Iterated
+    | Noted
     | CallbackFailed
     | UserdataWritten
     | Paused
@@ -448,15 +459,19 @@ def span_text(seconds: float) -> str:
 def to_record(event: Event) -> dict[str, Any]:
     """Return `event` as a dict of its fields and its `kind`, for JSON.
 
-    Messages become `{"$msg": type, "fields": {...}}`. Other values that JSON does not have are
-    replaced by their `repr`, and values that are too long for display are cut, or replaced by their
-    size. Names are never cut.
+    Userdata, goals, feedback and results are in the form of `smachpy.userdata.shown`. Texts that
+    are too long for display are cut; names are never cut.
     """
     # One `Room` for the whole record: many values of medium size are cut as one large value is.
     record: dict[str, Any] = {"kind": type(event).__name__}
     room = Room()
     for key, value in event._asdict().items():
-        record[key] = _listed(value) if key in _NAMES else plain(value, room)
+        if key in _NAMES:
+            record[key] = _listed(value)
+        else:
+            record[key] = shown(value, room) if key in _VALUES else _fact(value, room)
+    if "value" in record and _hides(record.get("key"), event._asdict()["value"]):
+        record["value"] = {"$repr": _MASK}
     return record
 
 
@@ -466,27 +481,34 @@ _NAMES = frozenset(
 )
 """Fields that say what an event is about: if they were cut, they would name something else."""
 
+_INFINITE = float("inf")
+
+_VALUES = frozenset({"value", "goal", "feedback", "result"})
+"""Fields with values of users."""
+
 
 def _listed(value: Any) -> Any:
     return [_listed(item) for item in value] if isinstance(value, tuple) else value
 
 
+def _fact(value: Any, room: Room) -> Any:
+    """Return another field: a text or texts, a number, ..."""
+    if isinstance(value, tuple | list):
+        return [_fact(item, room) for item in value[:MAX_LIST_ITEMS]]
+    if isinstance(value, str):
+        return short_text(value, room)
+    # A limit may be infinite, which JSON does not have.
+    return str(value) if value in {_INFINITE, -_INFINITE} else value
+
+
 def record_text(record: dict[str, Any]) -> str:
     """Return a record as JSON. Values that JSON refuses are replaced: no record is ever lost."""
+    import json
+
     try:
         return json.dumps(record)
     except (TypeError, ValueError, RecursionError):
-        return json.dumps({key: plain(value, Room()) for key, value in record.items()})
-
-
-def was_cut(text: str, size: int) -> bool:
-    """Return whether a text in a record may be the beginning of a longer one.
-
-    Args:
-        text: The text in the record.
-        size: Length of the whole record as JSON; in a long record, texts are cut shorter.
-    """
-    return text.endswith("\u2026") and (len(text) > LONGEST_TEXT or size >= MOST_TEXT)
+        return json.dumps({key: shown(value, Room()) for key, value in record.items()})
 
 
 def from_record(record: dict[str, Any]) -> Event:

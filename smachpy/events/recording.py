@@ -6,69 +6,96 @@ or null. A durable mission also has `run`, the name of its run: the process that
 continues the file, or writes another file with the same `run`. Every further line is an event
 (`smachpy.events.to_record`) with a number `seq`. Where events are missing, `seq` has a gap and the
 next event has their number, `dropped`; the last visit of each state is never missing
-(`events.buffer`). A last line that a crash has cut off is ignored when reading.
+(`events.buffer`). The last line, of kind "End", says that nothing follows: the numbers of `events`
+and of `missing` ones, and what a list shows, so that lists read two lines of a file. It lacks if
+the process died; a last line that a crash has cut off is ignored when reading.
 
 Lines of kind "Observed" are not events of the machine but data of the robot's topics
-(`smachpy.network.observations`).
+(`smachpy.network.observations`), those of kind "Crossed" are what crossed the mission's border
+(`smachpy.events.inputs`); with these, the header has `origin`, which says what ran.
 """
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import json
+import os
+import threading
 from collections import deque
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache
 from operator import itemgetter
 from pathlib import Path
-from types import NoneType
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, NotRequired, Protocol, TypedDict, cast
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.inputs.checked_data import DataError, Stamp, checked
+from actionlib_core.inputs.json_text import load_json
 from actionlib_core.interfaces import get_message
 from actionlib_core.interfaces._sources import BUNDLED
-from smachpy import log
-from smachpy.events import EVENT_KINDS, record_text
+from actionlib_core.node import known_node
+from actionlib_core.process.private_files import make_private_folder, open_private
+from smachpy.base import log
+from smachpy.events import record_text
+from smachpy.events.inputs import (
+    CROSSED,
+    WHICH,
+    Inputs,
+    OriginFacts,
+    Which,
+    origin_facts,
+)
+from smachpy.events.introspection import MAX_NESTING, Described, StateRecord, describe
+from smachpy.events.reading import OBSERVED, read_crossed, read_event, read_facts, read_observed
+from smachpy.events.run_state import RAISED
+from smachpy.events.steady import SteadyStamps
 from smachpy.exceptions import SmachError
-from smachpy.introspection import StateRecord, describe
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-    from typing import Self, TextIO
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from typing import IO, BinaryIO, Self, TextIO
 
-    from smachpy.machines.container import Container
+    from smachpy.events.buffer import EventBuffer
 
 FORMAT = "smachpy-run"
 VERSION = 1
-OBSERVED = "Observed"
 TYPES = "Types"
 """Kind of the records that hold definitions of the mission's own goal types."""
 WAITING_OBSERVED = 1_000
 """Number of records of the robot's topics that wait to be written; then the oldest are dropped."""
 
 WAITING_EVENTS = 100_000
-"""Number of entries that wait to be written while the disk hangs, or while the machine is faster
-than the writer. Further ones are thinned out and counted."""
+"""Number of entries that wait to be written. A machine that is faster than the writer waits for it
+then, or writes them itself in virtual time, where the writer runs only when the machine waits. If
+the disk hangs, further ones are thinned out and counted."""
 
-CLOSE_S = 2.0  # time to write what waits [s]; a disk that hangs must not hang the program's end
+END = "End"
+"""Kind of the last record."""
 
-_FIELDS = {"kind": str, "path": str, "stamp_ns": int}
-_STAMPS = 2**63  # [ns] from 1970 on
-_SECONDS = 2.0**33  # longest time on a mission's clock; `_STAMPS` in seconds
-_MALFORMED = (
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    ArithmeticError,
-    RecursionError,
-)
-"""Exceptions raised when reading JSON of an unexpected structure."""
+CLOSE_S = 2.0
+"""`close` says after this time that it still writes [s]."""
+
+HANGS_S = 10.0
+"""A writer that gets on with nothing for so long hangs: nobody waits for it any longer [s]."""
+
+WRITTEN_AT_ONCE = 1_000
+"""Number of entries in one write."""
+
+LARGEST = 1_000_000_000
+"""Largest recording that is read [bytes]."""
+
+STREAMED = 20_000_000
+"""Recordings of more bytes are read event by event where that is enough."""
+
+MAX_LINE_LENGTH = 32_000_000
+"""Longest line of a recording [characters]; the header of 10,000 states has 5,000,000."""
 
 
 class RecordingError(SmachError):
     """A recording cannot be written or read.
+
+    Try: check the path and the space on the disk; a file from elsewhere may be no recording.
 
     Attributes:
         path: The file.
@@ -94,6 +121,8 @@ class Recording:
         made_ns: When it was really made; `stamp_ns` differs if the mission's time was virtual.
         definitions: Texts of the mission's own message types, as `interface_texts` returns them.
         run: Name of the run of a durable mission, which may be in several files; else "".
+        inputs: Records of what crossed the mission's border (`smachpy.events.inputs`).
+        origin: What ran (`smachpy.events.inputs`); None in older recordings.
     """
 
     path: Path
@@ -106,6 +135,8 @@ class Recording:
     made_ns: int = 0
     definitions: dict[str, str] = field(default_factory=dict)
     run: str = ""
+    inputs: list[dict[str, Any]] = field(default_factory=list)
+    origin: dict[str, Any] | None = None
 
     @property
     def dropped(self) -> int:
@@ -126,6 +157,17 @@ class Recording:
         }
 
 
+class Recorded(Described, Protocol):
+    """The part of a container that a recording uses."""
+
+    userdata: Any
+
+    def event_buffer(
+        self, on_news: Callable[[], object] | None = None, *, limit: int = 0
+    ) -> EventBuffer:
+        """Return a buffer of its events."""
+
+
 class Recorder:
     """Writes the events of a machine to a file; a context manager.
 
@@ -134,6 +176,9 @@ class Recorder:
             resumes: then the rest of the run is appended.
         machine: The machine.
         run: Name of the durable run, `smachpy.durable.recorder.Recorder.run`; else "".
+        inputs: Which inputs of the mission are recorded: "seen", what reached its code, large
+            messages as hash and summary; "all", those too; "none".
+        origin: How to begin the mission again: its name, its arguments and so on.
 
     Attributes:
         path: The file.
@@ -142,25 +187,50 @@ class Recorder:
     Raises:
         RecordingError: the file exists, cannot be made, or its content cannot be read.
 
-    Threads: the machine never waits for the disk; another thread writes.
+    Threads: another thread writes; the machine waits for it only if 100,000 events wait.
     """
 
-    def __init__(self, path: str | Path, machine: Container, *, run: str = "") -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        machine: Recorded,
+        *,
+        run: str = "",
+        inputs: Which = "seen",
+        origin: Mapping[str, Any] | None = None,
+    ) -> None:
+        if inputs not in WHICH:
+            raise RecordingError(path, f"inputs: got {inputs!r}; expected one of {WHICH}.")
         self.path = Path(path)
         self.earlier: list[dict[str, Any]] = []
         clock = current_clock()
         self._executor = SerialExecutor(clock, f"recording {self.path.name}")
         self._failed = self._closed = False
         self._unwritten = 0
+        self._written = 0  # records, by which `close` and the machine see that the writer gets on
+        self._is_real = isinstance(clock, RealClock)
+        self._writing = threading.Lock()
+        self._is_stalled = False
+        self._has_room = clock.event(f"room in the recording {self.path.name}")
+        self._facts = _Facts()
+        node = known_node()  # not made for this: a machine may need no network at all
         try:
             if run and run_of(self.path) == run:
                 self._file = self._continued()
             else:
                 # "x": an existing file is never overwritten, even if two processes begin at once.
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self._file = self.path.open("x", encoding="utf-8")
+                make_private_folder(self.path.parent)
+                self._file = open_private(self.path, "x")
                 made_ns = RealClock().time_ns()
-                header = header_line(describe(machine), clock.time_ns(), made_ns=made_ns, run=run)
+                record = describe(machine)
+                facts = None
+                if inputs != "none":
+                    userdata = {key: machine.userdata[key] for key in machine.userdata.keys()}  # noqa: SIM118
+                    space = "" if node is None else node.namespace
+                    facts = origin_facts(clock, space, origin or {}, userdata, inputs)
+                header = header_line(
+                    record, clock.time_ns(), made_ns=made_ns, run=run, origin=facts
+                )
                 self._file.write(header)
                 self._file.flush()  # readable from now on, also if the process is killed
         except FileExistsError as error:
@@ -171,14 +241,21 @@ class Recorder:
             raise RecordingError(path, f"cannot write: {error.strerror or error}.") from error
         self._observed: deque[dict[str, Any]] = deque(maxlen=WAITING_OBSERVED)
         self._types: set[str] = set()  # goal types whose definitions were looked up
+        self._inputs = None
+        if inputs != "none":
+            name = "" if node is None else node.full_name
+            self._inputs = Inputs(inputs, clock, name, self._on_news)
         self._buffer = machine.event_buffer(self._on_news, limit=WAITING_EVENTS)
+        self._buffer.on_full = self._make_room
 
-    def _continued(self) -> TextIO:
-        """Open the file to append after its last complete line; the rest is removed."""
+    def _continued(self) -> IO[str]:
+        """Open the file to append after its last complete event; the rest is removed."""
         self.earlier = read_recording(self.path).events
+        for event in self.earlier:
+            self._facts.add(event)
         with self.path.open("rb+") as file:
-            kept = file.read().rfind(b"\n") + 1
-            file.truncate(kept)
+            begin, line = _last_line(file)
+            file.truncate(begin if _is_end(line) else begin + len(line))
         return self.path.open("a", encoding="utf-8")
 
     def __enter__(self) -> Self:
@@ -188,27 +265,31 @@ class Recorder:
         self.close()
 
     def close(self) -> None:
-        """Write the waiting records and close the file; may be called twice.
+        """Write the waiting records and the end mark, and close the file; may be called twice.
 
-        Blocks: 2 s at most.
+        Blocks: as long as the writer gets on; 10 s if the disk hangs.
         """
+        if self._file.closed:
+            return
         # No new events from here on; the last ones are written by one more call of `_write`.
         self._closed = True
         self._buffer.close()
+        if self._inputs is not None:
+            self._inputs.close()
         self._on_news()
-        in_time = self._executor.join(CLOSE_S)
-        if in_time and self._file.closed:
-            return
-        if not in_time:
-            log.logwarn(
-                f"recording {str(self.path)!r}: still being written after {CLOSE_S:g} s; the end "
-                "of the run is lost if the program ends now."
-            )
+        periods, before = 0, -1
+        while not self._executor.join(CLOSE_S):
+            periods, before = (1 if self._written != before else periods + 1), self._written
+            if periods * CLOSE_S >= HANGS_S:
+                log.logwarn(
+                    f"recording {str(self.path)!r}: still being written, but the disk has taken "
+                    f"nothing for {HANGS_S:g} s; the end of the run is lost if the program ends "
+                    "now."
+                )
+                break
+            log.loginfo(f"recording {str(self.path)!r}: the rest is still being written.")
         else:
-            try:
-                self._file.close()
-            except OSError as error:
-                self._fail(error)
+            self._finish()
         if self._buffer.dropped:
             log.logwarn(
                 f"recording {str(self.path)!r}: {self._buffer.dropped} events are missing; more "
@@ -216,6 +297,36 @@ class Recorder:
             )
         if self._unwritten:
             log.logwarn(f"recording {str(self.path)!r}: {self._unwritten} events are not in it.")
+
+    def _finish(self) -> None:
+        """Write the end mark and close the file."""
+        try:
+            if not self._failed:
+                self._file.write(event_line(self._facts.end()))
+            self._file.close()
+        except OSError as error:
+            self._fail(error)
+            with contextlib.suppress(OSError):
+                self._file.close()
+
+    def _make_room(self) -> bool:
+        """Wait in the machine's thread until the writer has taken what waits; tell whether.
+
+        In virtual time, where the writer waits for the machine, this thread writes instead.
+        """
+        if self._failed or self._is_stalled:
+            return False
+        if not self._is_real:
+            self._write()
+            return True
+        self._has_room.clear()
+        before = self._written
+        while not self._has_room.wait(HANGS_S):
+            if self._written == before:
+                self._is_stalled = True
+                return False
+            before = self._written
+        return True
 
     @property
     def dropped(self) -> int:
@@ -225,7 +336,7 @@ class Recorder:
     def observe(self, record: dict[str, Any]) -> None:
         """Write a record of `RobotTopics`; does nothing after `close`."""
         if not self._closed:
-            self._observed.append(record)
+            self._observed.append(self._buffer.steady(record))
             self._on_news()
 
     def _on_news(self) -> None:
@@ -233,7 +344,11 @@ class Recorder:
 
     def _write(self) -> None:
         """Write records until none are left."""
-        while records := [*self._buffer.read(), *self._take_observed()]:
+        with self._writing:
+            self._write_all()
+
+    def _write_all(self) -> None:
+        while records := self._take():
             if self._failed:  # still read, so that the buffer does not fill up
                 self._unwritten += len(records)
                 continue
@@ -244,6 +359,13 @@ class Recorder:
             except OSError as error:
                 self._unwritten += len(records)
                 self._fail(error)
+                continue
+            self._written += len(records)
+            self._is_stalled = False
+            for record in records:
+                self._facts.add(record)
+            if self._buffer.has_room():
+                self._has_room.set()
 
     def _new_types(self, records: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         """Yield the definitions of goal types that appear for the first time."""
@@ -256,13 +378,256 @@ class Recorder:
                     stamp_ns = record["stamp_ns"]
                     yield {"kind": TYPES, "path": "", "stamp_ns": stamp_ns, "definitions": texts}
 
-    def _take_observed(self) -> list[dict[str, Any]]:
-        return [self._observed.popleft() for _ in range(len(self._observed))]
+    def _take(self) -> list[dict[str, Any]]:
+        """Return what is to be written next."""
+        found = self._buffer.read(WRITTEN_AT_ONCE)
+        found += [self._observed.popleft() for _ in range(len(self._observed))]
+        if self._inputs is not None:
+            found += map(self._buffer.steady, self._inputs.take(WRITTEN_AT_ONCE))
+        return found
 
     def _fail(self, error: OSError) -> None:
         if not self._failed:
             self._failed = True
             log.logerr(f"recording {str(self.path)!r}: ends here: {error.strerror or error}.")
+
+
+class _Facts:
+    """What the end mark says of the newest run in a file."""
+
+    def __init__(self) -> None:
+        self._events = self._missing = self._last_ns = 0
+        self._first_ns: int | None = None
+        self._root = ""
+        self._outcome: str | None = None
+        self._outages: list[Any] = []
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Add a record, in order."""
+        kind = record["kind"]
+        if kind in _NO_EVENTS:
+            return
+        self._events += 1
+        self._missing += record.get("dropped", 0)
+        self._last_ns = record["stamp_ns"]
+        if self._first_ns is None:
+            self._first_ns = self._last_ns
+        if kind in {"Started", "Recovered"} and record["path"].count("/") == 1:
+            self._root, self._outcome = record["path"], None
+            self._outages = record.get("outages", [])
+        elif kind == "Finished" and record["path"] == self._root:
+            self._outcome = record["outcome"] or RAISED
+
+    def end(self) -> dict[str, Any]:
+        """Return the end mark."""
+        return {
+            "kind": END,
+            "path": self._root,
+            "stamp_ns": self._last_ns,
+            "events": self._events,
+            "missing": self._missing,
+            "first_ns": self._last_ns if self._first_ns is None else self._first_ns,
+            "outcome": self._outcome,
+            "outages": self._outages,
+        }
+
+
+class _RecordingEnd(TypedDict):
+    kind: Literal["End"]
+    path: str
+    stamp_ns: Stamp
+    events: int
+    missing: int
+    first_ns: Stamp
+    outcome: str | None
+    outages: list[tuple[Stamp, Stamp]]
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a list shows of a recording, of which two lines are read if it has an end mark.
+
+    Attributes:
+        path: The file.
+        machine: The machine's label.
+        made_ns: When it was made [ns since the epoch].
+        run: Name of the run of a durable mission, or "".
+        first_ns, last_ns: Stamps of its first and last event.
+        outcome: Outcome of the newest run in it; None if that has not ended.
+        outages: Pairs of stamps between which no process ran it.
+        events: Number of events.
+        missing: Number of events that were dropped.
+        has_end: Whether it was completed.
+        success: The machine's outcomes that are good; None goes by their names.
+    """
+
+    path: Path
+    machine: str
+    made_ns: int
+    run: str
+    first_ns: int
+    last_ns: int
+    outcome: str | None
+    outages: tuple[tuple[int, int], ...]
+    events: int
+    missing: int
+    has_end: bool
+    success: tuple[str, ...] | None = None
+
+
+def read_summary(path: str | Path) -> Summary:
+    """Return the summary of a recording.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            header = _read_header(
+                path, file.readline(MAX_LINE_LENGTH + 1).decode("utf-8", "replace")
+            )
+            _, line = _last_line(file)
+    except OSError as error:
+        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+    end: Any = None
+    has_end = _is_end(line)
+    if has_end:
+        try:
+            end = checked(
+                _RecordingEnd, load_json(line.decode("utf-8", "replace"), longest=MAX_LINE_LENGTH)
+            )
+        except ValueError as error:
+            raise RecordingError(path, f"got a wrong end mark ({error}).") from error
+    else:
+        facts, steady = _Facts(), SteadyStamps()
+        for record in each_event(path):
+            facts.add(steady.fix(record))
+        end = facts.end()
+    outages = tuple((first, last) for first, last in end["outages"])
+    return Summary(
+        path=path,
+        machine=header.record.label,
+        made_ns=header.made_ns,
+        run=header.run,
+        first_ns=end["first_ns"],
+        last_ns=end["stamp_ns"],
+        outcome=end["outcome"],
+        outages=outages,
+        events=end["events"],
+        missing=end["missing"],
+        has_end=has_end,
+        success=header.record.success,
+    )
+
+
+def summaries(
+    places: Iterable[str | Path], *, limit: int, skip: int = 0
+) -> tuple[list[Summary], int]:
+    """Return the summaries of the newest recordings in files and folders, the newest first.
+
+    Files with parts of one durable run are one summary. A file in a folder that is not a recording
+    is logged and skipped.
+
+    Args:
+        places: Files and folders.
+        limit: The most files that are read.
+        skip: Omit this many of the newest ones.
+
+    Returns:
+        The summaries, and how many files there are.
+
+    Raises:
+        RecordingError: there is no such file or folder, or a given file cannot be read.
+    """
+    given = {Path(place) for place in places}
+    paths = sorted(find_recordings(places), key=_changed_ns, reverse=True)
+    found: list[Summary] = []
+    runs: dict[str, int] = {}  # name of a durable run -> its place in the list
+    for path in paths[skip : skip + limit]:
+        try:
+            one = read_summary(path)
+        except RecordingError as error:
+            if path in given:
+                raise
+            log.logwarn(f"{error} It is left out.")
+            continue
+        at = runs.setdefault(one.run, len(found)) if one.run else len(found)
+        if at < len(found):
+            found[at] = _joined_summary(found[at], one)
+        else:
+            found.append(one)
+    return found, len(paths)
+
+
+def _joined_summary(one: Summary, other: Summary) -> Summary:
+    """Join the summaries of two parts of a durable run; the last one has the most outages."""
+    first, last = sorted((one, other), key=lambda part: (len(part.outages), part.made_ns))
+    return replace(
+        last,
+        path=first.path,
+        made_ns=first.made_ns,
+        first_ns=first.first_ns,
+        events=one.events + other.events,
+        missing=one.missing + other.missing,
+    )
+
+
+def _changed_ns(path: Path) -> tuple[int, str]:
+    try:
+        return path.stat().st_mtime_ns, path.name
+    except OSError:  # removed meanwhile: reading it says so
+        return 0, path.name
+
+
+def each_event(path: str | Path) -> Iterator[dict[str, Any]]:
+    """Yield the events of a recording one after the other, as they are in the file.
+
+    Raises:
+        RecordingError: it cannot be read, or a line before the last is not an event.
+    """
+    path = Path(path)
+    try:
+        with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
+            _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
+            for _, record in _records(path, file):
+                if record is not None and record["kind"] not in _NO_EVENTS:
+                    yield record
+    except OSError as error:
+        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+
+
+def _records(path: Path, file: TextIO) -> Iterator[tuple[int, dict[str, Any] | None]]:
+    """Yield the lines after the header: number and record; None for a last one that is cut off."""
+    number = 1
+    while line := file.readline(MAX_LINE_LENGTH + 1):
+        number += 1
+        if not line.endswith("\n") and len(line) <= MAX_LINE_LENGTH:
+            yield number, None
+            return
+        yield number, _read_line(path, number, line)
+
+
+_NO_EVENTS = frozenset({OBSERVED, TYPES, END, CROSSED})
+_BLOCK = 65_536  # [bytes] read from the end of a file at once
+
+
+def _last_line(file: BinaryIO) -> tuple[int, bytes]:
+    """Return where the last complete line of a file begins, and the line."""
+    begin, tail = file.seek(0, os.SEEK_END), b""
+    # Two line ends: of the line before, and of the line itself.
+    while begin and (tail.count(b"\n") < 2 and len(tail) <= MAX_LINE_LENGTH):  # noqa: PLR2004
+        size = min(max(_BLOCK, len(tail)), begin)  # doubled: a long line is joined a few times
+        begin = file.seek(begin - size)
+        tail = file.read(size) + tail
+    stop = tail.rfind(b"\n") + 1
+    start = tail.rfind(b"\n", 0, max(0, stop - 1)) + 1
+    return begin + start, tail[start:stop]
+
+
+def _is_end(line: bytes) -> bool:
+    """Return whether a line is an end mark; events of a machine have other kinds."""
+    return line.startswith((b'{"kind":"End",', b'{"kind": "End",'))
 
 
 def interface_texts(goal: str) -> dict[str, str]:
@@ -292,6 +657,7 @@ def header_line(
     *,
     made_ns: int | None = None,
     run: str = "",
+    origin: dict[str, Any] | None = None,
 ) -> str:
     """Return the first line of a file; `made_ns` is the real date if time is virtual."""
     header: dict[str, Any] = {
@@ -304,6 +670,8 @@ def header_line(
     }
     if run:
         header["run"] = run
+    if origin is not None:
+        header["origin"] = origin
     return json.dumps(header) + "\n"
 
 
@@ -336,138 +704,108 @@ def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 def read_recording(path: str | Path) -> Recording:
     """Read a file.
 
+    Data of robots' topics that has another form than `smachpy.events.reading` knows is left out,
+    with a warning.
+
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event; with the line.
     """
     path = Path(path)
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
+        with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > LARGEST:
+                raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
+            return _read(path, file)
     except OSError as error:
         raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
-    recording = _read_header(path, lines[0])
-    whole = lines[1:-1]  # the text after the last newline is empty, or was cut off
-    recording.cut = bool(lines[-1]) and len(lines) > 1
-    records = [_read_event(path, number, line) for number, line in enumerate(whole, 2)]
-    recording.events = list(
-        _numbered(one for one in records if one["kind"] not in {OBSERVED, TYPES})
-    )
-    for one in records:
-        if one["kind"] == TYPES and isinstance(one.get("definitions"), dict):
-            recording.definitions |= {str(k): str(v) for k, v in one["definitions"].items()}
-    observed = (one for one in records if one["kind"] == OBSERVED)
-    recording.observed = [{**one, "n": number} for number, one in enumerate(observed, 1)]
+
+
+def _read(path: Path, file: TextIO) -> Recording:
+    recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
+    events: list[dict[str, Any]] = []
+    wrong: list[str] = []  # data of topics that is left out
+    for number, record in _records(path, file):
+        if record is None:
+            recording.cut = True
+        elif record["kind"] in {OBSERVED, CROSSED}:
+            try:
+                _add_data(recording, record)
+            except DataError as error:
+                wrong.append(f"line {number}: {error}")
+        elif record["kind"] == TYPES:
+            recording.definitions |= _texts(record.get("definitions"))
+        elif record["kind"] != END:
+            events.append(record)
+    recording.events = list(_numbered(map(SteadyStamps().fix, events)))
+    if wrong:
+        log.logwarn(
+            f"recording {str(path)!r}: {len(wrong)} record(s) of topics are left out; the first: "
+            f"{wrong[0]}"
+        )
     return recording
+
+
+def _add_data(recording: Recording, record: dict[str, Any]) -> None:
+    """Add what is no event; raise `DataError` if it has a wrong form."""
+    if record["kind"] == CROSSED:
+        recording.inputs.append(read_crossed(record))
+    else:
+        observed = read_observed(record)
+        recording.observed.append({**observed, "n": len(recording.observed) + 1})
+
+
+def _texts(given: Any) -> dict[str, str]:
+    return {str(k): str(v) for k, v in given.items()} if isinstance(given, dict) else {}
 
 
 def _read_header(path: Path, line: str) -> Recording:
     try:
-        header = json.loads(line)
-        if header["format"] != FORMAT or header["version"] != VERSION:
-            raise ValueError(f"format {header['format']!r} version {header['version']!r}")
-        record = StateRecord.from_json(json.dumps(header["machine"]))
+        data = load_json(line, longest=MAX_LINE_LENGTH, deepest=MAX_NESTING)
+        header = checked(_Header, data, known_only=True)
+        record: StateRecord = checked(StateRecord, header["machine"])
         base = header.get("base")
         if base is not None:
-            for name in ("states", "goals", "userdata"):
-                for facts in base[name].values():
-                    dict(facts)
-        stamp_ns = _check_stamp(int(header["stamp_ns"]))
-        made_ns = _check_stamp(int(header.get("made_ns", stamp_ns)))  # older files have none
-        run = header.get("run", "")
-        if not isinstance(run, str):
-            raise TypeError(f"run: {run!r:.60}")
-        return Recording(path, record, stamp_ns, base, made_ns=made_ns, run=run)
-    except _MALFORMED as error:
+            base = read_facts(base)
+    except ValueError as error:
         raise RecordingError(
             path, f"line 1: got no header ({error}); expected a file of `smachpy run --record`."
         ) from error
+    stamp_ns = header["stamp_ns"]
+    made_ns = header.get("made_ns", stamp_ns)  # older files have none
+    run, origin = header.get("run", ""), header.get("origin")
+    return Recording(path, record, stamp_ns, base, made_ns=made_ns, run=run, origin=origin)
+
+
+class _Header(TypedDict):
+    format: Literal["smachpy-run"]
+    version: Literal[1]
+    stamp_ns: Stamp
+    machine: Any
+    base: NotRequired[Any]
+    made_ns: NotRequired[Stamp]
+    run: NotRequired[str]
+    origin: NotRequired[OriginFacts]
 
 
 def run_of(path: Path) -> str:
     """Return the name of the durable run in a file; "" for other runs and other files."""
     try:
         with path.open("rb") as file:
-            return _read_header(path, file.readline().decode("utf-8", "replace")).run
+            return _read_header(
+                path, file.readline(MAX_LINE_LENGTH + 1).decode("utf-8", "replace")
+            ).run
     except (OSError, RecordingError):
         return ""
 
 
-def _check_stamp(stamp_ns: int) -> int:
-    if not 0 <= stamp_ns < _STAMPS:
-        raise ValueError(f"stamp_ns: {stamp_ns!r:.60}")
-    return stamp_ns
-
-
-def _read_event(path: Path, number: int, line: str) -> dict[str, Any]:
+def _read_line(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
-        # NaN and Infinity, which Python's JSON has and browsers refuse, become texts.
-        event: dict[str, Any] = json.loads(line, parse_constant=str)
-        for name, kind in _FIELDS.items():
-            if type(event[name]) is not kind:
-                raise ValueError(f"{name}: {event[name]!r}")
-        _check_stamp(event["stamp_ns"])
-        if event["kind"] in EVENT_KINDS:  # others are data of topics, or of a newer version
-            event = _completed(event)
-        dropped = event.get("dropped", 0)
-        if type(dropped) is not int or dropped < 0:
-            raise ValueError(f"dropped: {dropped!r}")
-    except _MALFORMED as error:
+        return read_event(load_json(line, longest=MAX_LINE_LENGTH))
+    except ValueError as error:
         raise RecordingError(
             path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
         ) from error
-    return event
-
-
-def _completed(event: dict[str, Any]) -> dict[str, Any]:
-    """Check the fields of an event's kind; add the default of those that older files lack."""
-    event = {**EVENT_KINDS[event["kind"]]._field_defaults, **event}
-    for name, types in _field_types(event["kind"]).items():
-        value = event[name]
-        _check_type(name, value, types)
-        if types is _LIST_OF_TEXTS:
-            for item in value:
-                _check_type(name, item, (str,))
-    if not abs(event["t"]) < _SECONDS:
-        raise ValueError(f"t: {event['t']!r}")
-    if event["kind"] == "Recovered":
-        _check_recovered(event)
-    return event
-
-
-_LIST_OF_TEXTS = (list, tuple, str)
-_JSON_TYPES: dict[Any, tuple[type, ...]] = {
-    str: (str,),
-    str | None: (str, NoneType),
-    int: (int,),
-    bool: (bool,),
-    # `to_record` writes infinities and lists that are too long as texts.
-    float: (float, int, str),
-    float | None: (float, int, str, NoneType),
-    tuple[str, ...]: _LIST_OF_TEXTS,
-}
-"""Annotation of an event's field -> its types in a file; other fields take any value."""
-
-
-@cache
-def _field_types(kind: str) -> dict[str, tuple[type, ...]]:
-    hints = get_type_hints(EVENT_KINDS[kind])
-    types = {name: _JSON_TYPES.get(hint, ()) for name, hint in hints.items()}
-    return {**types, "t": (float, int)}
-
-
-def _check_type(name: str, value: Any, types: tuple[type, ...]) -> None:
-    if types and type(value) not in types:
-        raise TypeError(f"{name}: {value!r:.60}")
-
-
-def _check_recovered(event: dict[str, Any]) -> None:
-    _check_stamp(int(event["began_ns"]))
-    for begin, end in event["outages"]:
-        _check_stamp(int(begin))
-        _check_stamp(int(end))
-    for path, since in event["active"]:
-        if not isinstance(path, str):
-            raise TypeError(f"active: {path!r}")
-        _check_stamp(int(since))
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[Path]:
@@ -487,12 +825,32 @@ def find_recordings(places: Iterable[str | Path]) -> list[Path]:
     return found
 
 
-def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
+class Streamed:
+    """The events of a recording, read from the file each time they are iterated.
+
+    Raises:
+        RecordingError: while they are iterated: a line is not an event; with the line.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield the events, as `read_recording` returns them."""
+        return _numbered(map(SteadyStamps().fix, each_event(self._path)))
+
+
+def each_recording(places: Iterable[str | Path], *, stream: bool = False) -> Iterator[Recording]:
     """Yield the recordings in the given files and folders, sorted.
 
     Each is read when it is needed. A file in a folder that is not a recording is logged and
     skipped. Files of a folder with parts of one durable run, written by several computers, are
     yielded as one recording with the path of the first part.
+
+    Args:
+        places: Files and folders.
+        stream: Whether the `events` of large files may be `Streamed`, for readers that only iterate
+            them; topics and definitions are left out then.
 
     Raises:
         RecordingError: there is no such file or folder, or a given file cannot be read.
@@ -503,30 +861,47 @@ def each_recording(places: Iterable[str | Path]) -> Iterator[Recording]:
         runs = [run_of(path) for path in paths]
         parts: dict[str, list[Recording]] = {}
         for path, run in zip(paths, runs, strict=True):
+            is_part = bool(run) and runs.count(run) > 1
             try:
-                recording = read_recording(path)
+                is_large = stream and not is_part and path.stat().st_size > STREAMED
+                recording = _streamed(path) if is_large else read_recording(path)
             except RecordingError as error:
                 if not Path(place).is_dir():
                     raise
                 log.logwarn(f"{error} It is left out.")
                 continue
-            if run and runs.count(run) > 1:
+            if is_part:
                 parts.setdefault(run, []).append(recording)
             else:
                 yield recording
         yield from map(joined, parts.values())
 
 
+def _streamed(path: Path) -> Recording:
+    with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
+        recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
+    return replace(recording, events=cast("list[dict[str, Any]]", Streamed(path)))
+
+
 def joined(parts: Sequence[Recording]) -> Recording:
     """Join the recordings of one durable run; the machine is that of the last one."""
-    ordered = sorted(parts, key=lambda part: part.stamp_ns)
+    ordered = sorted(parts, key=_place)
     last = ordered[-1]
     observed = [one for part in ordered for one in part.observed]
     return replace(
         ordered[0],
         record=last.record,
-        events=list(_numbered(event for part in ordered for event in part.events)),
+        events=list(
+            _numbered(map(SteadyStamps().fix, (e for part in ordered for e in part.events)))
+        ),
         cut=last.cut,
         observed=[{**one, "n": number} for number, one in enumerate(observed, 1)],
         definitions={k: v for part in ordered for k, v in part.definitions.items()},
+        inputs=[one for part in ordered for one in part.inputs],
     )
+
+
+def _place(part: Recording) -> tuple[int, int]:
+    """Sort parts by the number of outages before them; the computers' clocks may differ."""
+    first = part.events[0] if part.events else {}
+    return len(first.get("outages", ())), part.stamp_ns

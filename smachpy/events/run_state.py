@@ -2,13 +2,16 @@
 
 A `RunState` is plain JSON data: it is sent to a viewer that joins in the middle of a run, and
 serves as a keyframe of a recording. It keeps counts and the newest facts, not the events. The page
-folds the same events in JavaScript (`viz/web/js/core/fold.js`); both are tested on the same
-fixtures.
+folds the same events in TypeScript (`viz/web/src/core/fold.ts`); both are tested on the
+same fixtures.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NotRequired, TypedDict
+
+# The types are also read while the program runs, by what checks data from the network.
+from actionlib_core.inputs.checked_data import Count, Number, Stamp  # noqa: TC001
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +23,7 @@ _NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": Non
 
 _OF_QUESTION = ("text", "answers", "words", "default", "patience", "service", "has_picture")
 
-_OF_VISIT = ("question", "marking", "fired", "held")
+_OF_VISIT = ("note", "question", "marking", "fired", "held")
 
 CUT_SHORT = "a new run began before it ended"
 """Text of a LOST goal whose run was cut short."""
@@ -32,28 +35,129 @@ ENDED_GOALS = 20
 """Number of ended goals that are kept."""
 
 
+class PreemptFacts(TypedDict):
+    """Who asked a state to stop: fields of `PreemptRequested`; None in older recordings."""
+
+    source: str | None
+    by: str | None
+    why: str | None
+    grace: float | None
+
+
+class QuestionFacts(TypedDict):
+    """A question: fields of `QuestionAsked`, when it was asked, and the answer.
+
+    `answer`, `by` and `answered`, the time, are None until there is one; an empty `by` means that
+    nobody answered in time.
+    """
+
+    text: str
+    answers: list[str]
+    words: list[str]
+    default: str
+    patience: float
+    service: str
+    has_picture: bool
+    asked: Stamp
+    answer: str | None
+    by: str | None
+    answered: Stamp | None
+
+
+class StateFacts(TypedDict):
+    """What is known of one state.
+
+    visits: number of visits. since: when the running visit began, None while there is none. left:
+    when it last ended. outcome: of the newest visit that ended. outcomes: outcome -> count.
+    seconds: in finished visits. preempt: when the running visit was asked to stop, asked: by whom,
+    serviced: when it serviced the request, abandoned: when its grace was over; all None until then.
+    attempt: of the visit, from 1. item: number of an iterator's item, from 0. waits: the reason of
+    a pause before it. note, question: of the newest visit. Of a plan that has fired since it was
+    entered: marking, ids of the places that hold tokens (one with two tokens is in it twice);
+    fired, id of the newest transition; held, while it waits: id of a transition -> why its guard is
+    false.
+    """
+
+    visits: Count
+    since: Stamp | None
+    outcome: str | None
+    outcomes: dict[str, Count]
+    seconds: Number
+    left: NotRequired[Stamp]
+    error: NotRequired[str | None]
+    preempt: NotRequired[Stamp | None]
+    asked: NotRequired[PreemptFacts | None]
+    serviced: NotRequired[Stamp | None]
+    abandoned: NotRequired[Stamp | None]
+    attempt: NotRequired[Count]
+    item: NotRequired[Count]
+    waits: NotRequired[str | None]
+    note: NotRequired[str]
+    question: NotRequired[QuestionFacts]
+    marking: NotRequired[list[str]]
+    fired: NotRequired[str]
+    held: NotRequired[dict[str, str]]
+
+
+class ProgressFacts(TypedDict):
+    """The progress of a goal: `smachpy_viz.model.progress.Progress`."""
+
+    fraction: Number | None
+    distance: Number | None
+    text: str
+
+
+class GoalFacts(TypedDict):
+    """What is known of one goal; `attempt` is that of the visit that sent it."""
+
+    path: str
+    action: str
+    since: Stamp
+    goal: Any
+    feedback: Any
+    first_feedback: Any
+    status: str
+    text: str
+    result: Any
+    ended: Stamp | None
+    attempt: NotRequired[Count]
+    progress: NotRequired[ProgressFacts]
+
+
+class WrittenFacts(TypedDict):
+    """The newest value of a key of userdata, who wrote it, and when."""
+
+    key: str
+    value: Any
+    writer: str
+    at: Stamp
+    container: str
+
+
+class RunFacts(TypedDict):
+    """The facts of a run; times are nanoseconds since the Unix epoch.
+
+    run: number of runs so far. started, ended, outcome: of the newest run. states: by path. goals:
+    by goal id. userdata: by "container key". outages: times in which no process ran it, absent if
+    there were none. dropped: number of missing events, by which counts are too low; absent if 0.
+    """
+
+    run: Count
+    started: Stamp | None
+    ended: Stamp | None
+    outcome: str | None
+    states: dict[str, StateFacts]
+    goals: dict[str, GoalFacts]
+    userdata: dict[str, WrittenFacts]
+    outages: NotRequired[list[tuple[Stamp, Stamp]]]
+    dropped: NotRequired[Count]
+
+
 class RunState:
     """Folds records (`smachpy.events.to_record`) into one state.
 
     Attributes:
-        data: The facts. Times are nanoseconds since the Unix epoch.
-            run: number of runs so far; started, ended, outcome: of the newest run; outages: pairs
-            [from, to] in which no process ran it, absent if there were none;
-            states: by path: visits, since (None while it is not running), left (when it last
-            ended), outcome, outcomes (outcome -> count), seconds (in finished visits), error,
-            preempt (when it was asked to stop), asked (`source`, `by`, `why` and `grace` of the
-            PreemptRequested), serviced (when it serviced the request), abandoned (when its grace
-            was over); these four are None until it is asked; attempt, item (of an iterator), waits
-            (the reason of a pause before it), question (of its newest visit, if it has asked one:
-            `text`, `answers`, `words`, `default`, `patience`, `service` and `has_picture` of the
-            QuestionAsked; `asked`, the time; and `answer`, `by` and `answered` of the
-            QuestionAnswered, None until then); of a plan that has fired since it was entered:
-            marking (ids of the places that hold tokens; one with two tokens is in it twice), fired
-            (id of its newest transition), held (while it waits: id of a transition -> why its guard
-            is false);
-            goals: by goal id: path, action, since, goal, feedback, first_feedback, status, text,
-            result, ended; userdata: by "container key": key, value, writer, at, container;
-            dropped: number of missing events, by which counts are too low; absent if 0.
+        data: The facts, of the form of `RunFacts`.
 
     Threads: not thread-safe.
     """
@@ -82,6 +186,7 @@ class RunState:
             "Fired": self._on_fired,
             "HeldBack": self._on_held_back,
             "Iterated": lambda r: self._set(r, item=r["number"]),
+            "Noted": lambda r: self._set(r, note=r["text"]),
             "Paused": lambda r: self._set(r, waits=r["reason"]),
             "Resumed": lambda r: self._set(r, waits=None),
             "UserdataWritten": self._on_userdata,
@@ -299,7 +404,9 @@ def _reopen(state: dict[str, Any], since: int) -> None:
     """Undo the last end of a state, which has not really ended."""
     state["seconds"] = max(0.0, state["seconds"] - (state["left"] - since) / 1e9)
     outcome, outcomes = state["outcome"], state["outcomes"]
-    outcomes[outcome] -= 1
-    if not outcomes[outcome]:
-        del outcomes[outcome]
+    # Without an outcome it was an outage that ended the visit, and nothing was counted.
+    if outcome in outcomes:
+        outcomes[outcome] -= 1
+        if outcomes[outcome] <= 0:
+            del outcomes[outcome]
     state["outcome"] = next(reversed(outcomes), None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import uuid
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +14,13 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.time import to_seconds
-from actionlib_core.wire.presence import Kind, list_endpoints
-from smachpy import log
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
+from smachpy.base import log
+from smachpy.base.problems import Problems
 from smachpy.events import from_record
 from smachpy.exceptions import SmachError
-from smachpy.introspection import StateRecord
-from smachpy.machines.problems import Problems
+from smachpy.network.reading import read_description, read_numbered_event
 from smachpy.network.server import (
     DESCRIPTION_TOPIC,
     EVENTS_TOPIC,
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from smachpy.events import Event
+    from smachpy.events.introspection import StateRecord
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["IntrospectionClient"]
@@ -136,7 +137,7 @@ class IntrospectionClient:
         """Return the structure of a server's machine.
 
         Raises:
-            SmachError: there is no such server, or it does not answer.
+            SmachError: there is no such server, it does not answer, or sends no structure.
 
         Blocks: until the answer, at most `timeout` [s].
         """
@@ -149,15 +150,18 @@ class IntrospectionClient:
                 f"introspection server {server!r}: got no answer in {to_seconds(timeout):g} s; "
                 f"servers that are there: {known}."
             ) from error
-        return StateRecord.from_json(message.data)
+        try:
+            return read_description(message.data)
+        except ValueError as error:
+            raise SmachError(f"introspection server {server!r}: its structure: {error}") from error
 
     def subscribe(
         self, server: str, listener: Callable[[Event, int], object]
     ) -> Callable[[], None]:
         """Call `listener(event, seq)` with every event of a server's machine from now on.
 
-        Goals and userdata arrive as plain values or as their `repr`. A gap in `seq` is the number
-        of events that the server could not send in time.
+        Goals and userdata arrive in the form of `smachpy.userdata.shown`. A gap in `seq` is the
+        number of events that the server could not send in time.
 
         Returns:
             A function that ends the subscription.
@@ -172,9 +176,13 @@ class IntrospectionClient:
         problems.raise_all()
 
         def take(message: Any) -> None:
-            record = json.loads(message.data)
-            number = record.pop("seq")
-            listener(from_record(record), number)
+            try:
+                record = read_numbered_event(message.data)
+                event = from_record(record)
+            except ValueError as error:
+                log.logwarn(f"{server}: an event is left out: {error}")
+            else:
+                listener(event, record["seq"])
 
         return Subscriber(server + EVENTS_TOPIC, String, take, node=self._get_node()).unregister
 

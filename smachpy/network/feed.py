@@ -28,10 +28,10 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
-from actionlib_core.wire.presence import Kind, token_pattern
+from actionlib_core.transport.tokens import Kind, token_pattern
 from smachpy.events import Recovered, Started, record_text
+from smachpy.events.introspection import describe
 from smachpy.events.run_state import RunState
-from smachpy.introspection import describe
 from smachpy.network.robot_topics import RobotTopics
 from smachpy.network.values import serve_values
 
@@ -51,10 +51,10 @@ HISTORY_SERVICE = "/smach/history"
 QUEUED_EVENTS = 20_000
 """Limit of the buffer; beyond it events are thinned out, which leaves gaps in `seq`."""
 
-KEPT_EVENTS = 5_000
+MAX_KEPT_EVENTS = 5_000
 """Number of events kept for viewers that join late, and number that may wait to be sent."""
 
-KEPT_BYTES = 8_000_000
+MAX_KEPT_BYTES = 8_000_000
 """Limit of both in bytes of text."""
 
 STOP_S = 1.0
@@ -100,7 +100,7 @@ class Feed:
         self._kept: deque[tuple[dict[str, Any], str]] = deque()
         self._kept_bytes = 0
         self._base = RunState()
-        self._run = "" if machine._smachpy.journal is None else machine._smachpy.journal.run
+        self._run = machine._smachpy.live.journal.run
         self._before = earlier[-1]["seq"] if earlier else 0
         for record in earlier:
             self._keep(record, record_text(record))
@@ -166,7 +166,7 @@ class Feed:
     def _listen(self) -> None:
         if self._watchers and self._stop_listening is None:
             self._stop_listening = self._robot.listen(
-                lambda record: self._observed.publish(record_text(record))
+                lambda record: self._observed.publish(record_text(self._buffer.steady(record)))
             )
         elif not self._watchers and self._stop_listening is not None:
             self._stop_listening()
@@ -194,8 +194,7 @@ class Feed:
                 kinds[record["path"]] = record["kind"]
                 if record["kind"] in _BEGINS:
                     self._executor.submit(self._describe)
-                    journal = self._machine._smachpy.journal
-                    self._run = "" if journal is None else journal.run
+                    self._run = self._machine._smachpy.live.journal.run
                 record["seq"] += self._before  # continues the numbers of the earlier process
                 text = record_text(record)
                 self._keep(record, text)
@@ -207,7 +206,7 @@ class Feed:
         self._kept.append((record, text))
         self._kept_bytes += len(text)
         # Events that are dropped here go into `base`, so that the history is still complete.
-        while len(self._kept) > KEPT_EVENTS or self._kept_bytes > KEPT_BYTES:
+        while len(self._kept) > MAX_KEPT_EVENTS or self._kept_bytes > MAX_KEPT_BYTES:
             old, text = self._kept.popleft()
             self._kept_bytes -= len(text)
             self._base.fold(old)
@@ -219,7 +218,7 @@ class Feed:
         """
         self._queue.append(text)
         self._queued_bytes += len(text)
-        while len(self._queue) > KEPT_EVENTS or self._queued_bytes > KEPT_BYTES:
+        while len(self._queue) > MAX_KEPT_EVENTS or self._queued_bytes > MAX_KEPT_BYTES:
             self._queued_bytes -= len(self._queue.popleft())
 
     def _answer(self, _request: object) -> tuple[bool, str]:
@@ -235,12 +234,12 @@ class Feed:
             "description": json.loads(self._description),
             "problems": self._problems,
             "control": None if self._control is None else self._control.state(),
-            "now": self._clock.time_ns(),
+            "now": self._buffer.now_ns() or self._clock.time_ns(),
         }
         with self._lock:
             base = json.dumps(self._base.data)
             kept = [text for _, text in self._kept]
-        head["observed"] = self._robot.kept()
+        head["observed"] = [self._buffer.steady(record) for record in self._robot.kept()]
         text = json.dumps(head)[:-1]
         return True, f'{text}, "base": {base}, "events": [{", ".join(kept)}]}}'
 

@@ -22,7 +22,7 @@ import math
 import zlib
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.events.recording import OBSERVED
+from smachpy.events.reading import MAX_CELLS, OBSERVED
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -57,15 +57,15 @@ VALUE_S: Final = 1.0
 NUMBERS_S: Final = 0.5
 MAP_S: Final = 2.0
 _NEAR_M, _NEAR_RAD = 0.01, 0.02  # smaller changes of a pose are not recorded
-_MOST_RAYS: Final = 181
-_MOST_POINTS: Final = 200  # of a plan
-_MOST_CELLS: Final = 4_000_000  # a larger map is made coarser
+_MAX_RAYS: Final = 181
+_MAX_POINTS: Final = 200  # of a plan
 _OCCUPIED, _FREE = 65, 25  # [%], the thresholds of ROS's map_saver
 _STANDS: Final = 1e-3  # [m/s] and [rad/s]: a slower robot is at rest
-_MOST_FRAMES: Final = 32  # between a frame and the map; a longer chain is a cycle
-_MOST_SCOPES: Final = 1000
-_MOST_NUMBERS: Final = 32  # of one message
-_MOST_ITEMS: Final = 8  # of an array
+_MAX_FRAMES: Final = 32  # between a frame and the map; a longer chain is a cycle
+_MAX_SCOPES: Final = 1000
+_MAX_NAMES: Final = 10_000  # of frames of one robot; whoever publishes on `tf` can invent them
+_MAX_NUMBERS: Final = 32  # of one message
+_MAX_ITEMS: Final = 8  # of an array
 _NUMERIC: Final = ("bool", "int", "uint", "float", "double")
 _BYTES: Final = frozenset({"uint8", "int8", "char", "byte", "octet"})
 
@@ -119,8 +119,8 @@ def _numbers(message: Any, path: str = "") -> Iterator[tuple[str, float]]:
             if not kind.endswith("Header"):
                 yield from _numbers(value, f"{here}.")
         elif isinstance(value, list | tuple):
-            if kind.endswith("[]") or len(value) <= _MOST_ITEMS:
-                items = enumerate(value[:_MOST_ITEMS])
+            if kind.endswith("[]") or len(value) <= _MAX_ITEMS:
+                items = enumerate(value[:_MAX_ITEMS])
                 yield from ((f"{here}.{i}", float(item)) for i, item in items if _is_finite(item))
         elif _is_finite(value):
             yield here, float(value)
@@ -172,10 +172,12 @@ class Observer:
     # -- one method for each role: they yield `what` and the fields of the record ----------------
 
     def _take_tf(self, robot: str, message: Any, _stamp_ns: int) -> Iterable[Any]:
-        if robot not in self._frames and len(self._frames) >= _MOST_SCOPES:
+        if robot not in self._frames and len(self._frames) >= _MAX_SCOPES:
             return ()
         known = self._frames.setdefault(robot, {})
         for stamped in message.transforms:
+            if len(known) >= _MAX_NAMES and _plain(stamped.child_frame_id) not in known:
+                continue
             moved = stamped.transform.translation
             x, y, yaw = _finite(moved.x, moved.y, _yaw(stamped.transform.rotation))
             parent = _plain(stamped.header.frame_id)
@@ -211,7 +213,7 @@ class Observer:
     def _take_scan(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
         if robot not in self._poses or not self._is_due("scan", robot, stamp_ns, SCAN_S):
             return
-        every = max(1, math.ceil(len(message.ranges) / _MOST_RAYS))
+        every = max(1, math.ceil(len(message.ranges) / _MAX_RAYS))
         first, step = _finite(message.angle_min, message.angle_increment * every)
         low, high = message.range_min, message.range_max
         ranges = [
@@ -231,7 +233,7 @@ class Observer:
 
     def _take_plan(self, robot: str, message: Any, stamp_ns: int) -> Iterator[Any]:
         poses, frame = list(message.poses), _plain(message.header.frame_id)
-        every = max(1, math.ceil(len(poses) / _MOST_POINTS))
+        every = max(1, math.ceil(len(poses) / _MAX_POINTS))
         kept = [*poses[:-1:every], *poses[-1:]]
         points = []
         for stamped in kept:
@@ -253,7 +255,7 @@ class Observer:
     def _take_numbers(self, topic: str, message: Any, stamp_ns: int) -> Iterator[Any]:
         if not self._is_due("numbers", topic, stamp_ns, NUMBERS_S):
             return
-        found = dict(itertools.islice(_numbers(message), _MOST_NUMBERS))
+        found = dict(itertools.islice(_numbers(message), _MAX_NUMBERS))
         if found:
             values = {path: round(value, 6) for path, value in found.items()}
             yield "values", {"robot": "", "topic": topic, "values": values}
@@ -275,7 +277,7 @@ class Observer:
     def _in_map(self, robot: str, frame: str, pose: Pose) -> Pose | None:
         """Return a pose of `frame` in the map frame; None if `tf` has no chain to it."""
         known = {**self._frames.get("", {}), **self._frames.get(robot, {})}
-        for _ in range(_MOST_FRAMES):
+        for _ in range(_MAX_FRAMES):
             if frame == "map" or frame.endswith("/map"):
                 return pose
             if frame not in known:
@@ -303,10 +305,12 @@ def grid_facts(data: Any, width: int, resolution: float, origin: Pose) -> dict[s
     (edge,) = _finite(resolution)
     if edge <= 0 or not cells.size or width < 1 or cells.size % width:
         raise ValueError(f"map: got {cells.size} cells of {edge} m in rows of {width}")
-    rows = cells.reshape(-1, width)
-    classes = np.where(rows >= _OCCUPIED, 1, np.where((rows >= 0) & (rows <= _FREE), 0, 2))
-    every = math.ceil(math.sqrt(cells.size / _MOST_CELLS))
-    classes = classes[::every, ::every].astype(np.uint8)
+    # First thinned out, then classified: a large map would need many times its memory.
+    every = math.ceil(math.sqrt(cells.size / MAX_CELLS))
+    rows: Any = cells.reshape(-1, width)[::every, ::every]
+    classes = np.full(rows.shape, 2, dtype=np.uint8)
+    classes[(rows >= 0) & (rows <= _FREE)] = 0
+    classes[rows >= _OCCUPIED] = 1
     return {
         "resolution": round(edge * every, 6),
         "width": int(classes.shape[1]),

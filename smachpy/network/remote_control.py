@@ -27,16 +27,18 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import SerialExecutor
 from actionlib_core.exceptions import ActionlibError, ServiceUnavailableError
+from actionlib_core.inputs.json_text import load_json
 from actionlib_core.interfaces import define_service
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher
-from smachpy import log
+from smachpy.base import log
+from smachpy.engine.preempt import asking
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import control_of
+from smachpy.network.reading import MAX_COMMAND_LENGTH, read_control_answer
 from smachpy.network.values import find_state
-from smachpy.run.grace import asking
 from smachpy.userdata.user_data import UserData
 
 if TYPE_CHECKING:
@@ -67,11 +69,18 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 
 RUNNING = (None, "keep", "cancel")
 
+MAX_AUTHOR_LENGTH = 200
+MAX_REASON_LENGTH = 1_000
+"""Lengths of the sender's name and of a command in events [characters]."""
+
 ANSWER_S = 3.0
 
 
 class CommandError(SmachError):
-    """A command is unknown or incomplete, names no existing state, or got no answer."""
+    """A command is unknown or incomplete, names no existing state, or got no answer.
+
+    Try: name a state by its path; `smachpy view` shows the machines that can be asked.
+    """
 
 
 class ControlServer:
@@ -127,7 +136,8 @@ class ControlServer:
         try:
             command = parse_command(request.command)
             words = [command["command"], *(str(command[f]) for f in COMMANDS[command["command"]])]
-            with self._lock, asking("operator", command.get("by") or "", " ".join(words)):
+            by = (command.get("by") or "")[:MAX_AUTHOR_LENGTH]
+            with self._lock, asking("operator", by, " ".join(words)[:MAX_REASON_LENGTH]):
                 self._carry_out(command)
             log.loginfo(f"{self._path}: command from remote: {command}")
         except SmachError as error:
@@ -241,12 +251,13 @@ class ControlClient:
         text = json.dumps({"by": self._by, **command})
         parse_command(text)
         try:
-            answer: dict[str, Any] = json.loads(self._service(text).answer)
+            return read_control_answer(self._service(text).answer)
+        except ValueError as error:
+            raise CommandError(f"{self._name}: got an answer that is none: {error}") from error
         except ActionlibError as error:
             absent = isinstance(error, ServiceUnavailableError)
             hint = " Was the mission started with --control?" if absent else ""
             raise CommandError(f"{self._name}: got no answer: {error}{hint}") from error
-        return answer
 
 
 def parse_command(text: str) -> dict[str, Any]:
@@ -256,9 +267,9 @@ def parse_command(text: str) -> dict[str, Any]:
         CommandError: it is not a command, or an argument is missing.
     """
     try:
-        command = json.loads(text)
+        command = load_json(text, longest=MAX_COMMAND_LENGTH)
     except ValueError as error:
-        raise CommandError(f"command: got no JSON: {error}; expected an object.") from error
+        raise CommandError(f"command: {error}; expected a JSON object.") from error
     if not isinstance(command, dict):
         raise CommandError(f"command: got {command!r}; expected an object.")
     name = command.get("command")

@@ -12,8 +12,8 @@ from actionlib_core.clock import SerialExecutor
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces import get_message
 from actionlib_core.node import get_node
-from actionlib_core.pubsub.topic import Subscriber
-from actionlib_core.wire.presence import Kind, parse_token, token_pattern
+from actionlib_core.pubsub.topic import WatchingSubscriber
+from actionlib_core.transport.tokens import Kind, parse_token, token_pattern
 from smachpy.events import record_text
 from smachpy.network.observations import NUMBERS, Observer, is_small, role_of
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Presence
-    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.transport.tokens import Endpoint
 
 logger = logging.getLogger("smachpy")
 
-KEPT: Final = 20_000
+MAX_KEPT_OBSERVATIONS: Final = 20_000
 """Number of records kept for viewers that join late, besides the newest maps."""
 
-KEPT_BYTES: Final = 8_000_000
+MAX_KEPT_BYTES: Final = 8_000_000
 """Limit of their text [bytes]."""
 
-MOST_TOPICS: Final = 400
+MAX_TOPICS: Final = 400
 """Maximum number of topics to which it subscribes."""
 
 
@@ -64,6 +64,7 @@ class RobotTopics:
         # listener may end its own subscription.
         self._calling = threading.RLock()
         self._executor = SerialExecutor(self._node.clock, "robot topics")
+        self._begun_at, self._begun_ns = self._node.clock.now(), self._node.clock.time_ns()
         self._observer = Observer()
         self._listeners: list[Callable[[dict[str, Any]], object]] = []
         self._kept: deque[tuple[dict[str, Any], int]] = deque()
@@ -72,7 +73,7 @@ class RobotTopics:
         self._count = 0
         self._watches: list[Closable] = []
         self._topics: dict[
-            str, tuple[Subscriber[Any], set[str]]
+            str, tuple[WatchingSubscriber[Any], set[str]]
         ] = {}  # by name, with its publishers
 
     def __enter__(self) -> Self:
@@ -88,10 +89,7 @@ class RobotTopics:
         The returned function waits for a running call, at most 1 s, so that whatever the listener
         uses can be closed afterwards.
 
-        Raises:
-            TransportError: the network of a ROS 2 robot cannot be joined.
-
-        Blocks: until such networks are joined.
+        Blocks: until the networks of ROS 2 robots are joined; one that cannot be is tried again.
         """
         with self._lock:
             self._listeners.append(listener)
@@ -178,14 +176,14 @@ class RobotTopics:
     def _change(self, end: Endpoint, key: str, *, alive: bool) -> None:
         scope = self._scope(end)
         assert scope is not None
-        gone: Subscriber[Any] | None = None
+        gone: WatchingSubscriber[Any] | None = None
         with self._lock:
             known = self._topics.get(end.name)
             if known is not None:
                 known[1].add(key) if alive else known[1].discard(key)
                 if not known[1]:
                     gone = self._topics.pop(end.name)[0]
-            wanted = known is None and alive and self._listeners and len(self._topics) < MOST_TOPICS
+            wanted = known is None and alive and self._listeners and len(self._topics) < MAX_TOPICS
         if gone is not None:
             gone.unregister()
         if not wanted:
@@ -194,7 +192,7 @@ class RobotTopics:
             kind = self._class(end)
             if scope[0] == NUMBERS and not is_small(kind()):
                 return
-            made = Subscriber(
+            made = WatchingSubscriber(
                 f"/{end.name}",
                 kind,
                 partial(self._on_message, *scope, self._inside(end.name)),
@@ -224,13 +222,16 @@ class RobotTopics:
         return name.removeprefix(f"{self._node.namespace.strip('/')}/")
 
     def _on_message(self, role: str, robot: str, topic: str, message: Any) -> None:
-        stamp_ns = self._node.clock.time_ns()
+        at = self._node.clock.now()
+        # No step of the wall clock changes what is due.
+        stamp_ns = self._begun_ns + round((at - self._begun_at) * 1e9)
         with self._calling:
             with self._lock:
                 records = self._observer.take(role, robot, message, stamp_ns)
                 if role in _HAVE_NUMBERS:
                     records += self._observer.take(NUMBERS, topic, message, stamp_ns)
                 for record in records:
+                    record["t"] = at
                     self._keep(record)
                 listeners = list(self._listeners)
             for record in records:
@@ -245,5 +246,5 @@ class RobotTopics:
         size = len(record_text(record))
         self._kept.append((record, size))
         self._kept_bytes += size
-        while len(self._kept) > KEPT or self._kept_bytes > KEPT_BYTES:
+        while len(self._kept) > MAX_KEPT_OBSERVATIONS or self._kept_bytes > MAX_KEPT_BYTES:
             self._kept_bytes -= self._kept.popleft()[1]

@@ -35,10 +35,10 @@ from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.time import Time
 from actionlib_core.transport import Quality
 from actionlib_core.wire.encoding import encoding_of
-from smachpy import log
+from smachpy.base import log
+from smachpy.base.problems import Problems
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
-from smachpy.machines.problems import Problems
 from smachpy.network.feed import DESCRIPTION_TOPIC, EVENTS_TOPIC, STOP_S, Feed
 from smachpy.network.remote_control import ControlServer
 from smachpy.userdata.json_text import dumps, loads
@@ -77,7 +77,7 @@ STATUS_INTERVAL_S = 0.05
 
 READ_TRIES = 5
 
-LONGEST_VALUE = 10_000
+MAX_VALUE_LENGTH = 10_000
 """For userdata values with more elements only the size is sent."""
 
 
@@ -316,7 +316,7 @@ def _describe_userdata(userdata: UserData) -> str:
     values = dict(data_of(userdata))  # an atomic copy
     for _ in range(READ_TRIES):
         try:
-            return dumps(values, longest=LONGEST_VALUE)
+            return dumps(values, longest=MAX_VALUE_LENGTH)
         except RuntimeError:  # a state changed the size of a dict or set meanwhile: try again
             continue
     return dumps({key: f"<{type(value).__name__} that changes>" for key, value in values.items()})
@@ -346,7 +346,7 @@ class IntrospectionServer:
     def __init__(
         self,
         server_name: str,
-        state: State,
+        state: Container,
         path: str,
         *,
         obey: bool = True,

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.interfaces import Message, define_service
 from actionlib_core.pubsub.service import Service
+from smachpy.userdata.secret import masked
 
 if TYPE_CHECKING:
     from actionlib_core.node import Node
     from smachpy.machines.container import Container
 
 VALUE_SERVICE = "/smach/value"
-LONGEST_VALUE = 2_000_000
+MAX_VALUE_LENGTH = 2_000_000
 """Longest text of a value; the number of characters cut off is appended."""
 
 WIDTH = 100
@@ -56,7 +57,7 @@ def serve_values(server_name: str, machine: Container, path: str, node: Node) ->
         except KeyError:
             return False, f"{request.container}: {request.key!r} is not there any more."
         try:
-            return True, value_text(value)
+            return True, value_text(masked(value, request.key))
         except Exception as error:  # noqa: BLE001  the user's `__repr__`
             return False, f"{type(value).__name__}: its repr raised {type(error).__name__}: {error}"
 
@@ -73,9 +74,9 @@ def value_text(value: Any) -> str:
         text = str(value)
     else:
         text = pprint.pformat(value, width=WIDTH, compact=True)
-    if len(text) <= LONGEST_VALUE:
+    if len(text) <= MAX_VALUE_LENGTH:
         return text
-    return f"{text[:LONGEST_VALUE]}\n... {len(text) - LONGEST_VALUE} characters more"
+    return f"{text[:MAX_VALUE_LENGTH]}\n... {len(text) - MAX_VALUE_LENGTH} characters more"
 
 
 def find_state(state: Any, path: str) -> Any:

@@ -23,7 +23,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.inputs.json_text import JsonTextError, load_json
 from actionlib_core.time import Duration, Time
+from smachpy.userdata.secret import masked
+from smachpy.userdata.shown import literal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -40,8 +43,41 @@ def dumps(values: Mapping[str, Any], *, longest: int | None = None) -> str:
         longest: Texts, bytes and containers with more elements become a `$repr` of their size, for
             display; None to write everything.
     """
+    if longest is not None:  # for display
+        values = {key: masked(value, key) for key, value in values.items()}
     encoded = {key: _encode(value, longest, 0) for key, value in values.items()}
     return json.dumps(encoded, allow_nan=False)
+
+
+def encoded(value: Any) -> Any:
+    """Return a value as `dumps` writes it, before it becomes text."""
+    return _encode(value, None, 0)
+
+
+def decoded(value: Any, where: str) -> Any:
+    """Return the value of an `encoded` one; `where` is its place, for errors.
+
+    Raises:
+        ValueError: it has no such form, or was only shown.
+    """
+    return _decode(value, where)
+
+
+def from_shown(values: Mapping[str, Any]) -> str:
+    """Return JSON text, as `dumps` does, of values as records of events have them (`shown`)."""
+    return json.dumps({key: _of_shown(value) for key, value in values.items()})
+
+
+def _of_shown(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_of_shown(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if "$int" in value:
+        return int(value["$int"])
+    if any(mark in value for mark in ("$object", "$array", "$cut", "$large", "$repr")):
+        return {"$repr": literal(value)}
+    return {key: _of_shown(item) for key, item in value.items()}
 
 
 def loads(text: str) -> dict[str, Any]:
@@ -54,12 +90,12 @@ def loads(text: str) -> dict[str, Any]:
     if not text:
         return {}
     try:
-        data = json.loads(text)
+        data = load_json(text, deepest=4 * _DEPTH)  # three for a level of `$items`
         if not isinstance(data, dict):
             raise ValueError(f"userdata: got {type(data).__name__}; expected a JSON object.")  # noqa: TRY004
         return {key: _decode(value, f"$.{key}") for key, value in data.items()}
-    except RecursionError as error:
-        raise ValueError("userdata: nested too deeply.") from error
+    except JsonTextError as error:
+        raise ValueError(f"userdata: {error}.") from error
 
 
 def find_lost(values: Mapping[str, Any]) -> list[str]:
@@ -127,7 +163,7 @@ def _decode(data: Any, where: str) -> Any:
     if decode is None:
         reason = "its sender could only show it" if marks[0] == "$repr" else "unknown"
         raise ValueError(
-            f"userdata: {where}: got {data!r}: {reason}; expected one of {sorted(_DECODERS)}."
+            f"userdata: {where}: got {data!r} ({reason}); expected one of {sorted(_DECODERS)}."
         )
     try:
         return decode(data, where)

@@ -62,8 +62,8 @@ def register_type(
         problem = problem_of(kind)
         if problem is not None:
             raise InvalidStateError(
-                f"register_type: got {kind.__qualname__}: {problem}; expected a dataclass, a named "
-                "tuple or an enum. Try to_data=... and from_data=..."
+                f"register_type: got {kind.__qualname__} ({problem}); expected a dataclass, a "
+                "named tuple or an enum. Try to_data=... and from_data=..."
             )
     REGISTERED[name_of(kind)] = RegisteredType(kind, to_data, from_data)
     if to_data is None:

@@ -14,12 +14,13 @@ import enum
 import functools
 import types
 from collections import OrderedDict, defaultdict, deque
+from contextvars import ContextVar
 from operator import is_
 from typing import TYPE_CHECKING, Any
 
-from smachpy.context import current_path
+from smachpy.base.context import current_path
+from smachpy.base.slips import accepts
 from smachpy.exceptions import ReadOnlyError
-from smachpy.slips import accepts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,6 +42,17 @@ def read_only(value: Any, key: str = "") -> Any:
         value: Any value.
         key: The userdata key from which it, or the value around it, was read; for error texts.
     """
+    try:
+        return _view(value, key)
+    except RecursionError:  # it contains itself: again, with a note of the views that are made
+        token = _MADE.set({})
+    try:
+        return _view(value, key)
+    finally:
+        _MADE.reset(token)
+
+
+def _view(value: Any, key: str) -> Any:
     kind = type(value)
     if kind in ATOMS:
         return value
@@ -48,8 +60,14 @@ def read_only(value: Any, key: str = "") -> Any:
     return value if maker is None else maker(value, key)
 
 
+_MADE: ContextVar[dict[int, Any] | None] = ContextVar("smachpy_views_made", default=None)
+"""Identity of a value -> its view, while views are made of one that contains itself."""
+
+
 def still_shows(view: Any, value: Any) -> bool:
     """Return whether `view`, made by `read_only(value)`, still has the content of `value`.
+
+    For a value that contains itself the answer is False.
 
     For nested lists, the comparison takes a fifth of the time of making a view. For views with
     copies that cannot be compared by identity (sets, slots), the answer is always False.
@@ -57,9 +75,12 @@ def still_shows(view: Any, value: Any) -> bool:
     if view is value:
         return type(value) in ATOMS
     looks = getattr(type(view), "_smach_still_shows", None)
-    if looks is None or view._smach_original is not value:  # noqa: SLF001  our own view
+    if looks is None or view._smachpy_original is not value:
         return False
-    return bool(looks(view, value))
+    try:
+        return bool(looks(view, value))
+    except RecursionError:
+        return False
 
 
 def _list_still_shows(view: list[Any], value: list[Any]) -> bool:
@@ -84,18 +105,50 @@ def _object_still_shows(_view: Any, _value: Any) -> bool:
 
 
 def writable(value: Any) -> Any:
-    """Undo `read_only`, also inside lists, tuples, sets and dicts; others are unchanged."""
+    """Undo `read_only`, also inside lists, tuples, sets and dicts; others are unchanged.
+
+    Raises:
+        ReadOnlyError: the value contains itself, and views too.
+    """
+    try:
+        return _writable(value)
+    except RecursionError:
+        if not _has_view(value):
+            return value
+    problem = (
+        "userdata: got a value that contains itself and values that this state may only read; "
+        "expected one or the other. Try copy.deepcopy of what was read."
+    )
+    raise ReadOnlyError(problem, path=current_path())
+
+
+def _has_view(value: Any) -> bool:
+    """Return whether there is a view in a value that contains itself."""
+    left, seen = [value], {id(value)}
+    while left:
+        one = left.pop()
+        if isinstance(one, _View):
+            return True
+        inside = one.values() if type(one) is dict else one
+        if type(one) in {list, tuple, set, frozenset, dict}:
+            new = [part for part in inside if id(part) not in seen]
+            seen.update(map(id, new))
+            left += new
+    return False
+
+
+def _writable(value: Any) -> Any:
     kind = type(value)
     if kind in ATOMS:
         return value
     if issubclass(kind, _View):
-        return value._smach_original  # noqa: SLF001  our own view
+        return value._smachpy_original
     if kind is list or kind is tuple or kind is set or kind is frozenset:
         if any(_holds_view(item) for item in value):
-            return kind(writable(item) for item in value)
+            return kind(_writable(item) for item in value)
         return value
     if kind is dict and any(_holds_view(item) for item in value.values()):
-        return {key: writable(item) for key, item in value.items()}
+        return {key: _writable(item) for key, item in value.items()}
     return value
 
 
@@ -111,10 +164,10 @@ def _holds_view(value: Any) -> bool:
 
 
 class _View:
-    """Base of all views; `_smach_original` is the viewed object, `_smach_key` its userdata key."""
+    """Base of all views: `_smachpy_original` is the object, `_smach_key` its userdata key."""
 
     __slots__ = ()
-    _smach_original: Any
+    _smachpy_original: Any
     _smach_key: str
 
 
@@ -137,7 +190,7 @@ def _refuser(base: type, method: str) -> Callable[..., Any]:
             raise ReadOnlyError(problem, key=key, path=path)
         if base is not object:
             getattr(base, method)(self, *args, **kwargs)
-        result = getattr(self._smach_original, method)(*args, **kwargs)
+        result = getattr(self._smachpy_original, method)(*args, **kwargs)
         return self if method[:3] == "__i" else result
 
     refuse.__name__ = method
@@ -189,7 +242,7 @@ def _maker(kind: type) -> Callable[[Any, str], Any] | None:
 def _tuple_view(value: Any, key: str) -> Any:
     if all(type(item) in ATOMS for item in value):
         return value
-    items = [read_only(item, key) for item in value]
+    items = [_view(item, key) for item in value]
     return tuple(items) if type(value) is tuple else type(value)._make(items)
 
 
@@ -213,7 +266,12 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | No
 
     def make(value: Any, key: str) -> Any:
         # Without `__init__`, which may do anything: attributes are shared or copied below.
+        made = _MADE.get()
+        if made is not None and id(value) in made:
+            return made[id(value)]
         view = new(view_class)
+        if made is not None:
+            made[id(value)] = view
         if base is not None:
             _fill(base, view, value, key)
         for slot in slots:
@@ -221,7 +279,7 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | No
                 object.__setattr__(view, slot, object.__getattribute__(value, slot))
         if has_dict:  # the same dict, so that later changes of the object are seen in the view
             object.__setattr__(view, "__dict__", value.__dict__)
-        object.__setattr__(view, "_smach_original", value)
+        object.__setattr__(view, "_smachpy_original", value)
         object.__setattr__(view, "_smach_key", key)
         return view
 
@@ -234,7 +292,7 @@ def _view_class(kind: type, base: type | None) -> Any:
 
     def __getattribute__(self: Any, name: str) -> Any:  # noqa: N807
         value = getter(self, name)
-        if type(value) in ATOMS or name[:2] == "__" or name == "_smach_original":
+        if type(value) in ATOMS or name[:2] == "__" or name == "_smachpy_original":
             return value
         return read_only(value, self._smach_key)
 
@@ -244,7 +302,7 @@ def _view_class(kind: type, base: type | None) -> Any:
     body: dict[str, Any] = {name: _refuser(base or object, name) for name in changes}
     body |= {
         "__new__": lambda _cls, *args, **kwargs: kind.__new__(kind, *args, **kwargs),
-        "__slots__": ("_smach_key", "_smach_original"),
+        "__slots__": ("_smach_key", "_smachpy_original"),
         "__class__": property(lambda _self: kind),  # dataclasses compare `__class__`
         "__module__": kind.__module__,
         "__qualname__": kind.__qualname__,
@@ -294,7 +352,7 @@ def _view_metaclass(metaclass: type) -> type:
 
 def _missing(self: Any, name: Any) -> Any:
     """Return the default of a `defaultdict` for a key that it does not have, without adding it."""
-    factory = self._smach_original.default_factory
+    factory = self._smachpy_original.default_factory
     if factory is None:
         raise KeyError(name)
     return read_only(factory(), self._smach_key)
@@ -315,24 +373,22 @@ def _fill(base: type, view: Any, value: Any, key: str) -> None:
     # the view raise.
     if isinstance(value, OrderedDict):
         for name, item in value.items():
-            OrderedDict.__setitem__(view, name, read_only(item, key))
+            OrderedDict.__setitem__(view, name, _view(item, key))
     elif base is dict:
-        dict.update(view, {n: read_only(item, key) for n, item in dict.items(value)})
+        dict.update(view, {n: _view(item, key) for n, item in dict.items(value)})
     elif base is set:
         set.update(view, value)
     elif base is bytearray:
         bytearray.extend(view, value)
     elif base is deque:
-        deque.__init__(view, [read_only(item, key) for item in value], value.maxlen)
+        deque.__init__(view, [_view(item, key) for item in value], value.maxlen)
     else:
-        list.extend(
-            view, [x if type(x) in ATOMS else read_only(x, key) for x in list.__iter__(value)]
-        )
+        list.extend(view, [x if type(x) in ATOMS else _view(x, key) for x in list.__iter__(value)])
 
 
 def _reduce(self: Any, protocol: Any) -> Any:
     """Copy and pickle like the original: a copy of a view may be changed."""
-    return self._smach_original.__reduce_ex__(protocol)
+    return self._smachpy_original.__reduce_ex__(protocol)
 
 
 def _slots_of(kind: type) -> tuple[str, ...]:

@@ -1,37 +1,60 @@
-"""Values for display: their JSON form, or the text of their `repr`, unless that takes too long.
+"""Values for display: their structure as JSON has it, within limits, and their text for people.
 
-`repr` has no limit, so the parts of the value are counted first. That works for Python's
-containers, messages, dataclasses, namespaces and exceptions, and for anything with a length; the
-`__repr__` of any other class is called without a check.
+JSON's own values stand for themselves: numbers, texts, lists, and dicts whose keys are texts that
+do not begin with "$". Any other value is an object with one of these keys:
+
+    {"$tuple": [...]}  {"$set": [...]}
+    {"$items": [[key, value], ...]}            a dict with other keys
+    {"$float": "nan" | "inf" | "-inf"}
+    {"$int": "12345678901234567890"}           an integer that JavaScript would round
+    {"$bytes": "base64"}
+    {"$msg": "pkg/Type", "fields": {...}}      a message of ROS
+    {"$object": "Pose2D", "fields": {...}}     a dataclass, named tuple, time of ROS, ...
+    {"$array": [...], "dtype": "float64"}      an array of numpy
+    {"$cut": "the beginning", "length": 9999}  a text that is too long
+    {"$large": "list", "length": 9999}         a value with too many parts: only their number
+    {"$repr": "..."}                           any other value: its `repr`, perhaps cut
+
+`literal` makes the text of such a value, as Python writes it.
+
+`repr` has no limit, so the parts of a value are counted before it is called. That works for
+Python's containers, messages, dataclasses, namespaces and exceptions, and for anything with a
+length; the `__repr__` of any other class is called without a check.
 """
 
 from __future__ import annotations
 
+import binascii
 import math
 from collections import UserDict, UserList, deque
-from collections.abc import ItemsView, KeysView, ValuesView
-from dataclasses import dataclass, fields
+from collections.abc import Callable, ItemsView, KeysView, ValuesView
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from functools import partial
 from itertools import chain
 from types import MappingProxyType, SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+from smachpy.userdata.secret import MASK, hides, is_secret
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-LONGEST_TEXT = 4_000
-LONGEST_LIST = 1_000
-DEEPEST = 20
-MOST_ITEMS = 10_000
-MOST_TEXT = 100_000
+MAX_TEXT_LENGTH = 4_000
+MAX_LIST_ITEMS = 1_000
+MAX_NESTING = 20
+MAX_TOTAL_ITEMS = 10_000
+MAX_TOTAL_TEXT = 100_000
 WIDEST_INT = 1_024  # bits
+EXACT = 2**53  # integers up to here are exact in JavaScript
 """Limits of values in a record, which are for display, not for computing.
 
 The first three apply to each part, the next two to a whole record, so that making one takes a few
 milliseconds at most.
 """
 
-_MOST_READ = 4 * LONGEST_TEXT  # characters in the parts of a `repr`, which is then cut
-_DEEPEST_REPR = 100
+_MAX_REPR_LENGTH = 4 * MAX_TEXT_LENGTH  # characters in the parts of a `repr`, which is then cut
+_MAX_REPR_NESTING = 100
 _SMALL = frozenset({type(None), bool, float, complex, range, type})
 _MAPPINGS = (dict, UserDict, MappingProxyType)
 _LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, ItemsView)
@@ -39,10 +62,11 @@ _LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, It
 
 @dataclass(slots=True)
 class Room:
-    """The remaining room in a record."""
+    """The remaining room in a record; `above` has the ids of the values around the present one."""
 
-    items: int = MOST_ITEMS
-    text: int = MOST_TEXT
+    items: int = MAX_TOTAL_ITEMS
+    text: int = MAX_TOTAL_TEXT
+    above: set[int] = field(default_factory=set)
 
 
 def text_of(value: Any, room: Room, depth: int = 0) -> str:
@@ -52,7 +76,7 @@ def text_of(value: Any, room: Room, depth: int = 0) -> str:
     for items. If the value's own code raises, the text says so.
     """
     try:
-        left = Room(room.items, min(room.text, _MOST_READ))
+        left = Room(room.items, min(room.text, _MAX_REPR_LENGTH))
         fits = _fits(value, left, set())
         spent = room.items - max(left.items, 0)
         room.items -= spent if fits else spent // 4  # counting costs less than formatting
@@ -70,9 +94,9 @@ def _fits(value: Any, left: Room, above: set[int]) -> bool:
         return value.bit_length() <= WIDEST_INT
     if isinstance(value, (str, bytes, bytearray)):
         left.text -= len(value)
-        return left.text >= 0 and (isinstance(value, str) or len(value) <= LONGEST_LIST)
+        return left.text >= 0 and (isinstance(value, str) or len(value) <= MAX_LIST_ITEMS)
     size = _size(value)
-    if size is not None and size > min(LONGEST_LIST, left.items):
+    if size is not None and size > min(MAX_LIST_ITEMS, left.items):
         return False
     # `above` has the ids of the values around this one: Python's `repr` shows a cycle as "...", so
     # it adds nothing here.
@@ -81,7 +105,7 @@ def _fits(value: Any, left: Room, above: set[int]) -> bool:
 
 
 def _all_fit(inside: Iterable[Any], left: Room, above: set[int]) -> bool:
-    if len(above) > _DEEPEST_REPR:
+    if len(above) > _MAX_REPR_NESTING:
         return False
     for one in inside:
         left.items -= 1
@@ -130,10 +154,10 @@ def _outline(value: Any, room: Room, depth: int) -> str:
     if isinstance(value, int):
         return f"<int of {value.bit_length()} bits>"
     if isinstance(value, str):
-        return repr(value[: min(LONGEST_TEXT, max(room.text, 0))]) + "\u2026"
+        return repr(value[: min(MAX_TEXT_LENGTH, max(room.text, 0))]) + "\u2026"
     named = _fields(value)
     size = len(value if named is None else named)
-    if size > min(LONGEST_LIST, room.items) or depth >= DEEPEST:
+    if size > min(MAX_LIST_ITEMS, room.items) or depth >= MAX_NESTING:
         return f"<{kind.__name__} of {size} elements>"
     room.items -= size
     if named is not None:
@@ -152,57 +176,249 @@ def _joined(
     for name, part in pairs:
         parts.append(name + text_of(part, room, depth + 1))
         length += len(parts[-1])
-        if length > LONGEST_TEXT:
+        if length > MAX_TEXT_LENGTH:
             break
     return f"{before}{', '.join(parts)}{after}"
 
 
-def plain(value: Any, room: Room, depth: int = 0) -> Any:
-    """Return `value` as JSON has it, cut to the limits above; see `smachpy.events.to_record`."""
-    if value is None or isinstance(value, bool):
+def shown(value: Any, room: Room, depth: int = 0) -> Any:
+    """Return the structure of a value, cut to the limits above."""
+    kind = type(value)
+    if value is None or kind is bool:
         return value
-    if isinstance(value, int):
-        bits = value.bit_length()
-        return value if bits <= WIDEST_INT else f"<int of {bits} bits>"
-    if isinstance(value, float) and math.isfinite(value):
-        return value
-    if isinstance(value, str):
-        return _cut(value, room)
     try:
-        shown = _container(value, room, depth) if depth < DEEPEST else None
+        return _shown_atom(value, room) if kind in _ATOMS else _shown(value, room, depth)
     except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
-        return f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"
-    return _cut(text_of(value, room), room) if shown is None else shown
+        return {"$repr": f"<{type(value).__name__}: looking at it raised {type(error).__name__}>"}
+
+
+_ATOMS: Final = frozenset({int, float, str, bytes})
+
+
+def _shown(value: Any, room: Room, depth: int) -> Any:  # noqa: PLR0911  one for each kind
+    kind = type(value)
+    usual = _USUAL.get(kind)
+    if usual is not None:
+        return _shown_parts(usual, len(value), value, room, depth)
+    if is_secret(value):
+        return {"$repr": MASK}
+    if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
+        return _shown_parts(_shown_message, len(kind.__slots__), value, room, depth)
+    if isinstance(value, Enum):
+        return {"$repr": _cut(f"{kind.__qualname__}.{value.name}", room)}
+    if isinstance(value, (int, float, str, bytes, bytearray)):
+        return _shown_atom(value, room)
+    form, size = _form(kind, value)
+    if form is None:
+        return {"$repr": _cut(text_of(value, room), room)}
+    return _shown_parts(form, size, value, room, depth)
+
+
+_Form: TypeAlias = "Callable[[Any, Room, int], Any]"
+
+
+def _shown_parts(form: _Form, size: int, value: Any, room: Room, depth: int) -> Any:
+    if id(value) in room.above:
+        return {"$repr": "..."}  # as Python writes a value inside itself
+    if size > min(MAX_LIST_ITEMS, room.items) or depth >= MAX_NESTING or room.text <= 0:
+        return {"$large": type(value).__name__, "length": size}
+    room.items -= size
+    room.above.add(id(value))
+    try:
+        return form(value, room, depth + 1)
+    finally:
+        room.above.discard(id(value))
+
+
+def _shown_atom(value: Any, room: Room) -> Any:
+    if isinstance(value, str):
+        most = min(MAX_TEXT_LENGTH, max(room.text, 0))
+        room.text -= min(len(value), most)
+        whole = len(value) <= most
+        return str(value) if whole else {"$cut": str(value[:most]), "length": len(value)}
+    if isinstance(value, bytes | bytearray):
+        if len(value) > min(MAX_LIST_ITEMS, room.text):
+            return {"$large": type(value).__name__, "length": len(value)}
+        room.text -= len(value)
+        return {"$bytes": binascii.b2a_base64(value, newline=False).decode("ascii")}
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else {"$float": str(float(value))}
+    if abs(value) <= EXACT:
+        return int(value)
+    bits = value.bit_length()
+    return {"$int": str(int(value))} if bits <= WIDEST_INT else {"$repr": f"<int of {bits} bits>"}
+
+
+def _form(kind: Any, value: Any) -> tuple[_Form | None, int]:
+    """Return the function that makes the structure of an unusual container; None for others."""
+    if isinstance(value, MappingProxyType | UserDict | dict):
+        return _shown_dict, len(value)
+    if hasattr(kind, "dtype") and hasattr(kind, "tolist"):
+        is_number = value.shape == ()
+        return (_shown_number if is_number else _shown_array), int(value.size)
+    if (found := _named(kind, value)) is not None:
+        return partial(_shown_object, found), len(found)
+    for base, form in _USUAL.items():
+        if isinstance(value, base):
+            return form, len(value)
+    return None, 0
+
+
+def _named(kind: Any, value: Any) -> dict[str, Any] | None:
+    """Return the named parts of a value that its class declares; None if it declares none."""
+    if hasattr(kind, "to_nsec") and hasattr(kind, "nsecs"):
+        return {"secs": value.secs, "nsecs": value.nsecs}
+    if hasattr(kind, "__dataclass_fields__"):
+        return {one.name: getattr(value, one.name, None) for one in fields(value) if one.repr}
+    if issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        return dict(zip(kind._fields, value, strict=False))
+    if issubclass(kind, SimpleNamespace):
+        return dict(vars(value))
+    if hasattr(kind, "__attrs_attrs__"):
+        return {o.name: getattr(value, o.name, None) for o in kind.__attrs_attrs__ if o.repr}
+    return None
+
+
+def _shown_message(value: Any, room: Room, depth: int) -> Any:
+    named = {name: getattr(value, name, None) for name in type(value).__slots__}
+    return {"$msg": str(value._type), "fields": _shown_fields(named, room, depth)}
+
+
+def _shown_object(named: dict[str, Any], value: Any, room: Room, depth: int) -> Any:
+    name = type(value).__qualname__.rpartition(".")[2]
+    return {"$object": name, "fields": _shown_fields(named, room, depth)}
+
+
+def _shown_fields(named: dict[str, Any], room: Room, depth: int) -> dict[str, Any]:
+    return {str(key): _shown_named(key, part, room, depth) for key, part in named.items()}
+
+
+def _shown_named(name: object, value: Any, room: Room, depth: int) -> Any:
+    return {"$repr": MASK} if hides(name, value) else shown(value, room, depth)
+
+
+def _shown_list(value: Any, room: Room, depth: int) -> Any:
+    return [shown(item, room, depth) for item in value]
+
+
+def _shown_dict(value: Any, room: Room, depth: int) -> Any:
+    pairs = list(value.items())
+    if all(isinstance(key, str) and key[:1] != "$" for key, _ in pairs):
+        room.text -= sum(len(key) for key, _ in pairs)
+        return {
+            str(key[:MAX_TEXT_LENGTH]): _shown_named(key, item, room, depth) for key, item in pairs
+        }
+    return {
+        "$items": [
+            [shown(key, room, depth), _shown_named(key, item, room, depth)] for key, item in pairs
+        ]
+    }
+
+
+def _shown_array(value: Any, room: Room, depth: int) -> Any:
+    return {"$array": shown(value.tolist(), room, depth), "dtype": str(value.dtype)}
+
+
+def _shown_number(value: Any, room: Room, depth: int) -> Any:
+    return shown(value.item(), room, depth)
+
+
+_USUAL: Final[dict[Any, _Form]] = {
+    list: _shown_list,
+    dict: _shown_dict,
+    tuple: lambda value, room, depth: {"$tuple": _shown_list(value, room, depth)},
+    set: lambda value, room, depth: {"$set": _shown_list(value, room, depth)},
+    frozenset: lambda value, room, depth: {"$set": _shown_list(value, room, depth)},
+}
 
 
 def _cut(text: str, room: Room) -> str:
-    most = min(LONGEST_TEXT, max(room.text, 0))
+    most = min(MAX_TEXT_LENGTH, max(room.text, 0))
     room.text -= min(len(text), most)
     return text if len(text) <= most else text[:most] + "\u2026"
 
 
-def _container(value: Any, room: Room, depth: int) -> Any:
-    """Return the JSON form of a container; None if `value` is none, or is too long."""
-    if isinstance(value, (list, tuple, dict)):
-        if len(value) > min(LONGEST_LIST, room.items):
-            return None
-        room.items -= len(value)
-        if not isinstance(value, dict):
-            return [plain(item, room, depth + 1) for item in value]
-        pairs = list(value.items())
-        if all(isinstance(key, str) for key, _ in pairs):
-            room.text -= sum(len(key) for key, _ in pairs)
-            return {key[:LONGEST_TEXT]: plain(item, room, depth + 1) for key, item in pairs}
+def short_text(text: str, room: Room) -> str:
+    """Return a text, cut to the limits above; "\u2026" at the end shows that it was cut."""
+    return _cut(text, room)
+
+
+# -- the text of a value ---------------------------------------------------------------------------
+
+
+def literal(value: Any) -> str:
+    """Return a value of `shown` as Python writes it.
+
+    Values of other forms, as of damaged recordings, are shown as they are.
+    """
+    if isinstance(value, dict):
+        for mark, text in _LITERALS.items():
+            if mark in value:
+                try:
+                    return text(value)
+                except (TypeError, ValueError, LookupError, AttributeError):
+                    break
+        return "{" + ", ".join(f"{key!r}: {literal(part)}" for key, part in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{_listed(value)}]"
+    return repr(value)
+
+
+def _listed(values: Iterable[Any]) -> str:
+    return ", ".join(map(literal, values))
+
+
+def _tuple_text(value: dict[str, Any]) -> str:
+    items = value["$tuple"]
+    return f"({_listed(items)},)" if len(items) == 1 else f"({_listed(items)})"
+
+
+def _call_text(value: dict[str, Any]) -> str:
+    name = value.get("$object") or value["$msg"].rpartition("/")[2]
+    named = ", ".join(f"{key}={literal(part)}" for key, part in value["fields"].items())
+    return f"{name}({named})"
+
+
+_LITERALS: Final[dict[str, Callable[[dict[str, Any]], str]]] = {
+    "$tuple": _tuple_text,
+    "$set": lambda value: f"{{{_listed(value['$set'])}}}" if value["$set"] else "set()",
+    "$items": lambda value: (
+        "{" + ", ".join(f"{literal(key)}: {literal(part)}" for key, part in value["$items"]) + "}"
+    ),
+    "$float": lambda value: str(value["$float"]),
+    "$int": lambda value: str(value["$int"]),
+    "$bytes": lambda value: repr(binascii.a2b_base64(value["$bytes"])),
+    "$msg": _call_text,
+    "$object": _call_text,
+    "$array": lambda value: f"array({literal(value['$array'])}, dtype={value['dtype']})",
+    "$cut": lambda value: f"{value['$cut']!r}\u2026",
+    "$large": lambda value: f"<{value['$large']} of {value['length']} elements>",
+    "$repr": lambda value: str(value["$repr"]),
+}
+
+
+def fields_of(value: Any) -> dict[str, Any] | None:
+    """Return the named parts of a value of `shown`; None if it has none."""
+    if not isinstance(value, dict):
         return None
-    return _fields_of(value, room, depth)
+    if "$msg" in value or "$object" in value:
+        parts = value.get("fields")
+        return parts if isinstance(parts, dict) else {}
+    return {} if is_shown(value) else value
 
 
-def _fields_of(value: Any, room: Room, depth: int) -> Any:
-    """Return the fields of a message, or of a ROS time or duration; None for anything else."""
-    if hasattr(value, "_md5sum") and hasattr(value, "__slots__"):
-        fields = {name: getattr(value, name, None) for name in value.__slots__}
-        return {"$msg": str(value._type), "fields": plain(fields, room, depth + 1)}
-    if hasattr(value, "to_nsec") and hasattr(value, "nsecs"):
-        parts = {"secs": value.secs, "nsecs": value.nsecs}
-        return {name: plain(part, room, depth + 1) for name, part in parts.items()}
-    return None
+def is_shown(value: Any) -> bool:
+    """Return whether a value is of `shown` and has a form that JSON alone does not have."""
+    return isinstance(value, dict) and any(mark in value for mark in _LITERALS)
+
+
+def shortened_part(value: Any) -> Any:
+    """Return the first part of a value of `shown` of which something was left out; else None."""
+    if isinstance(value, list):
+        return next((part for one in value if (part := shortened_part(one)) is not None), None)
+    if not isinstance(value, dict):
+        return None
+    is_cut = "$cut" in value or "$large" in value
+    if is_cut or str(value.get("$repr", "")).endswith("\u2026"):
+        return value
+    return shortened_part(list(value.values()))

@@ -14,15 +14,56 @@ import types
 import typing
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from smachpy.context import current_path
+from smachpy.base.context import current_path
+from smachpy.base.slips import accepts
 from smachpy.exceptions import InvalidStateError, UserDataKeyError, UserDataTypeError
-from smachpy.slips import accepts
 from smachpy.userdata.readonly import ATOMS, read_only, still_shows, writable
+from smachpy.userdata.secret import masked
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, MutableMapping
 
 __all__ = ["Const", "Remapper", "UserData", "get_const"]
+
+
+class ConstantKey(str):
+    """The key of a value of `add(constants=...)`, "LABEL.key"; it belongs to the machine's code.
+
+    A class of its own, because a user's key may have a dot, too.
+    """
+
+    __slots__ = ()
+
+
+class _VisitKeys:
+    """Which values of a container's userdata leave its present visit.
+
+    Until it is written, no value of a former visit does, nor one that was only copied in. What the
+    program itself has put there does, as in SMACH.
+
+    Attributes:
+        written: Keys that states have written in this visit; windows refer to this set.
+    """
+
+    __slots__ = ("_former", "written")
+
+    def __init__(self) -> None:
+        self.written: set[str] = set()
+        self._former: set[str] = set()  # from a former visit, or only copied in
+
+    def begin(self, copied_in: Iterable[str]) -> None:
+        """Begin a visit."""
+        self._former.update(self.written, copied_in)
+        self.written.clear()
+
+    def forget(self, key: str) -> None:
+        """Treat a value as the program's own: it has been set or removed."""
+        self.written.discard(key)
+        self._former.discard(key)
+
+    def leave(self, key: str) -> bool:
+        """Return whether the end of the visit copies the value to the parent."""
+        return key in self.written or key not in self._former
 
 
 class UserData:
@@ -34,14 +75,16 @@ class UserData:
     """
 
     _data: dict[str, Any]
+    _smachpy: _VisitKeys
 
     def __init__(self) -> None:
         object.__setattr__(self, "_data", {})
+        object.__setattr__(self, "_smachpy", _VisitKeys())
 
     def update(self, other_userdata: UserData | Remapper | Mapping[str, Any]) -> None:
         """Set all values of `other_userdata` here."""
         for key in other_userdata.keys():  # noqa: SIM118  UserData is no mapping
-            self._data[key] = other_userdata[key]
+            self[key] = other_userdata[key]
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
         """Return shallow copies of the values of `keys`, under the left names in `remapping`."""
@@ -59,7 +102,7 @@ class UserData:
         names = dict(remapping)
         for key in keys:
             if key in ud:
-                self._data[names.get(key, key)] = ud[key]
+                self[names.get(key, key)] = ud[key]
 
     def keys(self) -> list[str]:
         """Return the keys that have a value."""
@@ -73,6 +116,7 @@ class UserData:
 
     def __setitem__(self, key: str, item: Any) -> None:
         self._data[key] = item
+        self._smachpy.forget(key)
 
     def __delitem__(self, key: str) -> None:
         try:
@@ -92,10 +136,12 @@ class UserData:
             self._missing(name)
 
     def __setattr__(self, name: str, value: Any) -> None:
+        if name in TAKEN and not accepts(taken_key(name)):
+            raise InvalidStateError(taken_key(name))
         if name[0] == "_":
             object.__setattr__(self, name, value)
         else:
-            self._data[name] = value
+            self[name] = value
 
     def __delattr__(self, name: str) -> None:
         del self[name]
@@ -104,7 +150,7 @@ class UserData:
         return [*object.__dir__(self), *self._data]
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{key}={value!r}" for key, value in self._data.items())
+        values = ", ".join(f"{key}={masked(value, key)!r}" for key, value in self._data.items())
         return f"UserData({values})"
 
     def __reduce__(self) -> tuple[object, ...]:  # also for `copy.copy`
@@ -133,10 +179,11 @@ def typed_userdata(kind: type) -> UserData:
 
 
 def reset(userdata: UserData) -> None:
-    """Remove all values; typed userdata gets its defaults back. Constants ("LABEL.key") stay."""
+    """Remove all values; typed userdata gets its defaults back. Constants stay."""
     data = data_of(userdata)
-    for key in [key for key in data if "." not in key]:
+    for key in [key for key in data if type(key) is not ConstantKey]:
         del data[key]
+        userdata._smachpy.forget(key)
     if isinstance(data, CheckedDict):
         data.update(data.fields.defaults())
 
@@ -145,6 +192,22 @@ def _rebuild(data: dict[str, Any], kind: type | None = None) -> UserData:
     made = UserData() if kind is None else typed_userdata(kind)
     data_of(made).update(data)
     return made
+
+
+def begin_visit(userdata: UserData, copied_in: Iterable[str]) -> None:
+    """Begin a visit of the container, into which the values of these keys have been copied."""
+    userdata._smachpy.begin(copied_in)
+
+
+def write(userdata: UserData, values: Mapping[str, Any]) -> None:
+    """Set values as if a state of this visit had written them."""
+    userdata.update(values)
+    userdata._smachpy.written.update(values)
+
+
+def leaves(userdata: UserData, key: str) -> bool:
+    """Return whether the end of the visit copies the value of `key` to the parent."""
+    return userdata._smachpy.leave(key)
 
 
 def data_of(userdata: UserData) -> dict[str, Any]:
@@ -206,7 +269,7 @@ class Fields:
             )
             raise UserDataKeyError(key, problem, self.types)
         if not _fits(value, wanted):
-            raise UserDataTypeError(key, value, wanted, path=current_path())
+            raise UserDataTypeError(key, masked(value, key), wanted, path=current_path())
 
 
 class CheckedDict(dict[str, Any]):
@@ -217,7 +280,7 @@ class CheckedDict(dict[str, Any]):
         super().__init__(fields.defaults())
 
     def __setitem__(self, key: str, value: Any) -> None:
-        if "." not in key:  # keys of constants, "LABEL.key", belong to the machine
+        if type(key) is not ConstantKey:
             self.fields.check(key, value)
         super().__setitem__(key, value)
 
@@ -253,12 +316,13 @@ class Remapper:
         remapping: Name of a key here -> its name in `ud`.
     """
 
-    __slots__ = ("_data", "_input", "_output", "_views")
+    __slots__ = ("_data", "_input", "_output", "_views", "_written")
 
     _data: MutableMapping[str, Any] | Remapper
     _input: dict[str, str]
     _output: dict[str, str]
     _views: dict[str, Any]  # key -> the last read-only view of a list or dict
+    _written: set[str]  # that of the userdata
 
     def __init__(
         self,
@@ -269,7 +333,8 @@ class Remapper:
     ) -> None:
         names = dict(remapping)
         set_slot = object.__setattr__
-        set_slot(self, "_data", ud._data if isinstance(ud, UserData) else ud)  # noqa: SLF001
+        set_slot(self, "_data", data_of(ud) if isinstance(ud, UserData) else ud)
+        set_slot(self, "_written", ud._smachpy.written if isinstance(ud, UserData) else set())
         set_slot(self, "_views", {})
         set_slot(self, "_input", {key: names.get(key, key) for key in input_keys})
         set_slot(self, "_output", {key: names.get(key, key) for key in output_keys})
@@ -315,6 +380,7 @@ class Remapper:
             return
         # A state may write a value that it has read as a view; the next one must get the original.
         self._data[name] = item if type(item) in ATOMS else writable(item)
+        self._written.add(name)
 
     __getattr__ = __getitem__  # the same rules, without a second call
 
@@ -356,9 +422,22 @@ class Remapper:
             raise UserDataKeyError(key, problem, declared, path=current_path()) from None
 
 
+TAKEN = frozenset((*dir(UserData), *dir(Remapper)))
+"""Names that are no keys: as an attribute, `userdata.keys` is the method."""
+
+
+def taken_key(key: str) -> str:
+    """Return the problem of a key in `TAKEN`."""
+    return (
+        f"userdata key: got {key!r}, which is a method or attribute of userdata itself; expected "
+        f"another name. Try {key.strip('_')}_value."
+    )
+
+
 def revoke(window: Remapper) -> None:
     """Cut off a window whose state was left behind: from now on it writes to a copy."""
     object.__setattr__(window, "_data", _copy_of(window._data))  # noqa: SLF001  its own module
+    object.__setattr__(window, "_written", set())
 
 
 def _copy_of(data: MutableMapping[str, Any] | Remapper) -> dict[str, Any]:

@@ -6,24 +6,18 @@ through JSON. Events (`smachpy.events`) describe a run; their paths are the path
 
 from __future__ import annotations
 
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Literal,
-    Protocol,
-    TypeAlias,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, TypeAlias, get_args
 
+from smachpy.base.problems import missing_init
+from smachpy.base.slips import accepts
+from smachpy.events.outcome_classes import outcome_class
 from smachpy.exceptions import InvalidStateError
-from smachpy.machines.problems import missing_init
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from smachpy.events.outcome_classes import OutcomeClass
 
 __all__ = [
     "INIT_TOPIC",
@@ -58,6 +52,9 @@ Kind: TypeAlias = Literal[
 
 KINDS: frozenset[str] = frozenset(get_args(Kind))
 
+MAX_NESTING = 800
+"""Levels of JSON of the deepest machine, which are more than those of its states."""
+
 
 @dataclass(frozen=True, slots=True)
 class TransitionRecord:
@@ -70,6 +67,7 @@ class TransitionRecord:
         target_is_outcome: Whether `target` is an outcome.
         implicit: The user did not write the edge: it leads to the container's outcome of the same
             name.
+        guard: Its condition as text; "" if it has none, or leads on if no other condition holds.
     """
 
     source: str
@@ -77,6 +75,7 @@ class TransitionRecord:
     target: str
     target_is_outcome: bool = False
     implicit: bool = False
+    guard: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +167,8 @@ class StateRecord:
         rules: Outcome rules of a concurrence, loop rules of an iterator.
         default_outcome: Outcome of a concurrence if no rule holds.
         net: The net of a plan.
+        cleanup: Label of the child that runs at every end of the others, or "".
+        success: The outcomes that are good; None goes by their names.
     """
 
     path: str
@@ -186,11 +187,22 @@ class StateRecord:
     rules: tuple[RuleRecord, ...] = ()
     default_outcome: str | None = None
     net: NetRecord | None = None
+    cleanup: str = ""
+    success: tuple[str, ...] | None = None
+
+    def class_of(self, outcome: str) -> OutcomeClass:
+        """Return the class of one of its outcomes."""
+        return outcome_class(outcome, self.success)
 
     @property
     def is_container(self) -> bool:
         """Whether its kind can have children."""
         return self.kind in {"machine", "sequence", "concurrence", "iterator", "plan"}
+
+    @property
+    def others(self) -> tuple[StateRecord, ...]:
+        """All children except the clean-up."""
+        return tuple(child for child in self.children if child.label != self.cleanup)
 
     def walk(self) -> Iterator[StateRecord]:
         """Yield this record and all below it, parents first."""
@@ -209,11 +221,12 @@ class StateRecord:
         """Rebuild a record from `to_json` text.
 
         Raises:
-            ValueError: The text is not JSON, or a field is wrong; with the path of that field.
+            ValueError: the text is not JSON, or a field is wrong; with the path of that field.
         """
-        import json
+        from actionlib_core.inputs.checked_data import checked
+        from actionlib_core.inputs.json_text import load_json
 
-        record: StateRecord = _record(StateRecord, json.loads(text), "$")
+        record: StateRecord = checked(StateRecord, load_json(text, deepest=MAX_NESTING))
         return record
 
 
@@ -221,6 +234,7 @@ class Described(Protocol):
     """The methods of a state that `describe` uses."""
 
     _smachpy_is_container: ClassVar[bool]
+    _smachpy_kind: ClassVar[Kind]
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]: ...
     def describe_structure(self) -> Structure: ...
@@ -240,6 +254,8 @@ class Structure:
     default_outcome: str | None = None
     details: tuple[tuple[str, str], ...] = field(default=())
     net: NetRecord | None = None
+    cleanup: str = ""
+    success: tuple[str, ...] | None = None
 
 
 def describe(machine: Described, *, name: str | None = None) -> StateRecord:
@@ -261,16 +277,24 @@ def _describe(
         kind, details = state.describe_details()
     except AttributeError as error:
         hint = missing_init(state, error)
+        problem = f"{path}: state: got a {type(state).__name__} that is not initialised.{hint}"
         if not hint:
             raise
-        raise InvalidStateError(
-            f"{path}: state: got a {type(state).__name__} that is not initialised.{hint}"
-        ) from error
+        if not accepts(problem):
+            raise InvalidStateError(problem) from error
+        kind, details = state._smachpy_kind, ()
     structure = state.describe_structure()
     children = tuple(
         _describe(child, f"{path}/{child_label}", child_label, child_remapping)
         for child_label, child, child_remapping in structure.children
     )
+    if structure.cleanup:
+        children = tuple(
+            replace(child, details=(*child.details, ("runs", "at any end")))
+            if child.label == structure.cleanup
+            else child
+            for child in children
+        )
     return StateRecord(
         path=path,
         label=label,
@@ -288,6 +312,8 @@ def _describe(
         rules=structure.rules,
         default_outcome=structure.default_outcome,
         net=structure.net,
+        cleanup=structure.cleanup,
+        success=structure.success,
     )
 
 
@@ -298,45 +324,6 @@ def _first_paragraph(state: Described) -> str:
         return ""
     doc = cls.__dict__.get("__doc__") or ""
     return " ".join(doc.strip().split("\n\n")[0].split())
-
-
-def _rebuilt(kind: Any, data: Any, where: str) -> Any:
-    """Convert `data`, read from JSON, to the annotated type `kind`."""
-    arguments = get_args(kind)
-    if NetRecord in arguments and data is not None:  # "or None"
-        kind = NetRecord
-    if is_dataclass(kind):
-        return _record(kind, data, where)
-    if get_origin(kind) is tuple:
-        if isinstance(data, list) and arguments[1] is Ellipsis:
-            return tuple(_rebuilt(arguments[0], one, f"{where}[{i}]") for i, one in enumerate(data))
-        if isinstance(data, list) and len(data) == len(arguments):
-            return tuple(
-                _rebuilt(one, part, where) for one, part in zip(arguments, data, strict=True)
-            )
-        expected = "a list" if arguments[1] is Ellipsis else f"a list of {len(arguments)}"
-    elif get_origin(kind) is Literal:
-        if isinstance(data, str) and data in arguments:
-            return data
-        expected = f"one of {sorted(arguments)}"
-    elif isinstance(data, kind):  # a class, or a union of some
-        return data
-    else:
-        expected = {bool: "true or false", int: "a number"}.get(kind, "a text")
-    raise ValueError(f"{where}: got {data!r}; expected {expected}.")
-
-
-def _record(cls: Any, data: Any, where: str) -> Any:
-    if not isinstance(data, dict):
-        raise ValueError(f"{where}: got {type(data).__name__}; expected an object.")  # noqa: TRY004
-    hints, slots = get_type_hints(cls), fields(cls)
-    unknown = sorted(set(data) - set(hints))
-    missing = sorted(
-        slot.name for slot in slots if slot.default is MISSING and slot.name not in data
-    )
-    if unknown or missing:
-        raise ValueError(f"{where}: got unknown fields {unknown}, missing fields {missing}.")
-    return cls(**{n: _rebuilt(hints[n], part, f"{where}.{n}") for n, part in data.items()})
 
 
 INIT_TOPIC: str

@@ -1,12 +1,14 @@
-"""Pictures and views of machines and runs, provided by an installed package (`viz`).
+"""Pictures and views of machines and runs, provided by an installed package (`smachpy_viz`).
 
-Entry points, because imports go from `viz` to `smachpy` only. The group `smachpy.pictures` has:
+Entry points, because imports go from `smachpy_viz` to `smachpy` only. The group
+`smachpy.pictures` has:
 
 run: called as `draw(machine_or_record, file, run=events)`, writes a picture
 svg: called as `draw(machine)`, returns SVG text
 history: a class that collects events by `on_event`, for the argument `run` above
-terminal: a class, shows a run in the terminal while it happens (`viz.TerminalView`)
-viewer: a class, serves the live page in a process of its own (`viz.live.process.ViewerProcess`)
+terminal: a class, shows a run in the terminal while it happens (`smachpy.viz.TerminalView`)
+viewer: a class, serves the live page in a process of its own
+    (`smachpy_viz.live.process.ViewerProcess`)
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
-from smachpy import log
+from smachpy.base import log
 from smachpy.events import Entered, Event, Left
 from smachpy.exceptions import SmachError
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from smachpy.introspection import Described, StateRecord
+    from smachpy.events.introspection import Described, StateRecord
 
 GROUP = "smachpy.pictures"
 
