@@ -10,7 +10,8 @@ Values that JSON lacks are objects whose first key begins with `$`:
     {"$int": "0x..."}  {"$time": [secs, nsecs]}  {"$duration": [secs, nsecs]}       of ROS
     {"$datetime": "ISO 8601", "zone": "Europe/Berlin"}  {"$date"} {"$clock"} {"$timedelta"}
     {"$path": "text"}  {"$purepath": "text"}
-    {"$msg": "pkg/Type", "fields": {...}}  {"$ros2": "pkg/msg/Type", "distro": ..., "fields": ...}
+    {"$msg": "pkg/Type", "sum": "md5", "fields": {...}}
+    {"$ros2": "pkg/msg/Type", "distro": ..., "sum": "RIHS01", "fields": {...}}
     {"$array": "base64", "dtype": ..., "shape": [...]}  {"$scalar": "base64", "dtype": ...}
     {"$type": "module:Class", "fields": {...}}  {"$enum": "module:Class", "name": "RED"}
     {"$custom": "module:Class", "data": ...}
@@ -45,16 +46,19 @@ from smachpy.userdata.kept_types import (
     problem_of,
 )
 from smachpy.userdata.readonly import writable
+from smachpy.userdata.secret import is_secret_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
 
-_DEEPEST: Final = 100
+_MAX_NESTING: Final = 100
 
 
 class NotDurableError(InvalidUserCodeError, TypeError):
     """A value cannot be kept in a journal.
+
+    Try: keep plain data in the userdata, register the type, or list the key as `transient`.
 
     Attributes:
         key: The userdata key.
@@ -73,7 +77,7 @@ class NotDurableError(InvalidUserCodeError, TypeError):
         where = f"{path}: " if path else ""
         super().__init__(
             f"{where}userdata key {key!r}: got {kind.__module__}.{kind.__qualname__}"
-            f"{f' at {place}' if place else ''}, which a journal cannot keep: {reason}; expected "
+            f"{f' at {place}' if place else ''}, which a journal cannot keep ({reason}); expected "
             f"{way_out}, or transient=[{key!r}] if it does not have to survive.",
             path=path,
         )
@@ -81,6 +85,8 @@ class NotDurableError(InvalidUserCodeError, TypeError):
 
 class JournalValueError(MissionError, ValueError):
     """A value in a journal cannot be read back.
+
+    Try: restore the class or the registration with which the value was written.
 
     Attributes:
         place: Its place in the encoded value, "$.route[3]".
@@ -147,7 +153,7 @@ def _encode(value: Any, place: str, depth: int) -> Any:
     if kind in _ATOMS and (kind is not int or -_LARGEST < value < _LARGEST):
         return value
     # A value that contains itself would end in a RecursionError far away from its place.
-    if depth > _DEEPEST:
+    if depth > _MAX_NESTING:
         reason = "it is nested too deeply"
         raise _Refused(f"{place[:60]}...", kind, reason, "one that does not contain itself")
     encoder = _ENCODERS.get(kind)
@@ -167,6 +173,8 @@ def _encode(value: Any, place: str, depth: int) -> Any:
 
 def _why_not(kind: type) -> tuple[str, str]:
     """Return the reason, and what to use instead."""
+    if getattr(kind, "_smachpy_secret", False) is True:
+        return "it is a secret", "it as the value of a userdata key of its own, which is not kept"
     name = kind.__qualname__
     same_name = REGISTERED.get(name_of(kind))
     if "<locals>" in name:
@@ -192,7 +200,7 @@ def _encode_list(value: list[Any], place: str, depth: int) -> Any:
 def _encode_dict(value: dict[Any, Any], place: str, depth: int) -> Any:
     # Other keys, and texts that look like one of the marks above, are kept as pairs.
     if all(type(key) is str and not key.startswith("$") for key in value):
-        return {key: _encode(item, f"{place}.{key}", depth + 1) for key, item in value.items()}
+        return {key: _encode_named(key, item, place, depth) for key, item in value.items()}
     items = value.items()
     pairs = [
         [
@@ -202,6 +210,18 @@ def _encode_dict(value: dict[Any, Any], place: str, depth: int) -> Any:
         for key, item in items
     ]
     return {"$items": pairs}
+
+
+def _encode_named(name: str, value: Any, place: str, depth: int) -> Any:
+    """Encode a value with a name; one that its name calls a secret is refused in clear."""
+    if type(value) in {str, bytes} and value and is_secret_name(name):
+        raise _Refused(
+            f"{place}.{name}",
+            type(value),
+            "its name says that it is a secret",
+            "a userdata key of its own with a smachpy.Secret, which is not kept, or another name",
+        )
+    return _encode(value, f"{place}.{name}", depth + 1)
 
 
 def _sequence(mark: str) -> Callable[[Any, str, int], Any]:
@@ -288,7 +308,7 @@ def _encode_registered(value: Any, registered: RegisteredType, place: str, depth
             raise _Refused(
                 f"{place}.{field}", kind, "this field is not set", "all of them"
             ) from error
-        fields[field] = _encode(inner, f"{place}.{field}", depth + 1)
+        fields[field] = _encode_named(field, inner, place, depth)
     return {"$type": name, "fields": fields}
 
 
@@ -299,12 +319,12 @@ def _encode_message(value: Any, place: str, depth: int) -> Any:
     if wire is None or not hasattr(kind, "_slot_types"):
         return None
     fields = {
-        slot: _encode(getattr(value, slot), f"{place}.{slot}", depth + 1) for slot in kind.__slots__
+        slot: _encode_named(slot, getattr(value, slot), place, depth) for slot in kind.__slots__
     }
     name = kind._type
     if wire == "ros2":
-        return {"$ros2": name, "distro": kind._distro, "fields": fields}
-    return {"$msg": name, "fields": fields}
+        return {"$ros2": name, "distro": kind._distro, "sum": kind._rihs01, "fields": fields}
+    return {"$msg": name, "sum": kind._md5sum, "fields": fields}
 
 
 def _encode_numpy(value: Any, place: str) -> Any:
@@ -431,11 +451,19 @@ def _decode_message(data: dict[str, Any], place: str) -> Any:
     if "$msg" in data:
         from actionlib_core.interfaces import get_message
 
-        kind: type[Any] = get_message(data["$msg"])
+        kind: Any = get_message(data["$msg"])
+        known = kind._md5sum
     else:
         from actionlib_core.interfaces.ros2 import get_message as get_ros2_message
 
         kind = get_ros2_message(data["$ros2"], data["distro"])
+        known = kind._rihs01
+    if data.get("sum", known) != known:  # journals of earlier versions have none
+        reason = (
+            f"got a {kind._type} of another definition, {data['sum']}; expected the present one, "
+            f"{known}."
+        )
+        raise JournalValueError(place, reason)
     message = kind()
     values = _fields(data["fields"], place)
     if set(values) != set(kind.__slots__):

@@ -10,14 +10,23 @@ import json
 import threading
 from typing import TYPE_CHECKING, Any, Final
 
+from actionlib_core.inputs.json_text import check_depth
 from smachpy.durable.position import VERSION, Position
-from smachpy.durable.store import ENDED, StoreError
+from smachpy.durable.store import ENDED, StoreError, digest_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from smachpy.durable.store import Lease, Store
 
 SNAPSHOT_EVERY: Final = 1000
 """Entries between two snapshots, and so the most that are read when a run is resumed."""
+
+MAX_STATE_DEPTH: Final = 500
+"""Levels of arrays and objects in an entry; each level of a value has up to three of them."""
+
+LARGE: Final = 4096
+"""Values of more characters are kept once, beside the entries that name them by a digest."""
 
 
 def read_position(store: Store, mission: str) -> Position:
@@ -33,7 +42,7 @@ def read_position(store: Store, mission: str) -> Position:
     snapshot, entries = store.read(mission)
     where = f"mission {mission!r}"
     try:
-        position = Position(None if snapshot is None else json.loads(snapshot))
+        position = Position(None if snapshot is None else _load(snapshot))
         version = max(version, position.data["version"])
         if version > VERSION:
             problem = (
@@ -41,14 +50,32 @@ def read_position(store: Store, mission: str) -> Position:
             )
             raise StoreError(where, problem, reason="future")
         for entry in entries:
-            position.fold(json.loads(entry))
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+            position.fold(_load(entry))
+        position.check()
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
         problem = (
             f"journal: got an entry that cannot be read ({type(error).__name__}: {error}); "
             "expected what smachpy wrote. Try 'smachpy missions forget' and a new run."
         )
         raise StoreError(where, problem, reason="corrupt") from error
     return position
+
+
+def _load(data: bytes) -> Any:
+    """Return the data of an entry or snapshot.
+
+    Not with `load_json`, for which whole numbers of more than 300 digits are texts.
+
+    Raises:
+        ValueError: it is no JSON, or is nested too deeply.
+    """
+    try:
+        found = json.loads(data)
+    except RecursionError as error:
+        raise ValueError(f"it is nested deeper than {MAX_STATE_DEPTH} levels") from error
+    if data.count(b"[") + data.count(b"{") > MAX_STATE_DEPTH:
+        check_depth(found, MAX_STATE_DEPTH)
+    return found
 
 
 class Journal:
@@ -59,6 +86,8 @@ class Journal:
         lease: The right to write them.
         position: The position at which the run begins or resumes.
 
+        now_ns: Returns the mission's own time [ns], its sign of life in the store.
+
     Attributes:
         position: The position after the newest entry, written or not. Guarded by `lock`.
         lock: Guards the position and the order of entries; never held during I/O.
@@ -66,7 +95,9 @@ class Journal:
     Threads: every method may be called from any thread.
     """
 
-    def __init__(self, store: Store, lease: Lease, position: Position) -> None:
+    def __init__(
+        self, store: Store, lease: Lease, position: Position, now_ns: Callable[[], int]
+    ) -> None:
         self.position = position
         self.lock = threading.RLock()
         self._store = store
@@ -76,6 +107,40 @@ class Journal:
         self._put = 0
         self._written = 0
         self._since_snapshot = 0
+        self._now_ns = now_ns
+        self._has_begun = False
+        self._stored = position.digests()  # large values that the store has
+        self._blobs: dict[str, bytes] = {}  # those that are queued with the entries
+
+    def compact(self, encoded: Any, text: str) -> Any:
+        """Return an encoded value for an entry; a large one as its digest.
+
+        The caller holds the lock, and puts the entry before it releases it.
+
+        Args:
+            encoded: The value, from `smachpy.durable.codec.encode`.
+            text: The same as JSON.
+        """
+        if len(text) <= LARGE:
+            return encoded
+        data = text.encode()
+        digest = digest_of(data)
+        if digest not in self._stored:
+            self._stored.add(digest)
+            self._blobs[digest] = data
+        return {"$blob": digest}
+
+    def value(self, kept: Any) -> Any:
+        """Return the encoded value for what `compact` has returned.
+
+        Raises:
+            StoreError: the store has lost it.
+        """
+        if not isinstance(kept, dict) or "$blob" not in kept:
+            return kept
+        digest = kept["$blob"]
+        data = self._blobs.get(digest) or self._store.blob(self._lease.mission, digest)
+        return _load(data)
 
     def put(self, entry: dict[str, Any]) -> int:
         """Fold an entry and queue it; return its number. The caller holds the lock."""
@@ -83,6 +148,13 @@ class Journal:
         self._queue.append(json.dumps(entry, separators=(",", ":")).encode())
         self._put += 1
         return self._put
+
+    def freeze(self) -> None:
+        """Write nothing any more: a thread that comes to do so waits until the process ends.
+
+        Blocks: until the entries that are being written are.
+        """
+        self._writing.acquire()
 
     def commit(self, number: int) -> None:
         """Write the queued entries, at least up to entry `number`.
@@ -99,18 +171,26 @@ class Journal:
             # other threads can queue the next entries while this one waits for the disk.
             with self.lock:
                 entries, self._queue = self._queue, []
+                blobs, self._blobs = self._blobs, {}
                 upto = self._put
                 finished = self.position.data["finished"]
                 self._since_snapshot += len(entries)
                 snapshot = None
+                kept: set[str] = set()
                 if self._since_snapshot >= SNAPSHOT_EVERY or finished:
                     snapshot = self.position.to_bytes()
                     self._since_snapshot = 0
+                    kept = self._stored = self.position.digests()
             self._store.append(
                 self._lease,
                 entries,
                 snapshot=snapshot,
                 status=ENDED if finished else None,
                 outcome=self.position.data["outcome"],
+                blobs=blobs,
+                kept=frozenset(kept),
+                # The lease is renewed every few seconds; before that, the first entry tells.
+                beat_ns=None if self._has_begun else self._now_ns(),
             )
+            self._has_begun = True
             self._written = upto

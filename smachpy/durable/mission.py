@@ -6,18 +6,21 @@ import contextlib
 import math
 import os
 import uuid
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from actionlib_core.clock import current_clock
+from actionlib_core.shutdown import AT_EXIT
+from smachpy.base.problems import Problems
 from smachpy.durable import structure
 from smachpy.durable.journal import Journal, read_position
 from smachpy.durable.position import VERSION, Position
 from smachpy.durable.processes import this_runner
-from smachpy.durable.recorder import Recorder
+from smachpy.durable.recorder import Recorder, SteadyTime
 from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, StoreError, open_store
+from smachpy.engine.journal import NO_JOURNAL
+from smachpy.engine.preempt import asking, request_soon
 from smachpy.exceptions import MissionError
-from smachpy.machines.problems import Problems
-from smachpy.run.grace import asking, request_soon
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,12 +32,20 @@ if TYPE_CHECKING:
 Outage = Literal["counts", "pauses"]
 
 
+CANCEL_BY: Final = "smachpy missions"
+"""Who asks the machine to stop when the cancel of its mission is requested."""
+
+MAX_NOTE_LENGTH: Final = 300
+"""Characters of the reason why a mission was given back that are kept in its row."""
+
 LEASE_S: Final = 15.0
 """Time after the last renewal for which a runner holds its mission [s]."""
 
 
 class MachineChangedError(MissionError):
     """The machine differs from the one in the journal.
+
+    Try: resume with the former version, or say where it goes on with `migrations=`.
 
     Attributes:
         mission: The mission's id.
@@ -46,13 +57,15 @@ class MachineChangedError(MissionError):
         self.differences = tuple(differences)
         lines = "".join(f"\n  - {difference}" for difference in differences)
         super().__init__(
-            f"mission {mission!r}: machine: got one that differs from the journal's; expected the "
-            f"same.{lines}\n{way_out}"
+            f"mission {mission!r}: machine: got one that differs from the one with which it was "
+            f"begun or submitted; expected the same.{lines}\n{way_out}"
         )
 
 
 class OutageError(MissionError):
     """A journal is older than the mission allows.
+
+    Try: begin anew, or allow a longer `max_outage`.
 
     Attributes:
         mission: The mission's id.
@@ -130,7 +143,9 @@ def run_durable(
         StoreError, FencedError: the journal could not be written: the machine was preempted.
         SmachError: as `execute` does.
 
-    Blocks: as `execute` does.
+    Blocks: as `execute` does. SIGTERM, SIGHUP and SIGQUIT end the process as usual (exit code 128
+        and the signal's number), but not the mission, which the next call resumes; Ctrl-C preempts
+        it.
     """
     problems = Problems("run_durable")
     if mission is not None:
@@ -143,11 +158,11 @@ def run_durable(
         else:
             store = journal
         name = mission or machine.name or "SM_ROOT"
-        known = {row.id: row for row in store.missions()}
-        if name in known and known[name].status in OVER:
+        row = store.find(name)
+        if row is not None and row.status in OVER:
             store.forget(name)
-            del known[name]
-        if name not in known:
+            row = None
+        if row is None:
             store.create(new_mission(machine, mission=name))
         with kept_mission(
             machine, store, name, outage=outage, max_outage=max_outage, migrate=migrate
@@ -165,66 +180,111 @@ def kept_mission(
     max_outage: float | None = None,
     migrate: Any = None,
     lease_s: float = LEASE_S,
+    reserved: Lease | None = None,
     on_fenced: Callable[[FencedError], object] | None = None,
+    on_suspended: Callable[[str], object] | None = None,
 ) -> Iterator[Recorder]:
     """Journal the run of `machine` within the block as `mission`, which the store already has.
 
     The other arguments and the errors are those of `run_durable`. A runner that does not renew its
     lease for `lease_s` [s] loses the mission; if that is infinite, the lease is never renewed and
-    requests to cancel are not noticed. If another runner has taken the mission over, `on_fenced` is
-    called, in any thread, before the machine is preempted: the goals belong to that runner now, and
-    must not be cancelled here.
+    requests to cancel are not noticed. `reserved` is the lease of a runner that reserved it for
+    this process. If another runner has taken the mission over, `on_fenced` is called, in any
+    thread, before the machine is preempted: the goals belong to that runner now, and must not be
+    cancelled here.
+
+    If a signal suspends the mission, `on_suspended` is called with its name, in any thread, after
+    the lease was released. It must return soon: then the process ends.
     """
     row = store.mission(mission)
-    lease = store.claim(mission, this_runner(), seconds=lease_s)
-    status = QUEUED if row.status == QUEUED else INTERRUPTED
+    lease = store.claim(mission, this_runner(), seconds=lease_s, reserved=reserved)
+    status, note = QUEUED if row.status == QUEUED else INTERRUPTED, ""
     try:
         # Read only now that the lease is held: before, another runner could still write entries.
         position = read_position(store, mission)
         resumed = bool(position.visits)
-        shift_ns = gone_ns = 0
+        time = SteadyTime(current_clock())
+        gone_ns = 0
         if resumed:
-            # The outage begins with the last sign of life: an entry, or a renewal of the lease
-            # (`row.changed`), as a state may run for hours without an entry.
-            now_ns, last_ns = current_clock().time_ns(), position.data["last_ns"]
-            gone_ns = max(0, now_ns - max(last_ns, round(row.changed * 1e9)))
+            since_ns, now_ns = _outage(row, lease, position.data["last_ns"])
+            gone_ns, time = now_ns - since_ns, SteadyTime(current_clock(), now_ns)
             if max_outage is not None and gone_ns > max_outage * 1e9:
-                raise OutageError(mission, gone_ns / 1e9, max_outage)
-            fitted = _fitted(machine, row, position, migrate)
-            if fitted is not position:  # a snapshot, as the entries so far have the old paths
-                store.append(lease, [], snapshot=fitted.to_bytes())
-                position = fitted
-            shift_ns = gone_ns if outage == "pauses" else 0
-            if now_ns < last_ns:  # the clock was put back: deadlines move with it
-                shift_ns = now_ns - last_ns
+                raise OutageError(mission, gone_ns / 1e9, max_outage)  # noqa: TRY301
+        fitted = _fitted(machine, row, position, migrate)
+        if fitted is not position:  # a snapshot, as the entries so far have the old paths
+            store.append(lease, [], snapshot=fitted.to_bytes(), kept=fitted.digests())
+            position = fitted
         recorder = Recorder(
             machine,
-            Journal(store, lease, position),
+            Journal(store, lease, position, time.now_ns),
             row=row,
             resumed=resumed,
-            shift_ns=shift_ns,
+            time=time,
+            shift_ns=gone_ns if outage == "pauses" else 0,
             gone_ns=gone_ns,
         )
         recorder.on_fenced = on_fenced
+        recorder.on_suspend = partial(_suspend, store, lease, on_suspended)
         if resumed:
             recorder.restore()
         data = machine._smachpy
-        data.journal = recorder
+        data.live.journal = recorder
         try:
-            with _renewing(store, lease, lease_s, machine, recorder, asked=row.cancel):
+            # One that an earlier process has passed on is in the journal.
+            known = any(one["by"] == CANCEL_BY for one in position.data["preempts"])
+            cancel = (row.cancel, known)
+            with _renewing(store, lease, lease_s, machine, recorder, cancel):
                 yield recorder
         finally:
-            data.journal = None
+            data.live.journal = NO_JOURNAL
             if position.visits:  # empty before the run begins and after it has ended
                 status = INTERRUPTED
         if recorder.broken is not None:
-            raise recorder.broken
+            raise recorder.broken  # noqa: TRY301
+    except Exception as error:
+        reason = str(error).split("\n", 1)[0]
+        note = f"{lease.runner}: {reason:.{MAX_NOTE_LENGTH}}"
+        raise
     finally:
-        # Fails if the lease is lost or the store is unreachable. The recorder has raised that
-        # already; here it would hide the exception of the block.
-        with contextlib.suppress(MissionError):
-            now = store.mission(mission).status
-            store.release(lease, now if now in OVER else status)
+        _release(store, lease, status, note)
+
+
+def _suspend(
+    store: Store, lease: Lease, told: Callable[[str], object] | None, by: str, top: Any
+) -> None:
+    """Release the lease of a mission that waits for the end of the process; then end that."""
+    _release(store, lease, INTERRUPTED)
+    if told is not None:
+        told(by)
+    top.ending.forget(top)
+    if by != AT_EXIT and not any(map(_is_durable, top.ending.runs)):
+        top.ending.exit_by(by)
+
+
+def _release(store: Store, lease: Lease, status: str, note: str = "") -> None:
+    """Give the lease back, and set the status and note unless the mission is over."""
+    # Fails if the lease is lost or the store is unreachable. The recorder has raised that already;
+    # here it would hide the exception of the block, and the next process finds this one gone.
+    with contextlib.suppress(MissionError):
+        now = store.mission(lease.mission).status
+        store.release(lease, now if now in OVER else status, note="" if now in OVER else note)
+
+
+def _is_durable(top: Any) -> bool:
+    return bool(top.run.journal.is_durable)
+
+
+def _outage(row: MissionRow, lease: Lease, last_ns: int) -> tuple[int, int]:
+    """Return when the outage of a mission began, and the present time, in its own time [ns].
+
+    The outage begins with the last sign of life: an entry (at `last_ns`), or a renewal of the
+    lease, as a state may run for hours without an entry. The store's clock tells its length.
+    """
+    if lease.beat_ns is None:  # an older smachpy wrote it, with times of day
+        since_ns, now_ns = max(last_ns, round(row.changed * 1e9)), current_clock().time_ns()
+        return (since_ns, now_ns) if now_ns >= since_ns else (last_ns, last_ns)
+    since_ns = max(last_ns, lease.beat_ns)
+    return since_ns, max(since_ns, lease.beat_ns + round(lease.silent * 1e9))
 
 
 def _fitted(machine: Container, row: MissionRow, position: Position, migrate: Any) -> Position:
@@ -233,6 +293,8 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
     Raises:
         MachineChangedError: the machines differ, and `migrate` does not map all active states.
     """
+    if not position.visits and row.schedule is not None:
+        return position  # a schedule may be older than the code: it begins with what is here
     new = structure.shape_of(machine)
     try:
         old = position.data.get("structure") or structure.from_bytes(row.structure)
@@ -241,6 +303,9 @@ def _fitted(machine: Container, row: MissionRow, position: Position, migrate: An
     found = structure.differences(old, new)
     if not found:
         return position
+    if not position.visits:
+        way_out = "Try the code with which it was submitted, or submit it anew."
+        raise MachineChangedError(row.id, found, way_out)
     names = migrate(found) if callable(migrate) else migrate
     if not names:
         raise MachineChangedError(
@@ -276,32 +341,37 @@ def _renewing(
     lease_s: float,
     machine: Container,
     recorder: Recorder,
-    *,
-    asked: bool,
+    cancel: tuple[bool, bool],
 ) -> Iterator[None]:
-    """Renew the lease while the block runs, and preempt the machine if a cancel is requested."""
+    """Renew the lease while the block runs, and preempt the machine if a cancel is requested.
+
+    `cancel` says whether it is requested already, and whether the machine has got the request.
+    """
     clock = current_clock()
     over = clock.event(f"the end of mission {lease.mission}")
 
-    def cancel() -> None:
-        with asking("operator", "smachpy missions", "cancel"):
+    asked, cancelled = cancel
+
+    def preempt() -> None:
+        with asking("operator", CANCEL_BY, "cancel"):
             request_soon(machine)
 
     def renew() -> None:
-        cancelled = False
+        nonlocal cancelled
         # Three renewals per lease: one or two may be late before another runner takes over.
         while not over.wait(lease_s / 3):
             try:
-                wanted = store.renew(lease, seconds=lease_s)
+                wanted = store.renew(lease, seconds=lease_s, beat_ns=recorder.time.now_ns())
             except MissionError as error:
                 recorder.stop(error)
                 return
             if wanted and not cancelled:
                 cancelled = True
-                cancel()
+                preempt()
 
-    if asked:  # cancelled while no process ran the mission
-        cancel()
+    if asked and not cancelled:  # while no process ran the mission
+        cancelled = True
+        preempt()
     if math.isinf(lease_s):
         yield
         return

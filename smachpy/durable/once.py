@@ -5,13 +5,15 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, TypeVar
 
-from smachpy.context import current_frame
+from actionlib_core import border
+from smachpy.base.context import current_frame
+from smachpy.engine.frame import clock_of_run
 from smachpy.exceptions import InvalidStateError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from smachpy.run.frame import Frame
+    from smachpy.engine.frame import Frame
 
 R = TypeVar("R")
 
@@ -22,7 +24,8 @@ def once(key: str, call: Callable[[], R]) -> R:
     In a durable run the result is in the journal before this function returns: a state that is
     executed again, by another process or by `retry`, gets it without a second call. The next visit
     of the state calls again. If the process ends after `call` has returned and before its result is
-    in the journal, it is called again. Outside a durable run it is called each time.
+    in the journal, it is called again. Outside a durable run it is called each time; a run that is
+    reproduced from its recording gets the recorded result.
 
     Args:
         key: A name for the call, unique within one visit of the state.
@@ -46,7 +49,11 @@ def once(key: str, call: Callable[[], R]) -> R:
             "`lambda: ...`."
         )
     frame: Frame | None = current_frame()
-    if frame is None or frame.run.journal is None:
+    if frame is None:
         return call()
     found: R = frame.run.journal.once(frame, key, call)
+    if border.listeners:
+        now = clock_of_run().now()
+        for listener in border.listeners:
+            listener(border.Crossing("once", frame.path, "", key, now, "", found))
     return found

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from smachpy.durable import structure
 from smachpy.durable.journal import read_position
 from smachpy.durable.store import StoreError
+from smachpy.userdata.secret import masked_words
 
 if TYPE_CHECKING:
     from smachpy.durable.store import MissionRow, Store
@@ -29,6 +30,7 @@ def overview(store: Store, row: MissionRow) -> dict[str, Any]:
     """
     names = "id name target argv status outcome robot created changed owner"
     facts = {name: getattr(row, name) for name in names.split()}
+    facts["argv"] = masked_words(row.argv)
     facts.update(run=row.run, active=[], problem="", rows=None)
     facts.update(began_ns=None, last_ns=None, outages=[], ends=[], current=[])
     try:
@@ -40,8 +42,9 @@ def overview(store: Store, row: MissionRow) -> dict[str, Any]:
         return {**facts, "problem": "corrupt"}
     data = position.data
     root = shape.get(f"/{row.name}", {})
-    if root.get("kind") == "concurrence":
-        facts["rows"] = [f"/{row.name}/{label}" for label in root["children"]]
+    children = root.get("children")
+    if root.get("kind") == "concurrence" and isinstance(children, list):
+        facts["rows"] = [f"/{row.name}/{label}" for label in children]
     begun = {"began_ns": data["started_ns"] or None, "last_ns": data["last_ns"] or None}
     facts.update(begun, active=position.leaves(), outages=data["outages"])
     return {

@@ -1,47 +1,127 @@
 """The position of a run, folded from the entries of its journal; no threads, time or files here.
 
-An entry is a dict. Its `kind`, `path` and `stamp_ns` are those of the corresponding event
-(`smachpy.events`), so tools for recorded events can show a journal. The other keys are needed to
-resume:
+An entry is a dict. Its `kind` and `path` are those of the corresponding event (`smachpy.events`),
+so tools for recorded events can show a journal. Its `stamp_ns` is the mission's own time: the time
+of day when it began, and from there on a steady clock, outages included. Setting the clock of a
+computer does not change it. The other keys are needed to resume:
 
     Started, Entered   a visit begins; `in`: path of the container; `beside`: the other children
-                       keep running; `number`: the index of the iterator's item
-    Left               a visit has ended with `outcome`; `next`: path of the child that follows
+                       keep running; `number`: the index of the iterator's item; `ending`: it is
+                       the clean-up, and the fields of the `Ending` after which it runs
+    Left               a visit has ended with `outcome`; `next`: path of the child that follows;
+                       `served`: it had serviced the request to stop, which its container is rid of
     Retried            attempt `attempt` has ended; the next begins at `at_ns`
     GoalSent, GoalTaken, GoalDone    a goal is about to be sent, is at a server, has ended
     Once               a call has returned `value` for `key`
     Fired              `transitions` of the plan at `path` have fired: its tokens are in `marking`,
                        the actions at the paths `ends` must stop, those at `begins` begin
     Noted              nothing but changes, see below
-    PreemptRequested   `source`, `by` and `why` asked the container at `path` to stop; with
-                       `override` an operator asked the child there; it is a pair of the outcome or
-                       the label that comes next, or None
+    PreemptRequested   `source`, `by` and `why` asked the container at `path` to stop; if `passed`,
+                       it has got the request from above, or from its own timeout. With `override`
+                       an operator asked the child there; it is None, or the outcome, the label that
+                       comes next, and whether that holds only if the child stops
+    Recalled           the state at `path` withdraws the requests `origins` that it has got
+    Halted             an operator holds a state in the container at `path`: its timeouts stop
+    WentOn             they go on
     Recovered          another process resumes; `shift_ns`: how far deadlines have moved; `gone_ns`:
                        the length of the outage
     Finished           the run has ended with `outcome`
 
 Any of them may also have the changes since the entry before: `userdata` (path of a container -> key
 -> encoded value), `deleted` (path -> keys), and `conditions` (path of a plan -> `set`: name ->
-truth, `events`: pairs [name, stamp] that no guard has read).
+truth, `events`: pairs [name, stamp] that no guard has read). In the place of a large value is
+`{"$blob": DIGEST}`; see `smachpy.durable.journal`.
 """
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NotRequired, TypedDict
+
+from actionlib_core.inputs.checked_data import DataError, Stamp, checked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-VERSION: Final = 1
-"""Version of the format of entries and snapshots."""
+VERSION: Final = 2
+"""Version of the format of entries and snapshots; 2 has large values beside them, and stamps that
+no step of a computer's clock changes.
+"""
 
-MOST_ENDS: Final = 80
+MAX_REQUESTS: Final = 50
+"""Kept requests to stop, of the run and of each visit; older ones are dropped."""
+
+MAX_ENDS: Final = 80
 """Kept ends of the root's children; older ones are dropped."""
 
 
 OF_PROCESS: Final = frozenset({"signal", "shutdown"})
 """Origins of requests to stop that concern one process only: a resumed run is not asked again."""
+
+
+class _KeptGoal(TypedDict):
+    action: str
+    id: str
+    sent_ns: Stamp
+    taken_ns: Stamp | None
+    begun_ns: NotRequired[Stamp | None]
+    status: str | None
+    text: NotRequired[str]
+    result: NotRequired[Any]
+    preempted: NotRequired[bool]
+    stopped: NotRequired[bool]
+
+
+class _Visit(TypedDict):
+    """See `Position`; fields that journals of old versions lack need not be there.
+
+    The field `in` has no line here, as that is a word of Python.
+    """
+
+    since_ns: Stamp
+    begun_ns: NotRequired[Stamp]
+    entered_ns: NotRequired[Stamp]
+    attempt: int
+    outcome: str | None
+    number: NotRequired[int | None]
+    goal: _KeptGoal | None
+    once: dict[str, Any]
+    asked: NotRequired[dict[str, Any]]
+    requests: NotRequired[list[tuple[str, str, str]]]
+    served: NotRequired[list[tuple[str, str, str]]]
+    recalled: NotRequired[list[tuple[str, str, str]]]
+    halted_ns: NotRequired[Stamp]
+    stopping: NotRequired[bool]
+    again: NotRequired[bool]
+    ending: NotRequired[tuple[str | None, str, bool]]
+
+
+class _Condition(TypedDict):
+    set: dict[str, bool]
+    events: list[tuple[str, Stamp]]
+
+
+class _Preempt(TypedDict):
+    path: str
+    source: str
+    by: str
+    why: str
+    on_visit: NotRequired[bool]
+
+
+class _Data(TypedDict):
+    version: int
+    visits: dict[str, _Visit]
+    userdata: dict[str, dict[str, Any]]
+    markings: NotRequired[dict[str, list[str]]]
+    conditions: NotRequired[dict[str, _Condition]]
+    preempts: list[_Preempt]
+    started_ns: Stamp
+    last_ns: Stamp
+    outages: list[tuple[Stamp, Stamp]]
+    ends: NotRequired[list[tuple[str, Stamp, Stamp, str]]]
+    finished: bool
+    outcome: str | None
 
 
 class Position:
@@ -55,15 +135,21 @@ class Position:
                 of the attempt), begun_ns (begin of the visit; both are moved by an outage during
                 which time stops), entered_ns (the same, never moved); attempt; outcome (None while
                 it runs); number (index of the iterator's item); once (key -> encoded value);
-                goal, or None: action, id, sent_ns, taken_ns, status, text, result, preempted (it
-                ended after its state was asked to stop) and stopped (the end of a process has
-                cancelled it); asked, if an operator asked it to stop: source, by, why and override.
+                goal, or None: action, id, sent_ns, taken_ns, begun_ns, status, text, result,
+                preempted (it ended after its state was asked to stop) and stopped (the end of a
+                process has cancelled it); asked, if an operator asked it to stop: source, by, why
+                and override. A container may also have requests, triples of source, by and why that
+                asked it to stop, and served, those after which it began another child: a served
+                request concerns no later child. recalled: the requests that it has withdrawn.
+                halted_ns: since when its timeouts stand still, if they do.
+                The visit of a clean-up has ending: the fields of the `Ending` after which it runs.
                 The visit of a plan's action may also have: stopping (a transition has asked it to
                 stop) and again (it begins once more after that).
             markings: path of a running plan -> ids of the places that hold tokens
             conditions: as in entries
             userdata: path of a container -> key -> encoded value
-            preempts: path, source, by and why of each request
+            preempts: path, source, by and why of the newest requests; on_visit: it is also in the
+                visit of the container (not in journals of old versions)
             started_ns, last_ns: stamps of the first and the newest entry
             outages: pairs [from, to] of stamps
             ends: path, begin and end [ns] and outcome of the newest visits of the root's children
@@ -87,6 +173,18 @@ class Position:
             "finished": False,
             "outcome": None,
         }
+
+    def check(self) -> None:
+        """Check all facts: a file may come from a stranger.
+
+        Raises:
+            DataError: a fact is missing, or is of another type, with its place.
+        """
+        checked(_Data, self.data, known_only=True)
+        for path, visit in self.visits.items():
+            container = visit.get("in")
+            if not isinstance(container, str):
+                raise DataError(container, "a path", f".visits.{path}.in")
 
     @property
     def visits(self) -> dict[str, dict[str, Any]]:
@@ -114,7 +212,16 @@ class Position:
 
     def to_bytes(self) -> bytes:
         """Return the position as a snapshot."""
-        return json.dumps(self.data, separators=(",", ":")).encode()
+        return json.dumps({**self.data, "version": VERSION}, separators=(",", ":")).encode()
+
+    def digests(self) -> set[str]:
+        """Return the digests of the large values that it names."""
+        values = [value for container in self.userdata.values() for value in container.values()]
+        for visit in self.visits.values():
+            values += visit["once"].values()
+            values.append((visit["goal"] or {}).get("result"))
+        found = (value.get("$blob") for value in values if isinstance(value, dict))
+        return {digest for digest in found if digest is not None}
 
     def leaves(self) -> list[str]:
         """Return the paths of the innermost states that are running."""
@@ -158,10 +265,11 @@ class Position:
         }
         # The target of an operator's jump is a label, not a path: look it up beside the child.
         for path, visit in self.visits.items():
-            outcome, label = (visit.get("asked") or {}).get("override") or (None, None)
+            override = (visit.get("asked") or {}).get("override") or (None, None)
+            outcome, label, *more = override
             if label is not None:
                 label = new(f"{visit['in']}/{label}").rpartition("/")[2]
-                asked = {**visit["asked"], "override": [outcome, label]}
+                asked = {**visit["asked"], "override": [outcome, label, *more]}
                 visits[new(path)]["asked"] = asked
         preempts = [{**one, "path": new(one["path"])} for one in self.data["preempts"]]
         moved = {
@@ -179,6 +287,11 @@ class Position:
             for each in [each for each in facts if each.startswith(below)]:
                 del facts[each]
         self.markings.pop(path, None)
+
+    def _serve(self, container: str) -> None:
+        visit = self.visits.get(container)
+        if visit is not None and visit.get("requests"):
+            visit["served"] = [*visit.get("served", []), *visit.pop("requests")][-MAX_REQUESTS:]
 
     def _begin(self, path: str, container: str, stamp_ns: int, number: int | None = None) -> None:
         self.visits[path] = {
@@ -200,15 +313,24 @@ class Position:
     def _on_entered(self, entry: Mapping[str, Any]) -> None:
         path, container = entry["path"], entry["in"]
         if not entry.get("beside"):  # one child at a time: the one before has ended
+            known = self.visits.get(path)
+            # The child before has served what it was asked. Not if the child was chosen before the
+            # request: this entry then only has changes.
+            if known is None or known["outcome"] is not None:
+                self._serve(container)
             self._end_below(container)
         self._end_below(path)
         self._begin(path, container, entry["stamp_ns"], entry.get("number"))
+        if "ending" in entry:
+            self.visits[path]["ending"] = entry["ending"]
 
     def _on_left(self, entry: Mapping[str, Any]) -> None:
         path, following = entry["path"], entry.get("next")
         visit = self.visits[path]
         self._keep_end(path, visit, entry)
         self._end_below(path)
+        if entry.get("served"):
+            self._serve(visit["in"])
         if visit.get("stopping"):
             del self.visits[path]
             if visit.get("again"):
@@ -226,12 +348,14 @@ class Position:
             began = visit.get("entered_ns", visit["since_ns"])  # not in journals of old versions
             ends = self.data.setdefault("ends", [])
             ends.append([path, began, entry["stamp_ns"], entry["outcome"]])
-            del ends[:-MOST_ENDS]
+            del ends[:-MAX_ENDS]
 
     def _on_retried(self, entry: Mapping[str, Any]) -> None:
         self._end_below(entry["path"])
         visit = self.visits[entry["path"]]
         visit.update(since_ns=entry["at_ns"], attempt=entry["attempt"] + 1, goal=None)
+        for name in ("requests", "served", "recalled", "halted_ns"):
+            visit.pop(name, None)
 
     def _on_goal_sent(self, entry: Mapping[str, Any]) -> None:
         self.visits[entry["path"]]["goal"] = {
@@ -239,6 +363,7 @@ class Position:
             "id": entry["goal_id"],
             "sent_ns": entry["stamp_ns"],
             "taken_ns": None,
+            "begun_ns": None,
             "status": None,
             "text": "",
             "result": None,
@@ -247,7 +372,11 @@ class Position:
         }
 
     def _on_goal_taken(self, entry: Mapping[str, Any]) -> None:
-        self.visits[entry["path"]]["goal"]["taken_ns"] = entry["stamp_ns"]
+        goal, stamp_ns = self.visits[entry["path"]]["goal"], entry["stamp_ns"]
+        if goal["taken_ns"] is None:
+            goal["taken_ns"] = stamp_ns
+        if entry.get("begun", True):  # journals of old versions do not say
+            goal["begun_ns"] = stamp_ns
 
     def _on_goal_done(self, entry: Mapping[str, Any]) -> None:
         goal = self.visits[entry["path"]]["goal"]
@@ -285,11 +414,37 @@ class Position:
             if visit is not None:  # it may have ended meanwhile
                 visit["asked"] = {**request, "override": entry["override"]}
             return
-        self.data["preempts"].append(request)
+        visit = self.visits.get(entry["path"])
+        if visit is not None:
+            origin = [request["source"], request["by"], request["why"]]
+            visit["requests"] = [*visit.get("requests", []), origin][-MAX_REQUESTS:]
+        if entry.get("passed"):
+            return
+        preempts = self.data["preempts"]
+        preempts.append({**request, "on_visit": visit is not None})
+        del preempts[:-MAX_REQUESTS]
         if entry["source"] in OF_PROCESS:
             for visit in self.visits.values():
                 if visit["goal"] is not None:
                     visit["goal"]["stopped"] = True
+
+    def _on_recalled(self, entry: Mapping[str, Any]) -> None:
+        visit = self.visits[entry["path"]]
+        visit.pop("asked", None)
+        visit.pop("requests", None)
+        visit["recalled"] = [*visit.get("recalled", []), *entry["origins"]][-MAX_REQUESTS:]
+
+    def _on_halted(self, entry: Mapping[str, Any]) -> None:
+        self.visits[entry["path"]]["halted_ns"] = entry["stamp_ns"]
+
+    def _on_went_on(self, entry: Mapping[str, Any]) -> None:
+        self._go_on(self.visits[entry["path"]], entry["stamp_ns"])
+
+    def _go_on(self, visit: dict[str, Any], stamp_ns: int) -> None:
+        """Let the timeouts of a visit go on that an operator had stopped, if one had."""
+        halted_ns = visit.pop("halted_ns", None)
+        if halted_ns is not None:
+            visit["since_ns"] += max(0, stamp_ns - halted_ns)
 
     def _on_recovered(self, entry: Mapping[str, Any]) -> None:
         stamp_ns = entry["stamp_ns"]
@@ -298,11 +453,13 @@ class Position:
         last_ns = self.data["last_ns"] = min(self.data["last_ns"], stamp_ns)
         self.data["outages"].append([max(last_ns, stamp_ns - gone_ns), stamp_ns])
         for visit in self.visits.values():
+            self._go_on(visit, stamp_ns - gone_ns)  # the operator's pause has ended with its run
             visit["begun_ns"] = visit.get("begun_ns", visit["since_ns"]) + entry["shift_ns"]
             visit["since_ns"] += entry["shift_ns"]
             goal = visit["goal"]
-            if goal is not None and goal["taken_ns"] is not None:
-                goal["taken_ns"] += entry["shift_ns"]
+            for at in ("taken_ns", "begun_ns"):
+                if goal is not None and goal.get(at) is not None:
+                    goal[at] += entry["shift_ns"]
         for known in self.conditions.values():
             known["events"] = [[name, at + entry["shift_ns"]] for name, at in known["events"]]
 
@@ -323,6 +480,9 @@ class Position:
         "Fired": _on_fired,
         "Noted": _on_noted,
         "PreemptRequested": _on_preempt,
+        "Recalled": _on_recalled,
+        "Halted": _on_halted,
+        "WentOn": _on_went_on,
         "Recovered": _on_recovered,
         "Finished": _on_finished,
     }

@@ -3,10 +3,15 @@
 If the connection is lost, because the server restarts or a standby takes over, the store tries to
 connect again for `patience` seconds. It then looks up whether the interrupted transaction was
 committed, so that no entry is written twice.
+
+A pooler may stand between (PgBouncer in transaction mode): nothing is kept in the server's session,
+neither settings nor prepared statements, as the next transaction may run in another one.
 """
 
 from __future__ import annotations
 
+import contextlib
+import re
 import threading
 from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
@@ -14,7 +19,8 @@ import psycopg
 from psycopg import conninfo, errors
 
 from actionlib_core.clock import RealClock
-from smachpy.durable.sql import VERSION, Cursor, Dialect, SqlStore
+from actionlib_core.clock.forks import is_copy
+from smachpy.durable.sql import TABLES, VERSION, Cursor, Dialect, SqlStore
 from smachpy.durable.store import Reason, StoreError
 
 if TYPE_CHECKING:
@@ -24,6 +30,7 @@ T = TypeVar("T")
 
 _DEFAULTS: Final = {
     "application_name": "smachpy",
+    "client_encoding": "UTF8",  # whatever the database has; the server converts
     "target_session_attrs": "read-write",  # of several hosts, the one that accepts writes
     # [s]: a server that is gone without a word is noticed after 2 + 2 * 1 s without traffic; the
     # system's default is hours.
@@ -36,17 +43,28 @@ _HAS_TABLES: Final = (
     "SELECT COUNT(*) FROM pg_tables "
     "WHERE tablename = 'smachpy_version' AND schemaname = ANY (current_schemas(false))"
 )
+# "smjl", the application id of files: only one process changes the tables.
+_ONE_MAKER: Final = "SELECT pg_advisory_xact_lock(1936550508)"
 _FIRST_PAUSE_S: Final = 0.05
-_LONGEST_PAUSE_S: Final = 2.0
+_MAX_PAUSE_S: Final = 2.0
+_HEAR_S: Final = 1.0  # a thread that listens looks this often whether it is to end
+_CHANNEL: Final = "smachpy_queue"
 _AGAIN: Final = (
     errors.SerializationFailure,
     errors.DeadlockDetected,
+    errors.UniqueViolation,  # another process has claimed the same robot, group or id just now
     errors.ReadOnlySqlTransaction,  # this server has become a standby
+)
+_REFUSED: Final = re.compile(
+    "authentication failed|no password supplied|no pg_hba.conf entry|not permitted to log in"
+    '|(role|database|user) "[^"]*" does not exist'
 )
 _REASONS: Final[tuple[tuple[type[psycopg.Error], Reason, str], ...]] = (
     (errors.DiskFull, "full", "no space is left on the server"),
     (errors.DataCorrupted, "corrupt", "the database is damaged"),
     (errors.IndexCorrupted, "corrupt", "the database is damaged"),
+    (errors.UntranslatableCharacter, "failed", "the database's encoding lacks a character"),
+    (errors.InsufficientPrivilege, "failed", "this user may not do that"),
     (errors.QueryCanceled, "busy", "the server did not finish it in time"),
     (errors.LockNotAvailable, "busy", "the server did not finish it in time"),
 )
@@ -66,11 +84,11 @@ class PostgresStore(SqlStore):
         placeholder="%s",
         blob="BYTEA",
         real="DOUBLE PRECISION",
+        big="BIGINT",
         for_update=" FOR UPDATE",
         for_share=" FOR SHARE",
-        # "smjl", the application id of files. Locked rows are not enough: two runners may claim
-        # different missions of one robot, and neither sees the other's uncommitted claim.
-        one_claimer="SELECT pg_advisory_xact_lock(1936550508)",
+        skip_locked=" FOR UPDATE SKIP LOCKED",
+        notify=f"SELECT pg_notify('{_CHANNEL}', '')",
     )
 
     def __init__(self, url: str, *, patience: float = 8.0) -> None:
@@ -78,6 +96,7 @@ class PostgresStore(SqlStore):
         self._patience = patience
         self._clock = RealClock()
         self._lock = threading.Lock()
+        self._is_closed = False
         self.where = "postgresql://"
         try:
             given = conninfo.conninfo_to_dict(url)
@@ -89,43 +108,51 @@ class PostgresStore(SqlStore):
         half = max(2, round(patience / 2))
         limits = {"connect_timeout": str(half), "tcp_user_timeout": str(1000 * half)}
         self._arguments: dict[str, Any] = {**_DEFAULTS, **limits, **given}
-        try:
-            self._connection = self._connect()
-        except psycopg.Error as error:
-            raise self._error(error) from error
+        milliseconds = max(1, round(patience * 1000))
+        # One round trip. With "off" a commit returns before it is durable; the other values are up
+        # to the server.
+        self._begin = (
+            f"BEGIN; SET LOCAL statement_timeout = {milliseconds}; "
+            f"SET LOCAL idle_in_transaction_session_timeout = {2 * milliseconds}; "
+            "SELECT CASE WHEN current_setting('synchronous_commit') = 'off' "
+            "THEN set_config('synchronous_commit', 'on', true) END"
+        )
+        self._connection: psycopg.Connection[Any] | None = None
         try:
             self._transact(self._create_tables)
         except BaseException:
-            self._connection.close()
+            self.close()
             raise
 
     def close(self) -> None:
-        """As `Store.close`."""
+        if is_copy(self._pid):  # it is the parent's
+            return
         with self._lock:
-            self._connection.close()
+            self._is_closed = True
+            if self._connection is not None:
+                self._connection.close()
 
     def _connect(self) -> psycopg.Connection[Any]:
-        connection = psycopg.connect(**self._arguments, autocommit=True)
-        milliseconds = max(1, round(self._patience * 1000))
-        # With "off" a commit returns before it is durable; the other values are up to the server.
-        connection.execute(
-            "SELECT set_config('statement_timeout', %s, false), "
-            "CASE WHEN current_setting('synchronous_commit') = 'off' "
-            "THEN set_config('synchronous_commit', 'on', false) END",
-            [str(milliseconds)],
-        )
-        return connection
+        return psycopg.connect(**self._arguments, autocommit=True, prepare_threshold=None)
 
     def _create_tables(self, cursor: Cursor, _: bool) -> None:
         if not self._one(cursor, _HAS_TABLES)[0]:
             # Two processes may open a new database at once: look again when holding the lock.
-            self._do(cursor, self.dialect.one_claimer)
+            self._do(cursor, _ONE_MAKER)
             if not self._one(cursor, _HAS_TABLES)[0]:
                 for statement in self.dialect.tables():
                     self._do(cursor, statement)
-                self._do(cursor, f"CREATE TABLE smachpy_version AS SELECT {VERSION} AS version")
+                self._do(cursor, "CREATE TABLE smachpy_version AS SELECT 0 AS version")
         version = self._one(cursor, "SELECT version FROM smachpy_version")[0]
-        if version > VERSION:
+        if version < VERSION:
+            self._do(cursor, _ONE_MAKER)
+            for name, kind in self.dialect.columns().items():
+                add = f"ALTER TABLE smachpy_missions ADD COLUMN IF NOT EXISTS {name} {kind}"
+                self._do(cursor, add)
+            for statement in self.dialect.additions():
+                self._do(cursor, statement)
+            self._do(cursor, "UPDATE smachpy_version SET version = ?", VERSION)
+        elif version > VERSION:
             raise StoreError(
                 self.where,
                 f"got journals of version {version}; expected {VERSION} at most. "
@@ -134,42 +161,92 @@ class PostgresStore(SqlStore):
             )
 
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:  # noqa: ARG002
+        self._check_process()
         with self._lock:
             deadline = self._clock.now() + self._patience
             pause = _FIRST_PAUSE_S
             again = False
             while True:
+                connection = self._connection
+                is_new = connection is None or (connection.closed and not self._is_closed)
                 try:
-                    if again and self._connection.closed:
-                        self._connection = self._connect()
-                    with self._connection.transaction():
-                        return work(cast("Cursor", self._connection.cursor()), again)
+                    if connection is None or is_new:
+                        connection = self._connection = self._connect()
+                    return self._once(connection, work, again=again)
                 except psycopg.Error as error:
-                    # A wrong statement is wrong on a new connection, too.
-                    lost = self._connection.closed and not isinstance(
-                        error, psycopg.ProgrammingError
-                    )
+                    # A wrong statement, or password, is wrong on a new connection, too.
+                    lost = connection is None or connection.closed or is_new
+                    lost = lost and not isinstance(error, psycopg.ProgrammingError)
+                    lost = lost and not _is_refused(error) and not self._is_closed
                     left = deadline - self._clock.now()
                     if not (lost or isinstance(error, _AGAIN)) or left <= 0:
                         raise self._error(error) from error
-                    if isinstance(error, errors.ReadOnlySqlTransaction):
-                        self._connection.close()  # connect again, to the host that accepts writes
+                    if isinstance(error, errors.ReadOnlySqlTransaction) and connection is not None:
+                        connection.close()  # connect again, to the host that accepts writes
                 again = True
                 self._clock.sleep(min(pause, left))
-                pause = min(2 * pause, _LONGEST_PAUSE_S)
+                pause = min(2 * pause, _MAX_PAUSE_S)
+
+    def _once(
+        self, connection: psycopg.Connection[Any], work: Callable[[Cursor, bool], T], *, again: bool
+    ) -> T:
+        connection.execute(self._begin)
+        try:
+            result = work(cast("Cursor", connection.cursor()), again)
+        except BaseException:
+            with contextlib.suppress(psycopg.Error):
+                connection.execute("ROLLBACK")
+            raise
+        connection.execute("COMMIT")
+        return result
+
+    def listen(self, on_news: Callable[[], object]) -> Callable[[], object]:
+        """On a connection of its own.
+
+        Behind a pooler in transaction mode it hears nothing, without an error.
+        """
+        over = self._clock.event("the end of the queue's news")
+
+        def hear() -> None:
+            while not over.is_set():
+                with contextlib.suppress(psycopg.Error), self._connect() as connection:
+                    connection.execute(f"LISTEN {_CHANNEL}")
+                    on_news()  # there may have been some before
+                    while not over.is_set():
+                        for _ in connection.notifies(timeout=_HEAR_S):
+                            on_news()
+                over.wait(_MAX_PAUSE_S)
+
+        task = self._clock.spawn(hear, name="news of the queue")
+
+        def end() -> None:
+            over.set()
+            task.join()
+
+        return end
 
     def _verify(self, cursor: Cursor) -> None:
         """Do nothing: the server checks its own pages, with `initdb --data-checksums`."""
 
     def _now(self, cursor: Cursor) -> float:
         # The clocks of the runners' computers differ; the server's clock is the same for all.
-        now = self._one(cursor, "SELECT EXTRACT(EPOCH FROM clock_timestamp())::DOUBLE PRECISION")
+        now = self._one(cursor, f"SELECT {self._now_text()}")
         return float(now[0])
+
+    def _now_text(self) -> str:
+        return "EXTRACT(EPOCH FROM clock_timestamp())::DOUBLE PRECISION"
+
+    def _bytes(self, cursor: Cursor) -> int:
+        tables = ", ".join(f"'{table}'" for table in sorted(TABLES))
+        sizes = f"SUM(pg_total_relation_size(oid)) FROM pg_class WHERE relname IN ({tables})"
+        return int(self._one(cursor, f"SELECT {sizes}")[0] or 0)
 
     def _error(self, error: psycopg.Error) -> StoreError:
         for kind, reason, problem in _REASONS:
             if isinstance(error, kind):
                 return self._store_error(reason, f"{problem} ({_line(error)})")
+        if _is_refused(error):
+            return self._store_error("failed", f"the server refuses it ({_line(error)})")
         if isinstance(error, (psycopg.OperationalError, psycopg.InterfaceError)):
             return self._store_error("unreachable", f"got no answer ({_line(error)})")
         return self._store_error("failed", f"PostgreSQL cannot use it ({_line(error)})")
@@ -177,6 +254,15 @@ class PostgresStore(SqlStore):
     def _store_error(self, reason: Reason, problem: str) -> StoreError:
         expected = "expected a database that can be written"
         return StoreError(self.where, f"{problem}; {expected}.", reason=reason)
+
+
+def _is_refused(error: psycopg.Error) -> bool:
+    """Return whether the server has answered that this user may not use this database.
+
+    Errors of a connection have no code, only their text: in another language than English, which is
+    up to the server, they count as an outage.
+    """
+    return isinstance(error, psycopg.OperationalError) and bool(_REFUSED.search(str(error)))
 
 
 def _line(error: BaseException) -> str:

@@ -34,6 +34,18 @@ def process_lives(pid: int, mark: str) -> bool | None:
     return _start_of(pid) == start
 
 
+def boot_clock() -> str:
+    """Return a name of this computer's monotonic clock, the same for all that read it.
+
+    "" if that cannot be determined. Another boot, or a container with another time, has another.
+    """
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+        return f"{boot} {Path('/proc/self/ns/time').readlink()}"
+    except OSError:
+        return ""
+
+
 def _boot_and_namespace() -> str:
     """Return "BOOT NAMESPACE"; processes for which it is equal see each other's pids."""
     try:

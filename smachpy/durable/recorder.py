@@ -1,4 +1,4 @@
-"""Records a run in its journal, and resumes a recorded run: the `RunJournal` of `smachpy.run`.
+"""Records a run in its journal, and resumes a recorded run: the `RunJournal` of `smachpy.engine`.
 
 This module handles the machine and its threads. `smachpy.durable.position` gives entries their
 meaning, `smachpy.durable.journal` writes them.
@@ -7,32 +7,41 @@ meaning, `smachpy.durable.journal` writes them.
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
+import os
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy import log
-from smachpy.durable.codec import decode, encode
+from actionlib_core.clock.forks import is_copy
+from actionlib_core.shutdown import AT_EXIT
+from smachpy.base import log
+from smachpy.base.problems import name_of
+from smachpy.durable.codec import NotDurableError, decode, encode
 from smachpy.durable.position import OF_PROCESS
-from smachpy.durable.store import FencedError, StoreError
+from smachpy.durable.store import FencedError, StoreError, digest_of
+from smachpy.engine.described import walk
+from smachpy.engine.interrupt import Interruption
+from smachpy.engine.journal import RunJournal
+from smachpy.engine.options import ASK
+from smachpy.engine.preempt import ask, ask_child, asking, current_origin, pass_on, request_soon
+from smachpy.engine.visit import Origin, Override
 from smachpy.exceptions import InvalidUserCodeError, MissionError, error_text
 from smachpy.machines.container import Container, control_of
-from smachpy.machines.problems import name_of
 from smachpy.machines.state import get_options
-from smachpy.run.grace import ask, ask_child, asking, current_origin, request_soon
-from smachpy.run.interrupt import Interruption
-from smachpy.run.options import ASK
-from smachpy.run.visit import Override
 from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
-from smachpy.userdata.user_data import CheckedDict, data_of
+from smachpy.userdata.secret import is_secret, is_secret_name
+from smachpy.userdata.user_data import CheckedDict, ConstantKey, data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
+    from actionlib_core.clock import Clock
     from smachpy.durable.journal import Journal
+    from smachpy.durable.position import Position
     from smachpy.durable.store import MissionRow
-    from smachpy.run.frame import Frame, Run
-    from smachpy.run.step import Step
+    from smachpy.engine.frame import Frame
+    from smachpy.engine.step import Step
 
 _MADE_AGAIN = frozenset({"timeout", "concurrence", "plan"})
 """Origins of requests that a resumed run makes by itself, if their cause still holds."""
@@ -42,33 +51,69 @@ RESUME_S: Final = 2.0
 active have been entered again [s]. An operator may hold one of them for hours.
 """
 
+SUSPENDS: Final = frozenset({"SIGTERM", "SIGHUP", "SIGQUIT", AT_EXIT})
+"""Ends of the process that are no end of the mission: a service is stopped, a terminal closed.
+Ctrl-C is typed by the operator of the mission, who wants the robot to stop.
+"""
+
 _MISSING = object()
 
-MOST_LISTED: Final = 500
+_SHORT: Final = 64
+"""Values whose JSON is longer are compared by a digest, so that the text need not be kept."""
+
+MAX_LISTED_GOALS: Final = 500
 """Resumed states, and outages, that the event `Recovered` lists at most."""
 
 
-class Recorder:
+class SteadyTime:
+    """The time of a mission: the time of day when it began, and from there on a steady clock.
+
+    Args:
+        clock: The clock.
+        begin_ns: Its present time [ns since the Unix epoch]; None: the time of day.
+    """
+
+    def __init__(self, clock: Clock, begin_ns: int | None = None) -> None:
+        self._clock = clock
+        self._origin = clock.now()
+        self._begin_ns = clock.time_ns() if begin_ns is None else begin_ns
+
+    def now_ns(self) -> int:
+        """Return the time [ns since the Unix epoch]."""
+        return self._begin_ns + round((self._clock.now() - self._origin) * 1e9)
+
+    def ahead_ns(self) -> int:
+        """Return how far it is ahead of the time of day [ns]: clocks are set, and outages end."""
+        return self.now_ns() - self._clock.time_ns()
+
+
+class Recorder(RunJournal):
     """Writes each action of a run to the journal first, and resumes the run of an earlier process.
 
     Args:
         machine: The root.
         journal: Its journal.
         resumed: Whether the position comes from an earlier process.
+        time: Its time.
         shift_ns: How far deadlines move because no process ran the mission [ns].
         gone_ns: Length of the outage before this process [ns].
         row: The mission's row in the store.
 
     Attributes:
         mission: The mission's id.
+        time: Its time.
         run: The name of this run in recordings and viewers. It differs when a mission of the same
             id is started anew.
         broken: The error after which nothing is written any more and the run was preempted; None
             while there is none.
         on_fenced: Called before that preempt if another runner has taken the mission over, or None.
+        on_suspend: Called with the signal and the top frame, instead of a preempt, if the process
+            is to end; or None.
 
-    Threads: any thread of the run calls the methods, as `smachpy.run.frame.RunJournal` says.
+    Threads: any thread of the run calls the methods, as `smachpy.engine.journal.RunJournal` says.
     """
+
+    is_durable = True
 
     def __init__(
         self,
@@ -77,18 +122,23 @@ class Recorder:
         *,
         row: MissionRow,
         resumed: bool,
+        time: SteadyTime,
         shift_ns: int = 0,
         gone_ns: int = 0,
     ) -> None:
         self.mission, self.run = row.id, row.run
+        self.time = time
         self.broken: Exception | None = None
         self.on_fenced: Callable[[FencedError], object] | None = None
+        self.on_suspend: Callable[[str, Any], object] | None = None
+        self._is_suspended = False
+        self._pid = os.getpid()
         self._machine = machine
         self._journal = journal
         self._is_resumed = resumed
         self._shift_ns = shift_ns
         self._gone_ns = gone_ns
-        self._run: Run | None = None
+        self._top: Frame | None = None
         self._root = f"/{machine.name or 'SM_ROOT'}"
         # Visits of the earlier process: those whose states have not been entered again, and those
         # that continue now. A path is in at most one of the two.
@@ -97,14 +147,24 @@ class Recorder:
         self._markings: dict[str, list[str]] = {}  # of plans that have not been resumed yet
         # Children that had been asked to stop, to be asked again: frame, child, origin, override.
         self._to_stop: list[tuple[Frame, Step, tuple[str, str, str], Override | None]] = []
-        preempts = journal.position.data["preempts"] if resumed else []
-        self._preempts = [one for one in preempts if one["source"] not in OF_PROCESS]
+        # Requests to containers that are passed on once all states have been entered again; and by
+        # container, those that it has served: if they come again, its present child is not meant.
+        self._preempts = _unserved(journal.position) if resumed else []
+        self._served: dict[str, list[tuple[str, str, str]]] = {}
+        self._open: dict[str, list[tuple[str, str, str]]] = {}  # those that it has not served
+        # By child, the requests that have reached it, and those that it has withdrawn.
+        self._heard: dict[str, set[tuple[str, str, str]]] = {}
+        self._recalled: dict[str, set[tuple[str, str, str]]] = {}
+        self._is_asking = False  # `_ask_again` passes requests on
+        self._held: list[tuple[Container, tuple[str, str, str]]] = []  # the same, already asked
         self._gave_up_waiting = False  # not all states were entered again within `RESUME_S`
         self._questions = 0  # states about which an operator is asked now
         # Children whose begin is in the journal already, in the entry that chose them.
         self._chosen: set[str] = set()
         self._numbers: dict[str, int] = {}  # path of an iterator -> index of its item
-        self._containers = dict(_containers(machine, self._root))
+        self._containers: dict[str, Container] = {
+            path: state for path, state in walk(machine, self._root) if isinstance(state, Container)
+        }
         # Two containers may share a userdata object: it is kept once, under the first path.
         self._homes: dict[int, str] = {}
         for path, container in self._containers.items():
@@ -115,7 +175,7 @@ class Recorder:
         }
         self._knowledge: dict[str, Any] = {}  # path of a plan -> its conditions and events
         self._known_changes: dict[str, int] = {}  # path of a plan -> its changes that were written
-        # Path -> key -> the value, and its JSON, as last written.
+        # Path -> key -> the value, and its JSON, or the digest of a long one, as last written.
         self._known: dict[str, dict[str, tuple[Any, str]]] = {}
         for path, container in self._containers.items():
             own: Any = container._smachpy
@@ -135,15 +195,18 @@ class Recorder:
             kept = self._journal.position.userdata.get(path, {})
             data = data_of(self._containers[path].userdata)
             # The mission's code may have set a key that the run has deleted since.
-            for key in [key for key in data if self._is_kept(path, key) and key not in kept]:
-                del data[key]
+            for key in [key for key, value in data.items() if self._is_kept(path, key, value)]:
+                if key not in kept:
+                    del data[key]
             known = self._known[path] = {}
-            for key, encoded in kept.items():
+            for key, found in kept.items():
+                encoded = self._journal.value(found)
                 data[key] = decode(encoded)
-                known[key] = (data[key], json.dumps(encoded))
+                known[key] = (data[key], _shortened(json.dumps(encoded)))
+        shift_ns = self._shift_ns - self.time.ahead_ns()
         for path, conditions in self._journal.position.conditions.items():
             if path in self._knowledge:
-                self._knowledge[path].restore(conditions, self._shift_ns)
+                self._knowledge[path].restore(conditions, shift_ns)
 
     # -- writing -------------------------------------------------------------------------------
 
@@ -155,18 +218,29 @@ class Recorder:
         return self._write_with(None, None, kind, path, facts)
 
     def _write_with(
-        self, frame: Frame | None, step: Step | None, kind: str, path: str, facts: dict[str, Any]
+        self,
+        frame: Frame | None,
+        step: Step | None,
+        kind: str,
+        path: str,
+        facts: dict[str, Any],
+        value: str = "",
     ) -> bool:
-        """Write an entry with the changes in the userdata of `frame`; see `_changes`."""
-        run = self._run
-        assert run is not None
+        """Write an entry with the changes in the userdata of `frame`; see `_changes`.
+
+        `value` is the name of the fact that is an encoded value, which may be large.
+        """
+        if is_copy(self._pid):  # a process that a state has forked: the mission is its parent's
+            return True
         if self.broken is not None:
             return False
         journal = self._journal
         # The lock covers reading the userdata and queueing the entry: a change that an entry
         # reports must not be older than the one that an earlier entry has reported.
         with journal.lock:
-            entry = {"kind": kind, "path": path, "stamp_ns": run.clock.time_ns(), **facts}
+            entry = {"kind": kind, "path": path, "stamp_ns": self.time.now_ns(), **facts}
+            if value:
+                entry[value] = journal.compact(facts[value], json.dumps(facts[value]))
             if frame is not None:
                 entry.update(self._changes(frame, step))
             if entry.pop("only_changes", False) and "userdata" not in entry:
@@ -182,7 +256,7 @@ class Recorder:
 
     def stop(self, error: Exception) -> None:
         """Preempt the run because its journal cannot be written; only the first `error` counts."""
-        if self.broken is not None:
+        if self.broken is not None or self._is_suspended:
             return
         self.broken = error
         if self.on_fenced is not None and isinstance(error, FencedError):
@@ -210,45 +284,55 @@ class Recorder:
             if before is not None and before[0] is value:
                 if type(value) in ATOMS or (written is not None and key not in written):
                     continue
-            elif not self._is_kept(path, key):
+            elif not self._is_kept(path, key, value):
                 continue
-            encoded = encode(value, key=key, path=frame.here())
+            encoded = _encoded(value, key, frame.here())
             text = json.dumps(encoded)  # texts, because 1 == True == 1.0
-            if before is None or before[1] != text:
-                changed[key] = encoded
-            known[key] = (value, text)
+            short = _shortened(text)
+            if before is None or before[1] != short:
+                changed[key] = self._journal.compact(encoded, text)
+            known[key] = (value, short)
         gone = [key for key in known if key not in data]
         for key in gone:
             del known[key]
         found: dict[str, Any] = {"userdata": {path: changed}} if changed else {}
         return {**found, "deleted": {path: gone}} if gone else found
 
-    def _is_kept(self, path: str, key: str) -> bool:
-        """Return whether a key is kept; constants, "LABEL.KEY", come from the machine's code."""
-        return "." not in key and key not in self._transient[path]
+    def _is_kept(self, path: str, key: str, value: object) -> bool:
+        """Return whether a key is kept; constants come from the machine's code."""
+        is_constant = type(key) is ConstantKey
+        return not is_constant and key not in self._transient[path] and not is_secret(value)
 
     # -- the run -------------------------------------------------------------------------------
 
-    def attach(self, root: Frame) -> None:
-        """As `RunJournal.attach`."""
-        run = self._run = root.run
-        run.journal = self
-        # Entries are written where events are published, which the fast loop does not do.
+    def attach(self, root: Frame) -> tuple[Any, ...] | None:
+        self._top, run = root, root.run
+        # Entries are written where events are published.
         run.watched = run.careful = True
         if self._is_resumed:
             self._write("Recovered", self._root, shift_ns=self._shift_ns, gone_ns=self._gone_ns)
             # A copy: the position changes with each entry from here on.
             self._unresumed = copy.deepcopy(self._journal.position.visits)
+            for path, visit in self._unresumed.items():
+                self._served[path] = [
+                    (source, by, why) for source, by, why in visit.get("served", ())
+                ]
+                self._open[path] = [
+                    (source, by, why) for source, by, why in visit.get("requests", ())
+                ]
+                self._recalled[path] = {
+                    (source, by, why) for source, by, why in visit.get("recalled", ())
+                }
             self._markings = dict(self._journal.position.markings)
             self._resumed[self._root] = self._unresumed.pop(self._root)
             self._all_back = run.clock.event("the states that were active")
             if self._unresumed and self._machine._preempt_requested:
                 # Requested before the run: a state that was active must be entered again before it
                 # can stop, or its goal would run on without anybody to cancel it.
-                source, by, why = self._machine._smachpy.origin or ("program", "", "")
+                source, by, why = self._machine._smachpy.live.origin or ("program", "", "")
                 self._machine._preempt_requested = False
-                self.asked(root, (source, by, why))
-            return
+                self.asked(root, Origin(source, by, why))
+            return self._recovered()
         with self._journal.lock:
             facts: dict[str, Any] = {"in": "", "userdata": {}}
             for path in self._homes.values():
@@ -256,30 +340,29 @@ class Recorder:
                 known = self._known[path] = {}
                 kept = facts["userdata"][path] = {}
                 for key, value in values.items():
-                    if self._is_kept(path, key):
-                        kept[key] = encode(value, key=key, path=path)
-                        known[key] = (value, json.dumps(kept[key]))
+                    if self._is_kept(path, key, value):
+                        encoded = _encoded(value, key, path)
+                        text = json.dumps(encoded)
+                        kept[key] = self._journal.compact(encoded, text)
+                        known[key] = (value, _shortened(text))
         self._write("Started", self._root, **facts)
+        return None
 
-    def recovered(self) -> tuple[Any, ...] | None:
-        """As `RunJournal.recovered`."""
-        if not self._is_resumed:
-            return None
+    def _recovered(self) -> tuple[Any, ...]:
+        """Return the fields of the event `Recovered`."""
         data = self._journal.position.data
         active = [
             (path, visit.get("entered_ns", visit["since_ns"]))  # not in journals of old versions
             for path, visit in data["visits"].items()
             if visit["outcome"] is None
         ]
-        outages = tuple(map(tuple, data["outages"][-MOST_LISTED:]))
-        return self.mission, data["started_ns"], outages, tuple(active[:MOST_LISTED])
+        outages = tuple(map(tuple, data["outages"][-MAX_LISTED_GOALS:]))
+        return self.mission, data["started_ns"], outages, tuple(active[:MAX_LISTED_GOALS])
 
     def finish(self, outcome: str) -> None:
-        """As `RunJournal.finish`."""
         self._write("Finished", self._root, outcome=outcome)
 
     def enter(self, frame: Frame, step: Step) -> str | None:
-        """As `RunJournal.enter`."""
         if frame.path not in self._containers:
             return None  # a state runs this container by itself; it is not part of the machine
         path = step.path_in(frame)
@@ -287,6 +370,9 @@ class Recorder:
         outcome: str | None = None
         if visit is None:
             self._resumed.pop(path, None)
+            # The child before had ended after these, and it is followed now: they are served.
+            self._served.setdefault(frame.path, []).extend(self._open.pop(frame.path, ()))
+            self._forget_requests(path)
             if not self._write_entered(frame, path):
                 outcome = "preempted"
         else:
@@ -319,7 +405,9 @@ class Recorder:
         """Write that the state at `path` begins; return whether that worked."""
         facts: dict[str, Any] = {"in": frame.path}
         kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
-        if kind in {"concurrence", "plan"}:
+        if frame.tidying is not None:
+            facts["ending"] = list(frame.tidying.ending)
+        elif kind in {"concurrence", "plan"}:
             facts["beside"] = True
         elif kind == "iterator":
             facts["number"] = self._numbers.get(frame.path, 0)
@@ -341,22 +429,29 @@ class Recorder:
 
     def _ask_again(self) -> None:
         """Pass on the requests to stop that waited until the active states were entered again."""
+        self._is_asking = True
         stopping, self._to_stop = self._to_stop, []
         for frame, step, origin, override in stopping:
             with asking(*origin):
                 ask_child(frame, step, override)
+        held, self._held = self._held, []
+        for inner, origin in held:
+            assert self._top is not None
+            with asking(*origin), self._top.run.lock:
+                pass_on(inner)
+            self._top.run.flush_soon()
         preempts, self._preempts = self._preempts, []
         for request in preempts:
             container = self._containers.get(request["path"])
             if container is not None:
                 with asking(request["source"], request["by"], request["why"]):
                     request_soon(container)
+        self._is_asking = False
 
     def execute(self, frame: Frame, step: Step, userdata: Any) -> Any:
-        """As `RunJournal.execute`."""
         visit = self._resumed.get(frame.here())
         if visit is None:
-            return step.execute(userdata)
+            return self._left(frame, step, step.execute(userdata))
         state: Any = step.state
         options = get_options(state)
         if options.on_resume is not None:
@@ -365,15 +460,12 @@ class Recorder:
         # The option `resume` does not apply to a container, whose children are resumed. An action
         # looks for its goal first, and calls `decide` itself if the server does not know it.
         if isinstance(state, Container) or state._smachpy_kind == "action":
-            return step.execute(userdata)
+            return self._left(frame, step, step.execute(userdata))
         decided = self.decide(frame, userdata)
-        return step.execute(userdata) if decided is None else decided
+        return self._left(frame, step, step.execute(userdata) if decided is None else decided)
 
     def decide(self, frame: Frame, userdata: Any) -> Any:
-        """As `RunJournal.decide`.
-
-        Blocks: until the operator answers, for `resume="ask"`.
-        """
+        """Return the outcome that `resume` gives; for "ask" it blocks until an operator answers."""
         options = get_options(frame.step.state)
         policy = options.resume
         if policy is None:
@@ -424,32 +516,39 @@ class Recorder:
                 f"{where}: hook {name_of(hook)} raised {error_text(error)}", path=where
             ) from error
 
-    def leave(self, frame: Frame, step: Step, outcome: Any) -> None:
-        """As `RunJournal.leave`."""
+    def _left(self, frame: Frame, step: Step, outcome: Any) -> Any:
+        """Write that `step` has ended with `outcome`, and return that."""
         path = step.path_in(frame)
         self._resumed.pop(path, None)
         if frame.dead:  # left behind: the journal has recorded another end for this visit
             raise Interruption
         visit, state = frame.visit, step.state
-        overridden = visit is not None and visit.override is not None
+        override = None if visit is None else visit.override
+        answered = visit is not None and visit.has_answered(outcome)
+        overridden = override is not None and override.holds(answered=answered)
         if frame.path not in self._containers or not isinstance(outcome, str) or overridden:
-            return
+            return outcome
         facts: dict[str, Any] = {"outcome": outcome}
-        target = step.next.get(outcome)
-        asked = visit is not None or state._preempt_requested
+        step.decide(frame, outcome)
+        target = step.next[outcome].target if outcome in step.next else None
+        asked = state._preempt_requested or (visit is not None and visit.is_asked())
         asked = asked or frame.container._preempt_requested
         if target is None:
             if not asked:
-                return  # an unknown outcome: the machine raises an error right after this
+                return outcome  # an unknown one: the machine raises an error right after this
         # The next child begins in the same entry, so that no kill can come between. Not if the
         # child was asked to stop: the container may end instead.
         elif not (asked or target.final) and hasattr(frame.data, "transitions"):
             facts["next"] = f"{frame.path}/{target.label}"
             self._chosen.add(facts["next"])
+        kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
+        if answered and outcome != "preempted" and kind not in {"concurrence", "plan"}:
+            facts["served"] = True
         # Start callbacks get the userdata itself and may keep it: compare all keys, not only those
         # that this child writes.
         callbacks = frame.data.start_cbs
         self._write_with(frame, None if callbacks else step, "Left", path, facts)
+        return outcome
 
     # -- the position before the resume --------------------------------------------------------
 
@@ -458,27 +557,24 @@ class Recorder:
         # `tuple`: other branches take their visits out at the same time.
         return [each for each, visit in tuple(self._unresumed.items()) if visit["in"] == path]
 
-    def resumes(self, frame: Frame) -> bool:
-        """As `RunJournal.resumes`."""
-        return self._has_begun(frame.path)
-
     def resumed_label(self, frame: Frame) -> str | None:
-        """As `RunJournal.resumed_label`."""
         children = self._children(frame.path) if self._unresumed else []
         return children[0][len(frame.path) + 1 :] if children else None
 
+    def ending(self, frame: Frame) -> Sequence[Any] | None:
+        for child in self._children(frame.path) if self._unresumed else ():
+            found: Sequence[Any] | None = self._unresumed[child].get("ending")
+            if found is not None:
+                return found
+        return None
+
     def item(self, frame: Frame, number: int) -> int:
-        """As `RunJournal.item`."""
         children = self._children(frame.path) if self._unresumed else []
         self._numbers[frame.path] = number
         return number - self._unresumed[children[0]]["number"] if children else 1
 
     def check_items(self, frame: Frame, count: int) -> None:
-        """As `RunJournal.check_items`.
-
-        Raises:
-            MissionError: there are fewer.
-        """
+        """Raise a MissionError if there are fewer items than before the resume."""
         # An item that was reached has been entered again by now, and its visit is gone.
         for child in self._children(frame.path):
             number = self._unresumed[child]["number"]
@@ -487,11 +583,7 @@ class Recorder:
                 f"{number + 1}, as before it. Try items that are the same each time."
             )
 
-    def began_inside(self, frame: Frame) -> bool:
-        """As `RunJournal.began_inside`."""
-        return self._has_begun(frame.here())
-
-    def _has_begun(self, path: str) -> bool:
+    def has_begun(self, path: str) -> bool:
         return path in self._markings or (bool(self._unresumed) and bool(self._children(path)))
 
     # -- plans ---------------------------------------------------------------------------------
@@ -504,7 +596,6 @@ class Recorder:
         ends: Sequence[str],
         begins: Sequence[str],
     ) -> None:
-        """As `RunJournal.fired`."""
         path = frame.path
         if path not in self._containers:
             return
@@ -519,7 +610,6 @@ class Recorder:
         self._write_with(frame, None, "Fired", path, facts)
 
     def note_conditions(self, frame: Frame) -> None:
-        """As `RunJournal.note_conditions`."""
         facts = self._new_conditions(frame)
         if facts and frame.path in self._containers:
             self._write("Noted", frame.path, **facts)
@@ -530,11 +620,13 @@ class Recorder:
         for path, knowledge in self._knowledge.items():
             is_here = path == frame.path or path.startswith(f"{frame.path}/")
             if is_here and self._known_changes.get(path, 0) != knowledge.changes:
-                self._known_changes[path], found[path] = knowledge.kept(frame.run.clock)
+                self._known_changes[path], kept = knowledge.kept(frame.run.clock)
+                ahead_ns = self.time.ahead_ns()
+                events = [[name, at_ns + ahead_ns] for name, at_ns in kept["events"]]
+                found[path] = {**kept, "events": events}
         return {"conditions": found} if found else {}
 
     def resumed_plan(self, frame: Frame) -> tuple[list[str], dict[str, Any]] | None:
-        """As `RunJournal.resumed_plan`."""
         path = frame.path
         marking = self._markings.pop(path, None)
         if marking is None:
@@ -552,67 +644,134 @@ class Recorder:
                 if not visit.get("again"):
                     continue
                 visit = {**visit, "stopping": False}
-            children[label] = visit
+            begun_ns = visit.get("begun_ns", visit["since_ns"]) - self.time.ahead_ns()
+            children[label] = {**visit, "begun_ns": begun_ns}
         if not self._unresumed:
             self._note_all_back()
         return marking, children
 
     def attempt(self, frame: Frame) -> tuple[int, float]:
-        """As `RunJournal.attempt`."""
         visit = self._resumed.get(frame.here())
         if visit is None:
             return 1, 0.0
-        wait = visit["since_ns"] - frame.run.clock.time_ns()
+        wait = visit["since_ns"] - self.time.now_ns()
         return visit["attempt"], max(0.0, wait / 1e9)
 
     def time_left(self, frame: Frame, seconds: float) -> float:
-        """As `RunJournal.time_left`."""
         visit = self._resumed.get(frame.here())
         if visit is None:
             return seconds
-        return float(seconds - (frame.run.clock.time_ns() - visit["since_ns"]) / 1e9)
+        return float(seconds - (self.time.now_ns() - visit["since_ns"]) / 1e9)
 
     def goes_on(self, frame: Frame) -> bool:
-        """As `RunJournal.goes_on`."""
         visit = self._resumed.get(frame.here())
-        return visit is None or visit["goal"] is not None or self.began_inside(frame)
+        return visit is None or visit["goal"] is not None or self.has_begun(frame.here())
 
     def retried(self, frame: Frame, attempt: int, wait: float, reason: str) -> None:
-        """As `RunJournal.retried`."""
         path = frame.here()
         # The next attempt is a normal one: `resume`, the goal and the time left were for this one.
         self._resumed.pop(path, None)
+        self._forget_requests(path)
         if path in self._journal.position.visits:
-            at_ns = frame.run.clock.time_ns() + int(wait * 1e9)
+            at_ns = self.time.now_ns() + int(wait * 1e9)
             facts = {"attempt": attempt, "reason": reason, "at_ns": at_ns}
             is_inside = frame.path in self._containers
             self._write_with(frame if is_inside else None, None, "Retried", path, facts)
 
-    def asked(self, frame: Frame, origin: tuple[str, str, str]) -> bool:
-        """As `RunJournal.asked`."""
+    def asked(self, frame: Frame, origin: Origin) -> bool:
         path = frame.here() if frame.parent is None else frame.path
         source, by, why = origin
+        if source in OF_PROCESS and by in SUSPENDS:
+            self._suspend(by)
+            return True
         request = {"path": path, "source": source, "by": by, "why": why}
-        known = self._journal.position.data["preempts"]
         if source in _MADE_AGAIN or path not in self._containers:
             return False
-        if request not in known:
+        if not self._is_known(path, origin):
             self._write("PreemptRequested", **request)
         if not self._unresumed or self._gave_up_waiting:
             return False
         # Kept until all states that were active have been entered again, or `RESUME_S` is over.
         if request not in self._preempts:
             self._preempts.append(request)
-            assert self._run is not None
-            self._run.clock.call_later(RESUME_S, self._give_up_waiting)
+            self._wait_for_all()
         return True
 
+    def _wait_for_all(self) -> None:
+        assert self._top is not None
+        self._top.run.clock.call_later(RESUME_S, self._give_up_waiting)
+
+    def has_served(self, path: str) -> bool:
+        source, by, why = origin = current_origin()
+        if path not in self._containers or source == "plan":
+            return False
+        if self._is_asking or source in _MADE_AGAIN:
+            is_open = (source, by, why) in self._open.get(path, ())
+            if not is_open and (source, by, why) in self._served.get(path, ()):
+                return True
+        if not self._is_known(path, origin):
+            self._write("PreemptRequested", path, source=source, by=by, why=why, passed=True)
+        return False
+
+    def holds_back(self, path: str) -> bool:
+        source, by, why = current_origin()
+        if path not in self._containers or source == "plan":
+            return False
+        if not self._unresumed or self._gave_up_waiting or not self.has_begun(path):
+            return False
+        # A timeout that is over already, for one: its children are entered again before they stop.
+        self._held.append((self._containers[path], (source, by, why)))
+        self._wait_for_all()
+        return True
+
+    def passes(self, path: str) -> bool:
+        source, by, why = current_origin()
+        again = self._is_asking or source in _MADE_AGAIN
+        if again and (source, by, why) in self._recalled.get(path, ()):
+            return False
+        self._heard.setdefault(path, set()).add((source, by, why))
+        return True
+
+    def recalled(self, path: str) -> None:
+        if path in self._journal.position.visits:
+            origins = sorted(self._heard.pop(path, ()))
+            self._recalled.setdefault(path, set()).update(origins)
+            self._write("Recalled", path, origins=origins)
+
+    def halted(self, path: str) -> None:
+        if path in self._journal.position.visits:
+            self._write("Halted", path)
+
+    def went_on(self, path: str) -> None:
+        if path in self._journal.position.visits:
+            self._write("WentOn", path)
+
+    def _forget_requests(self, path: str) -> None:
+        """A visit, or an attempt, begins: a timeout of it is another one."""
+        self._heard.pop(path, None)
+        self._recalled.pop(path, None)
+        self._served.pop(path, None)
+        self._open.pop(path, None)
+
+    def _is_known(self, path: str, origin: tuple[str, str, str]) -> bool:
+        """Return whether the journal has a request to a container that it has not served yet."""
+        visit = self._journal.position.visits.get(path, {})
+        return list(origin) in visit.get("requests", ())
+
+    def _suspend(self, by: str) -> None:
+        """Let the process end without an end of the mission, because of the signal `by`."""
+        if self._is_suspended:
+            return
+        self._is_suspended = True  # before the lease is released, so that its loss is no error
+        self._journal.freeze()
+        if self.on_suspend is not None:
+            self.on_suspend(by, self._top)
+
     def asked_one(self, frame: Frame, step: Step, override: Override | None) -> None:
-        """As `RunJournal.asked_one`."""
         path = step.path_in(frame)
         if path in self._journal.position.visits:
             source, by, why = current_origin()
-            wanted = None if override is None else [override.outcome, override.label]
+            wanted = None if override is None else list(dataclasses.astuple(override))
             facts = {"source": source, "by": by, "why": why, "override": wanted}
             self._write("PreemptRequested", path, **facts)
 
@@ -625,32 +784,31 @@ class Recorder:
     # -- userdata ------------------------------------------------------------------------------
 
     def check_value(self, frame: Frame, path: str, key: str, value: Any) -> None:
-        """As `RunJournal.check_value`.
-
-        Raises:
-            NotDurableError: it cannot be kept.
-        """
+        """Raise a NotDurableError if the value cannot be kept."""
         # Here rather than at the end of the state, so that the traceback shows the assignment.
         home = self._homes.get(id(frame.container.userdata))
-        if type(value) not in ATOMS and home is not None and self._is_kept(home, key):
-            encode(value, key=key, path=path)
+        if type(value) in ATOMS and not (type(value) is str and is_secret_name(key)):
+            return
+        if home is not None and self._is_kept(home, key, value):
+            _encoded(value, key, path)
 
     # -- goals and side effects ----------------------------------------------------------------
 
     def goal_of(self, frame: Frame) -> dict[str, Any] | None:
-        """As `RunJournal.goal_of`."""
         visit = self._resumed.get(frame.here())
         goal = None if visit is None else visit["goal"]
-        if goal is None or goal["result"] is None:
-            return goal
-        return {**goal, "result": decode(goal["result"])}
+        if goal is None:
+            return None
+        result, ahead_ns = goal["result"], self.time.ahead_ns()
+        times = {at: goal[at] for at in ("taken_ns", "begun_ns") if at in goal}
+        return {
+            **goal,
+            **{at: None if ns is None else ns - ahead_ns for at, ns in times.items()},
+            "result": None if result is None else decode(self._journal.value(result)),
+        }
 
     def goal_sent(self, frame: Frame, action: str, goal_id: str) -> None:
-        """As `RunJournal.goal_sent`.
-
-        Raises:
-            StoreError, FencedError: it cannot be written, so the goal must not be sent.
-        """
+        """Write it, or raise the StoreError or FencedError: then the goal must not be sent."""
         if self._visit_of(frame) is None:
             return
         if frame.dead:  # a thread that was left behind must not start anything
@@ -659,21 +817,19 @@ class Recorder:
         if not written and self.broken is not None:
             raise self.broken
 
-    def goal_taken(self, frame: Frame, goal_id: str) -> None:
-        """As `RunJournal.goal_taken`."""
+    def goal_taken(self, frame: Frame, goal_id: str, *, begun: bool) -> None:
         if self._has_goal(frame, goal_id):
-            self._write("GoalTaken", frame.here(), goal_id=goal_id)
+            self._write("GoalTaken", frame.here(), goal_id=goal_id, begun=begun)
 
     def goal_done(
         self, frame: Frame, goal_id: str, status: str, text: str, result: Any, *, preempted: bool
     ) -> None:
-        """As `RunJournal.goal_done`."""
         if self._has_goal(frame, goal_id):
             kept = None if result is None else encode(result, key="result", path=frame.here())
             facts = {"goal_id": goal_id, "status": status, "text": text, "result": kept}
             if preempted:
                 facts["preempted"] = True
-            self._write("GoalDone", frame.here(), **facts)
+            self._write_with(None, None, "GoalDone", frame.here(), facts, "result")
 
     def _has_goal(self, frame: Frame, goal_id: str) -> bool:
         visit = self._visit_of(frame)
@@ -683,11 +839,7 @@ class Recorder:
         return self._journal.position.visits.get(frame.here())
 
     def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:
-        """As `RunJournal.once`.
-
-        Raises:
-            NotDurableError: the result of `call` cannot be kept; it was called.
-        """
+        """Call or remember it; raise a NotDurableError if the result of `call` cannot be kept."""
         path = frame.here()
         visits = self._journal.position.visits
         while path and path not in visits:  # a state runs this container by itself: use its visit
@@ -696,19 +848,44 @@ class Recorder:
             return call()
         kept = visits[path]["once"].get(key, _MISSING)
         if kept is not _MISSING:
-            return decode(kept)
+            return decode(self._journal.value(kept))
         value = call()
-        encoded = encode(value, key=key, path=path)
+        facts = {"key": key, "value": encode(value, key=key, path=path)}
         if frame.dead:
             raise Interruption
-        if not self._write("Once", path, key=key, value=encoded):
+        if not self._write_with(None, None, "Once", path, facts, "value"):
             assert self.broken is not None
             raise self.broken
         return value
 
 
-def _containers(state: Any, path: str) -> Iterator[tuple[str, Container]]:
-    if isinstance(state, Container):
-        yield path, state
-        for label, child in state.get_children().items():
-            yield from _containers(child, f"{path}/{label}")
+def _unserved(position: Position) -> list[dict[str, str]]:
+    """Return the requests to stop that containers have got, and have not served."""
+    old = [one for one in position.data["preempts"] if "on_visit" not in one]
+    kept = [
+        {"path": path, "source": source, "by": by, "why": why}
+        for path, visit in position.visits.items()
+        for source, by, why in visit.get("requests", ())
+    ]
+    # A concurrence asks its branches again once it has seen the same end again; a branch that is
+    # quicker must not begin another child before.
+    passing = OF_PROCESS | {"timeout", "plan"}
+    return [one for one in (*old, *kept) if one["source"] not in passing]
+
+
+def _shortened(text: str) -> str:
+    """Return a text that differs if `text` does, and is short."""
+    return text if len(text) <= _SHORT else digest_of(text.encode())
+
+
+def _encoded(value: Any, key: str, path: str) -> Any:
+    """Encode a value of userdata; one that its name calls a secret is refused in clear.
+
+    Raises:
+        NotDurableError: it cannot be kept.
+    """
+    if isinstance(value, str | bytes) and value and is_secret_name(key):
+        reason = "its name says that it is a secret"
+        way_out = f"smachpy.Secret(...) for {key!r}, which is not kept, another name"
+        raise NotDurableError(key, "", type(value), reason, way_out, path=path)
+    return encode(value, key=key, path=path)

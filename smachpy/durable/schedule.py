@@ -1,4 +1,4 @@
-"""Chooses a runner's next mission from a queue, and computes when schedules are due; no I/O."""
+"""Computes when schedules are due, and reads times that people write; no I/O."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from typing import TYPE_CHECKING, Final
 from zoneinfo import ZoneInfo
 
-from smachpy.durable.store import INTERRUPTED, QUEUED, RUNNING, MissionRow
 from smachpy.exceptions import MissionError
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from smachpy.durable.store import MissionRow
 
 _FIELDS: Final = 5  # of a cron expression; a time zone may follow them
 
 
 class ScheduleError(MissionError):
     """A time or a cron expression cannot be read.
+
+    Try: write what the text expects; cron expressions have five fields.
 
     Attributes:
         text: The text that was given.
@@ -28,71 +29,32 @@ class ScheduleError(MissionError):
         super().__init__(f"{option}: got {text!r}; expected {expected}.")
 
 
-def next_mission(
-    rows: Sequence[MissionRow], now: float, robots: Collection[str], leave: Collection[str] = ()
-) -> MissionRow | None:
-    """Return the mission that a runner should take next; None if there is none.
+def next_of(schedule: MissionRow, now: float) -> tuple[MissionRow, float]:
+    """Return the mission that a due schedule begins, and the schedule's next due time.
 
-    Interrupted missions come before queued ones, and of these the one that has been due longest
-    comes first. Missions for a robot that another mission is using have to wait.
+    A schedule that was due several times while no runner was alive begins one mission.
 
     Args:
-        rows: Missions of the store.
+        schedule: The schedule.
         now: Seconds since the Unix epoch.
-        robots: The robots that the runner serves; empty: all missions, with or without a robot.
-        leave: Ids of missions that it must not take.
+
+    Raises:
+        ScheduleError: its cron expression cannot be read here, or is never due.
+        ModuleNotFoundError: the package cronsim of the extra `cron` is missing.
     """
-    busy = {row.robot for row in rows if row.status == RUNNING and row.robot is not None}
-    free = [
-        row
-        for row in rows
-        if row.status in {QUEUED, INTERRUPTED}
-        and row.every is None
-        and row.id not in leave
-        and (not robots or row.robot in robots)
-        and row.robot not in busy
-        and _due(row) <= now
-    ]
-    return min(free, key=lambda row: (row.status == QUEUED, _due(row), row.id), default=None)
-
-
-def next_time(rows: Sequence[MissionRow], now: float) -> float | None:
-    """Return when the next mission or schedule is due [s since the Unix epoch]; None for never."""
-    later = [_due(row) for row in rows if row.status == QUEUED and _due(row) > now]
-    return min(later, default=None)
-
-
-def due_schedules(
-    rows: Sequence[MissionRow], now: float
-) -> list[tuple[MissionRow, MissionRow, float]]:
-    """Return for each schedule that is due: its row, the new mission, and the next due time.
-
-    A schedule that was due several times while no runner was alive adds one mission.
-
-    Args:
-        rows: Missions of the store.
-        now: Seconds since the Unix epoch.
-    """
-    found = []
-    for row in rows:
-        if (
-            row.every is not None
-            and row.status == QUEUED
-            and row.due is not None
-            and row.due <= now
-        ):
-            # The id has the due time: if two runners see it, both choose the same id.
-            stamp = datetime.fromtimestamp(row.due, UTC).strftime("%Y%m%dT%H%M%SZ")
-            begun = dataclasses.replace(
-                row,
-                id=f"{row.id}-{stamp}",
-                every=None,
-                schedule=row.id,
-                created=now,
-                changed=now,
-            )
-            found.append((row, begun, next_due(row.every, now)))
-    return found
+    assert schedule.every is not None
+    assert schedule.due is not None
+    # The id has the due time: if two runners see it, both choose the same id.
+    stamp = datetime.fromtimestamp(schedule.due, UTC).strftime("%Y%m%dT%H%M%SZ")
+    begun = dataclasses.replace(
+        schedule,
+        id=f"{schedule.id}-{stamp}",
+        every=None,
+        schedule=schedule.id,
+        created=now,
+        changed=now,
+    )
+    return begun, next_due(schedule.every, now)
 
 
 def next_due(every: str, now: float) -> float:
@@ -122,7 +84,7 @@ def next_due(every: str, now: float) -> float:
     return due.timestamp()
 
 
-def read_time(text: str, now: float) -> float:
+def read_time(text: str, now: float, option: str = "--at") -> float:
     """Return the time of "08:30", "2026-03-28 08:30" or ISO 8601 [s since the Unix epoch].
 
     A time without an offset is in this computer's zone; a time without a date is its next
@@ -131,9 +93,10 @@ def read_time(text: str, now: float) -> float:
     Args:
         text: The text that a person wrote.
         now: Seconds since the Unix epoch.
+        option: The option that it was given to.
 
     Raises:
-        ScheduleError: it cannot be read.
+        ScheduleError: it cannot be read, is in the past, or does not exist in this computer's zone.
     """
     today = datetime.fromtimestamp(now, UTC).astimezone().date()
     for form in ("%H:%M", "%H:%M:%S"):
@@ -141,20 +104,29 @@ def read_time(text: str, now: float) -> float:
             clock = datetime.strptime(text, form).time()  # noqa: DTZ007  in this computer's zone
         except ValueError:
             continue
-        due = datetime.combine(today, clock).timestamp()
+        due = _timestamp(option, text, datetime.combine(today, clock))
         if due < now:
             # Not plus 24 hours: a day on which summer time begins or ends is shorter or longer.
-            due = datetime.combine(today + timedelta(days=1), clock).timestamp()
+            tomorrow = datetime.combine(today + timedelta(days=1), clock)
+            due = _timestamp(option, text, tomorrow)
         return due
     try:
-        return datetime.fromisoformat(text).astimezone().timestamp()
+        due = _timestamp(option, text, datetime.fromisoformat(text))
     except (ValueError, OverflowError, OSError):
         expected = "a time such as 08:30, 2026-03-28T08:30 or 2026-03-28T08:30+01:00"
-        raise ScheduleError("--at", text, expected) from None
+        raise ScheduleError(option, text, expected) from None
+    if due < now:
+        raise ScheduleError(option, text, "a time in the future")
+    return due
 
 
-def _due(row: MissionRow) -> float:
-    return row.created if row.due is None else row.due
+def _timestamp(option: str, text: str, at: datetime) -> float:
+    """Return a time [s since the Unix epoch]; one without an offset is in this computer's zone."""
+    seconds = at.astimezone().timestamp()
+    if at.tzinfo is None and datetime.fromtimestamp(seconds) != at:  # noqa: DTZ006
+        expected = "a time that exists: the clocks of this zone are put forward over it"
+        raise ScheduleError(option, text, expected)
+    return seconds
 
 
 def _zone(every: str, name: str) -> tzinfo:

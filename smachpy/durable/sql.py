@@ -3,21 +3,30 @@
 
 Databases differ in how they are opened, in how transactions begin, and in their errors; a subclass
 has `_transact`, `_now`, `_verify` and `close` for these, and a `Dialect`.
+
+Each step of the queue is one statement, or is repeated safely: a process may be killed, and in
+PostgreSQL suspended, between any two.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import os
 import zlib
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType, NoneType
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
+from actionlib_core.clock.forks import is_copy
+from actionlib_core.names import clean_namespace
+from smachpy.durable.position import VERSION as FORMAT
 from smachpy.durable.processes import process_lives, process_mark, this_runner
 from smachpy.durable.store import (
-    CANCELLED,
     INTERRUPTED,
     OVER,
+    PAGE,
     QUEUED,
     RUNNING,
     FencedError,
@@ -25,26 +34,44 @@ from smachpy.durable.store import (
     MissionInUseError,
     MissionOverError,
     MissionRow,
+    QueueNews,
     StoreError,
     UnknownMissionError,
     check_lease_seconds,
+    digest_of,
     host_and_pid,
     may_take,
 )
 from smachpy.exceptions import MissionError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 T = TypeVar("T")
 
-VERSION: Final = 1
-"""Version of the tables; a store with a higher one was written by a newer smachpy."""
+VERSION: Final = 2
+"""Version of the tables; a store with a higher one was written by a newer smachpy.
+
+Version 2 only adds columns, tables and indexes, and each new column has a default: a process of
+version 1 that has the store open goes on, and one that opens it is refused.
+"""
 
 _COLUMNS: Final = (
     "id, name, target, argv, status, outcome, robot, created, changed, owner, structure, version, "
-    "due, every, schedule, cancel"
+    "due, every, schedule, cancel, priority, not_after, grp, drives, note"
 )
+_FIELDS: Final = _COLUMNS.replace("grp", "group").split(", ")
+_HELD: Final = "owner, mark, lease_end, lease_clock"
+"""The columns from which `_may_take` decides."""
+
+_ROBOT: Final = "COALESCE({0}drives, {0}robot)"
+"""The robot that a mission holds, as an expression; `drives` is null in rows of version 1."""
+
+MAX_LEFT_ROWS: Final = 500
+"""The most missions, and targets, that `reserve` passes over: they are bound to a statement."""
+
+PRUNED_AT_ONCE: Final = 500
+"""Missions that `prune` deletes in one transaction: others write in between."""
 
 
 @dataclass(frozen=True)
@@ -53,22 +80,25 @@ class Dialect:
 
     Attributes:
         placeholder: Stands for a value in a statement.
-        blob, real: Types of columns.
+        blob, real, big: Types of columns.
         for_update, for_share: Ends of a SELECT that lock its rows.
+        skip_locked: End of a SELECT that locks its row, and passes over rows that others lock.
         clustered: End of a CREATE TABLE that stores rows in the order of their primary key.
-        one_claimer: A statement after which only this transaction can claim missions, or "".
+        notify: A statement that wakes runners when its transaction is committed, or "".
     """
 
     placeholder: str
     blob: str
     real: str
+    big: str
     for_update: str = ""
     for_share: str = ""
+    skip_locked: str = ""
     clustered: str = ""
-    one_claimer: str = ""
+    notify: str = ""
 
     def tables(self) -> tuple[str, ...]:
-        """Return the statements that create the tables."""
+        """Return the statements that create the tables of version 1."""
         missions = (
             "id TEXT PRIMARY KEY, name TEXT NOT NULL, target TEXT NOT NULL, argv TEXT NOT NULL, "
             f"status TEXT NOT NULL, outcome TEXT, robot TEXT, created {self.real} NOT NULL, "
@@ -89,6 +119,70 @@ class Dialect:
             f"CREATE TABLE smachpy_entries ({entries}){self.clustered}",
             f"CREATE TABLE smachpy_snapshots ({snapshots})",
         )
+
+    def columns(self) -> dict[str, str]:
+        """Return the columns that version 2 adds to the missions: name -> type and default."""
+        return {
+            "priority": "INTEGER NOT NULL DEFAULT 0",
+            "not_after": self.real,
+            "grp": "TEXT",
+            "drives": "TEXT",
+            "note": "TEXT NOT NULL DEFAULT ''",
+            # 1: it is due later, or is a schedule. `look` sets 0 when it is due, so that no claim
+            # depends on a clock.
+            "waits": "INTEGER NOT NULL DEFAULT 0",
+            # Since when it waits, by the store's clock: missions of one priority begin in this
+            # order.
+            "ready": f"{self.real} NOT NULL DEFAULT 0",
+            # The end of the lease, and the time of `changed`, on a clock that nobody sets; see
+            # `SqlStore._steady`.
+            "lease_clock": "TEXT",
+            "beat_clock": "TEXT",
+            "beat_ns": self.big,
+        }
+
+    def additions(self) -> tuple[str, ...]:
+        """Return the statements of version 2 that follow its columns; they may be repeated."""
+        blobs = (
+            f"mission TEXT NOT NULL, digest TEXT NOT NULL, data {self.blob} NOT NULL, "
+            "PRIMARY KEY (mission, digest)"
+        )
+        table = f"CREATE TABLE IF NOT EXISTS smachpy_blobs ({blobs}){self.clustered}"
+        indexes = (
+            f"CREATE {kind} IF NOT EXISTS smachpy_{name} ON smachpy_missions {columns}{where}"
+            for name, kind, columns, where in _INDEXES
+        )
+        return (table, *(f"UPDATE smachpy_missions {change}" for change in _CHANGES), *indexes)
+
+
+_OPEN: Final = "status <> 'ended' AND status <> 'cancelled'"
+_CHANGES: Final = (
+    "SET drives = TRIM(robot, '/') WHERE robot IS NOT NULL AND drives IS NULL",
+    "SET waits = 1 WHERE due IS NOT NULL AND status = 'queued'",
+    "SET ready = COALESCE(due, created) WHERE ready = 0",
+    # A process that was killed after the end of its mission still holds its robot.
+    f"SET owner = NULL, mark = NULL WHERE NOT ({_OPEN})",
+)
+"""What rows of version 1 need; each may be repeated."""
+
+_INDEXES: Final = (
+    ("free", "INDEX", "(status, priority DESC, ready, id)", " WHERE waits = 0 AND owner IS NULL"),
+    ("due", "INDEX", "(status, due)", " WHERE waits = 1"),
+    ("late", "INDEX", "(status, not_after)", " WHERE not_after IS NOT NULL"),
+    ("held", "INDEX", "(owner)", " WHERE owner IS NOT NULL"),
+    ("robots", "UNIQUE INDEX", f"(({_ROBOT.format('')}))", " WHERE owner IS NOT NULL"),
+    ("groups", "UNIQUE INDEX", "(grp)", " WHERE owner IS NOT NULL AND grp IS NOT NULL"),
+    ("open", "INDEX", "(created, id)", f" WHERE {_OPEN}"),
+    ("targets", "INDEX", "(target)", f" WHERE {_OPEN}"),
+    ("newest", "INDEX", "(created, id)", ""),
+    ("changed", "INDEX", "(status, changed)", ""),
+)
+"""Name, kind, columns and condition; the two unique ones are what keeps a robot from two missions.
+"""
+
+TABLES: Final = frozenset(
+    {"smachpy_missions", "smachpy_entries", "smachpy_snapshots", "smachpy_blobs"}
+)
 
 
 class Cursor(Protocol):
@@ -124,6 +218,21 @@ class SqlStore(ABC):
         # Number of the last entry that each lease has written. After a failover the server may have
         # fewer: the standby took over without the newest transactions.
         self._written: dict[Lease, int] = {}
+        self._verified = False
+        self._pid = os.getpid()
+
+    def _check_process(self) -> None:
+        """Refuse to use the connection of another process.
+
+        Raises:
+            StoreError: this process was forked from the one that has opened the store.
+        """
+        if is_copy(self._pid):
+            problem = (
+                "this process was forked from the one that has opened it, and must not use its "
+                "connection. Try opening another store here."
+            )
+            raise StoreError(self.where, problem, reason="failed")
 
     @abstractmethod
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:
@@ -141,61 +250,308 @@ class SqlStore(ABC):
     def _now(self, cursor: Cursor) -> float:
         """Return the time [s since the Unix epoch] of the one clock that all runners go by."""
 
-    def create(self, row: MissionRow) -> None:
-        """As `Store.create`."""
+    @abstractmethod
+    def _now_text(self) -> str:
+        """Return that time as an expression of SQL."""
 
-        def work(cursor: Cursor, again: bool) -> None:
+    def _steady(self, seconds: float = 0.0) -> str | None:
+        """Return the time in `seconds` [s] on a clock that is never set; None: there is none."""
+        del seconds
+        return None
+
+    def _since(self, then: float, steady: str | None, now: float) -> float:
+        """Return the time since a moment [s].
+
+        Args:
+            then: When it was [s since the Unix epoch].
+            steady: The same as text of `_steady`, or None.
+            now: The present time [s since the Unix epoch].
+        """
+        del steady
+        return now - then
+
+    # -- missions ------------------------------------------------------------------------------
+
+    def create(self, row: MissionRow) -> MissionRow:
+        first_try: list[float] = []
+
+        def work(cursor: Cursor, again: bool) -> float:
             found = self._one(cursor, "SELECT created FROM smachpy_missions WHERE id = ?", row.id)
             if found is not None:
-                if again and found[0] == row.created:  # by the first try, whose answer was lost
-                    return
+                if again and found[0] in first_try:  # made by it, but its answer was lost
+                    return float(found[0])
                 raise MissionError(
-                    f"{self.where}: mission {row.id!r}: got an id that is taken; "
-                    f"expected a new one. Try 'smachpy missions forget {row.id}', if it is over."
+                    f"{self.where}: mission {row.id!r}: got an id that is taken; expected a new "
+                    "one. Try another id, or 'smachpy missions list'."
                 )
-            self._insert(cursor, row)
+            now = self._now(cursor)
+            first_try.append(now)
+            self._insert(cursor, row, now)
+            return now
 
-        self._transact(work)
+        now = self._transact(work)
+        return self._stamped(row, now)
 
-    def missions(self, *, open_only: bool = False) -> list[MissionRow]:
-        """As `Store.missions`."""
-        which = f" WHERE status NOT IN {OVER}" if open_only else ""
+    def missions(
+        self,
+        *,
+        open_only: bool = False,
+        statuses: Collection[str] = (),
+        robot: str | None = None,
+        target: str | None = None,
+        limit: int | None = PAGE,
+        skip: int = 0,
+    ) -> list[MissionRow]:
+        conditions: list[str] = []
+        values: list[object] = []
+        if open_only:
+            conditions.append(_OPEN)
+        if statuses:
+            # The row of an interrupted mission may still say that its process runs it.
+            wanted = {*statuses, *({RUNNING} if INTERRUPTED in statuses else ())}
+            conditions.append(f"status IN ({_places(wanted)})")
+            values += sorted(wanted)
+        if robot is not None:
+            conditions.append(f"{_ROBOT.format('')} = ?")
+            values.append(robot_identity(robot))
+        if target is not None:
+            conditions.append("target = ?")
+            values.append(target)
+        where = f" WHERE {' AND '.join(conditions)}" if conditions else ""
+        page = "" if limit is None else f" LIMIT {int(limit)} OFFSET {int(skip)}"
 
         def work(cursor: Cursor, _: bool) -> list[MissionRow]:
             self._do(
                 cursor,
-                f"SELECT {_COLUMNS}, mark, lease_end FROM smachpy_missions{which} "
-                "ORDER BY created, id",
+                f"SELECT {_COLUMNS}, {_HELD} FROM smachpy_missions{where} "
+                f"ORDER BY created DESC, id DESC{page}",
+                *values,
             )
             rows = cursor.fetchall()
             now = self._now(cursor)
             return [self._row(row, now) for row in rows]
 
-        return self._transact(work, reads=True)
+        rows = self._transact(work, reads=True)
+        if limit is None:
+            rows = rows[skip:]
+        return [row for row in reversed(rows) if not statuses or row.status in statuses]
+
+    def find(self, id: str) -> MissionRow | None:  # noqa: A002
+
+        def work(cursor: Cursor, _: bool) -> MissionRow | None:
+            sql = f"SELECT {_COLUMNS}, {_HELD} FROM smachpy_missions WHERE id = ?"
+            row = self._one(cursor, sql, id)
+            return None if row is None else self._row(row, self._now(cursor))
+
+        row = self._transact(work, reads=True)
+        if row is not None and row.problem:
+            raise self._damaged(id, "its row has values of wrong types")
+        return row
 
     def mission(self, id: str) -> MissionRow:  # noqa: A002
-        """As `Store.mission`."""
+        row = self.find(id)
+        if row is None:
+            raise self._transact(lambda cursor, _: self._unknown(cursor, id), reads=True)
+        return row
 
-        def work(cursor: Cursor, _: bool) -> MissionRow:
-            row = self._known(cursor, id, f"{_COLUMNS}, mark, lease_end")
-            return self._row(row, self._now(cursor))
+    def holders(self) -> list[MissionRow]:
+
+        def work(cursor: Cursor, _: bool) -> list[MissionRow]:
+            columns = f"{_COLUMNS}, {_HELD}"
+            self._do(cursor, f"SELECT {columns} FROM smachpy_missions WHERE owner IS NOT NULL")
+            rows, now = cursor.fetchall(), self._now(cursor)
+            held = len(_COLUMNS.split(", "))
+            return [self._row(row, now) for row in rows if not self._may_take(row[held:], now)]
 
         return self._transact(work, reads=True)
 
-    def claim(self, id: str, runner: str, *, seconds: float) -> Lease:  # noqa: A002
-        """As `Store.claim`."""
+    def size(self) -> tuple[int, int]:
+
+        def work(cursor: Cursor, _: bool) -> tuple[int, int]:
+            count = self._one(cursor, "SELECT COUNT(*) FROM smachpy_missions")[0]
+            return int(count), self._bytes(cursor)
+
+        return self._transact(work, reads=True)
+
+    @abstractmethod
+    def _bytes(self, cursor: Cursor) -> int:
+        """Return the size of the store [bytes]."""
+
+    # -- the queue -----------------------------------------------------------------------------
+
+    def look(self, *, robots: Collection[str] = ()) -> QueueNews:
+        names = [robot_identity(robot) for robot in robots]
+        own = f" AND {_ROBOT.format('')} IN ({_places(names)})" if names else ""
+
+        def read(cursor: Cursor, _: bool) -> tuple[Any, ...]:
+            now = self._now(cursor)
+            self._do(
+                cursor,
+                f"SELECT id, fence, {_HELD} FROM smachpy_missions WHERE owner IS NOT NULL",
+            )
+            dead = [row[:2] for row in cursor.fetchall() if self._may_take(row[2:], now)]
+            waiting = "FROM smachpy_missions WHERE status = 'queued' AND waits = 1"
+            due = self._one(cursor, f"SELECT MIN(due) {waiting} AND every IS NULL")[0]
+            mine = due
+            if own and due is not None:
+                sql = f"SELECT MIN(due) {waiting} AND every IS NULL{own}"
+                mine = self._one(cursor, sql, *names)[0]
+            often = self._one(cursor, f"SELECT MIN(due) {waiting} AND every IS NOT NULL")[0]
+            late = self._one(
+                cursor,
+                "SELECT MIN(not_after) FROM smachpy_missions "
+                "WHERE status = 'queued' AND not_after IS NOT NULL",
+            )[0]
+            free = f"FROM smachpy_missions WHERE waits = 0 AND owner IS NULL{own} AND status ="
+            is_free = any(
+                self._one(cursor, f"SELECT 1 {free} '{status}' LIMIT 1", *names)
+                for status in (INTERRUPTED, QUEUED)
+            )
+            schedules: list[MissionRow] = []
+            if often is not None and often <= now:
+                self._do(
+                    cursor,
+                    f"SELECT {_COLUMNS}, {_HELD} {waiting} AND every IS NOT NULL AND due <= ? "
+                    f"ORDER BY due LIMIT {PAGE}",
+                    now,
+                )
+                schedules = [self._row(row, now) for row in cursor.fetchall()]
+            return now, dead, due, mine, often, late, is_free, schedules
+
+        now, dead, due, mine, often, late, is_free, schedules = self._transact(read, reads=True)
+        cancelled: list[str] = []
+        is_late = late is not None and late <= now
+        if dead or is_late or (due is not None and due <= now):
+            cancelled = self._transact(lambda cursor, _: self._tidy(cursor, dead))
+            is_free = True
+        return QueueNews(
+            schedules=tuple(row for row in schedules if not row.problem),
+            cancelled=tuple(cancelled),
+            next_due=None if mine is None or mine <= now else mine - now,
+            next_schedule=None if often is None else max(0.0, often - now),
+            free=is_free,
+            now=now,
+        )
+
+    def _tidy(self, cursor: Cursor, dead: Iterable[tuple[str, int]]) -> list[str]:
+        """Free what dead processes held, let begin what is due, and cancel what is late.
+
+        Returns:
+            The ids of those that are late.
+        """
+        now = self._now(cursor)
+        for id_, fence in dead:
+            columns = f"fence, {_HELD}{self.dialect.for_update}"
+            row = self._one_mission(cursor, id_, columns)
+            # Looked at again: it may have been claimed, or its lease renewed, meanwhile.
+            if row is not None and row[0] == fence and self._may_take(row[1:], now):
+                self._free(cursor, id_)
+        self._do(
+            cursor,
+            "UPDATE smachpy_missions SET waits = 0 "
+            "WHERE status = 'queued' AND waits = 1 AND every IS NULL AND due <= ?",
+            now,
+        )
+        late = "WHERE status = 'queued' AND owner IS NULL AND not_after <= ?"
+        self._do(cursor, f"SELECT id FROM smachpy_missions {late}", now)
+        cancelled = [row[0] for row in cursor.fetchall()]
+        if cancelled:
+            self._do(
+                cursor,
+                "UPDATE smachpy_missions SET status = 'cancelled', changed = ?, "
+                f"note = 'it was not begun in time' {late}",
+                *(now, now),
+            )
+        self._wake(cursor)
+        return cancelled
+
+    def _free(self, cursor: Cursor, id_: str) -> None:
+        """Take a mission, its robot and its group from its process."""
+        # A higher fence: if that process was only suspended, its next write is refused.
+        self._do(
+            cursor,
+            "UPDATE smachpy_missions SET owner = NULL, mark = NULL, lease_end = NULL, "
+            "fence = fence + 1, "
+            "status = CASE WHEN status = 'running' THEN 'interrupted' ELSE status END "
+            "WHERE id = ?",
+            id_,
+        )
+
+    def reserve(
+        self,
+        runner: str,
+        *,
+        seconds: float,
+        robots: Collection[str] = (),
+        leave: Collection[str] = (),
+        leave_targets: Collection[str] = (),
+    ) -> tuple[MissionRow, Lease] | None:
+        check_lease_seconds(seconds)
+        host_and_pid(runner)
+        leave, leave_targets = list(leave)[-MAX_LEFT_ROWS:], list(leave_targets)[-MAX_LEFT_ROWS:]
+        conditions = ""
+        values: list[object] = []
+        for column, word, given in (
+            (_ROBOT.format("m."), "IN", [robot_identity(robot) for robot in robots]),
+            ("m.id", "NOT IN", leave),
+            ("m.target", "NOT IN", leave_targets),
+        ):
+            if given:
+                conditions += f"AND {column} {word} ({_places(given)}) "
+                values += given
+        # Evaluated once, unlike `NOT EXISTS`: a long queue may wait for one robot.
+        held = (
+            "NOT IN (SELECT {0} FROM smachpy_missions WHERE owner IS NOT NULL AND {0} IS NOT NULL)"
+        )
+        robot, robots_held = _ROBOT.format("m."), held.format(_ROBOT.format(""))
+
+        # If the answer is lost, nobody uses the reservation; `look` frees it when it has expired.
+        def work(cursor: Cursor, _: bool) -> tuple[MissionRow, Lease] | None:
+            now = self._now_text()
+            for status in (INTERRUPTED, QUEUED):
+                late = f"AND (m.not_after IS NULL OR m.not_after > {now}) "
+                self._do(
+                    cursor,
+                    "UPDATE smachpy_missions SET owner = ?, mark = ?, fence = fence + 1, "
+                    f"lease_end = {now} + ?, lease_clock = ? "
+                    "WHERE id = (SELECT m.id FROM smachpy_missions AS m "
+                    f"WHERE m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL "
+                    f"{late if status == QUEUED else ''}{conditions}"
+                    f"AND ({robot} IS NULL OR {robot} {robots_held}) "
+                    f"AND (m.grp IS NULL OR m.grp {held.format('grp')}) "
+                    f"ORDER BY m.priority DESC, m.ready, m.id LIMIT 1{self.dialect.skip_locked}) "
+                    f"RETURNING {_COLUMNS}, {_HELD}, fence",
+                    *(runner, self._mark, seconds, self._steady(seconds), *values),
+                )
+                row = cursor.fetchone()
+                if row is not None:
+                    return self._row(row[:-1], 0.0), Lease(row[0], row[-1], runner)
+            return None
+
+        return self._transact(work)
+
+    # -- the missions of this process ----------------------------------------------------------
+
+    def claim(
+        self,
+        id: str,  # noqa: A002
+        runner: str,
+        *,
+        seconds: float,
+        reserved: Lease | None = None,
+    ) -> Lease:
         check_lease_seconds(seconds)
         host_and_pid(runner)
 
         def work(cursor: Cursor, again: bool) -> Lease:
-            if self.dialect.one_claimer:
-                self._do(cursor, self.dialect.one_claimer)
             row = self._known(
                 cursor,
                 id,
-                "status, robot, owner, mark, lease_end, fence, every" + self.dialect.for_update,
+                f"status, {_ROBOT.format('')}, grp, every, fence, changed, beat_clock, beat_ns, "
+                f"{_HELD}{self.dialect.for_update}",
             )
-            status, robot, owner, mark, lease_end, fence, every = row
+            status, robot, group, every, fence, changed, beat_clock, beat_ns, *held = row
+            owner, mark = held[:2]
             now = self._now(cursor)
             if status in OVER:
                 raise MissionOverError(self.where, id, status)
@@ -204,22 +560,29 @@ class SqlStore(ABC):
                     f"{self.where}: mission {id!r}: got a schedule, {every!r}; expected one of the "
                     "missions that it begins. Try: smachpy missions list"
                 )
-            if not (again and owner == runner and mark == self._mark):  # not by the first try
-                self._refuse_held(id, owner, mark, lease_end, now)
-            if robot is not None:
-                self._take_robot(cursor, id, robot, now)
+            mine = (owner, mark) == (runner, self._mark)
+            if again and mine and status == RUNNING:  # by the first try, whose answer was lost
+                pass
+            elif reserved is not None:
+                if (owner, fence) != (reserved.runner, reserved.fence) or status == RUNNING:
+                    raise FencedError(self.where, reserved, owner)
+            elif not (mine and status != RUNNING):  # this process may have reserved it itself
+                self._refuse_held(id, held, now)
+            self._take_shared(cursor, id, robot, group, now)
             self._do(
                 cursor,
-                "UPDATE smachpy_missions SET status = ?, owner = ?, mark = ?, lease_end = ?, "
-                "fence = ? WHERE id = ?",
-                *(RUNNING, runner, self._mark, now + seconds, fence + 1, id),
+                "UPDATE smachpy_missions SET status = 'running', owner = ?, mark = ?, "
+                "lease_end = ?, lease_clock = ?, fence = ?, note = '', "
+                "version = CASE WHEN version < ? THEN ? ELSE version END WHERE id = ?",
+                *(runner, self._mark, now + seconds, self._steady(seconds), fence + 1),
+                *(FORMAT, FORMAT, id),
             )
-            return Lease(id, fence + 1, runner)
+            silent = max(0.0, self._since(changed, beat_clock, now))
+            return Lease(id, fence + 1, runner, beat_ns, silent)
 
         return self._transact(work)
 
-    def renew(self, lease: Lease, *, seconds: float) -> bool:
-        """As `Store.renew`."""
+    def renew(self, lease: Lease, *, seconds: float, beat_ns: int | None = None) -> bool:
         check_lease_seconds(seconds)
 
         def work(cursor: Cursor, _: bool) -> bool:
@@ -227,9 +590,11 @@ class SqlStore(ABC):
             now = self._now(cursor)
             self._do(
                 cursor,
-                "UPDATE smachpy_missions SET lease_end = ?, changed = ? WHERE id = ?",
-                *(now + seconds, now, lease.mission),
+                "UPDATE smachpy_missions SET lease_end = ?, lease_clock = ? WHERE id = ?",
+                *(now + seconds, self._steady(seconds), lease.mission),
             )
+            if beat_ns is not None:
+                self._note_beat(cursor, lease.mission, beat_ns, now)
             return cancel
 
         return self._transact(work)
@@ -242,8 +607,10 @@ class SqlStore(ABC):
         snapshot: bytes | None = None,
         status: str | None = None,
         outcome: str | None = None,
+        blobs: Mapping[str, bytes] = MappingProxyType({}),
+        kept: Collection[str] = (),
+        beat_ns: int | None = None,
     ) -> None:
-        """As `Store.append`."""
         mission = lease.mission
 
         def work(cursor: Cursor, again: bool) -> int:
@@ -254,6 +621,13 @@ class SqlStore(ABC):
                     return last  # the first try was committed; only its answer was lost
                 if last < before:
                     raise self._damaged(mission, f"the server has {last} entries of {before}")
+            if blobs:
+                self._do_many(
+                    cursor,
+                    "INSERT INTO smachpy_blobs (mission, digest, data) VALUES (?, ?, ?) "
+                    "ON CONFLICT (mission, digest) DO NOTHING",
+                    ((mission, digest, data) for digest, data in blobs.items()),
+                )
             # Numbers without gaps, and a checksum each: `read` notices lost and damaged entries.
             if entries:
                 rows = (
@@ -268,7 +642,9 @@ class SqlStore(ABC):
                 )
                 last += len(entries)
             if snapshot is not None:
-                self._compact(cursor, mission, last, snapshot)
+                self._compact(cursor, mission, last, snapshot, kept)
+            if beat_ns is not None:
+                self._note_beat(cursor, mission, beat_ns, self._now(cursor))
             if status is not None or outcome is not None:
                 self._do(
                     cursor,
@@ -280,11 +656,16 @@ class SqlStore(ABC):
 
         self._written[lease] = self._transact(work)
 
+    def _note_beat(self, cursor: Cursor, mission: str, beat_ns: int, now: float) -> None:
+        self._do(
+            cursor,
+            "UPDATE smachpy_missions SET changed = ?, beat_clock = ?, beat_ns = ? WHERE id = ?",
+            *(now, self._steady(), beat_ns, mission),
+        )
+
     def read(self, id: str) -> tuple[bytes | None, list[bytes]]:  # noqa: A002
-        """As `Store.read`."""
 
         def work(cursor: Cursor, _: bool) -> tuple[Any, list[Any]]:
-            self._verify(cursor)
             # In PostgreSQL each statement sees what is committed by then; the locked row keeps a
             # runner from compacting between the two below.
             self._known(cursor, id, "id" + self.dialect.for_share)
@@ -298,19 +679,33 @@ class SqlStore(ABC):
             )
             return snapshot, cursor.fetchall()
 
+        if not self._verified:
+            self._transact(lambda cursor, _: self._verify(cursor), reads=True)
+            self._verified = True
         snapshot, rows = self._transact(work, reads=True)
-        expected = 0 if snapshot is None else snapshot[0]
-        for n, crc, data in rows:
+        kinds = (int, int, bytes)
+        expected = 0
+        if snapshot is not None:
+            if not _are(snapshot, kinds) or zlib.crc32(snapshot[2]) != snapshot[1]:
+                raise self._damaged(id, "its snapshot is damaged")
+            expected = snapshot[0]
+        for row in rows:
             expected += 1
-            if n != expected or zlib.crc32(data) != crc:
-                what = "is missing" if n != expected else "is damaged"
+            whole = _are(row, kinds)
+            if not whole or row[0] != expected or zlib.crc32(row[2]) != row[1]:
+                what = "is missing" if whole and row[0] != expected else "is damaged"
                 raise self._damaged(id, f"entry {expected} {what}")
-        if snapshot is not None and zlib.crc32(snapshot[2]) != snapshot[1]:
-            raise self._damaged(id, "its snapshot is damaged")
         return None if snapshot is None else snapshot[2], [row[2] for row in rows]
 
-    def release(self, lease: Lease, status: str) -> None:
-        """As `Store.release`."""
+    def blob(self, id: str, digest: str) -> bytes:  # noqa: A002
+        sql = "SELECT data FROM smachpy_blobs WHERE mission = ? AND digest = ?"
+        row = self._transact(lambda cursor, _: self._one(cursor, sql, id, digest), reads=True)
+        if row is None or not _are(row, (bytes,)) or digest_of(row[0]) != digest:
+            what = "is missing" if row is None else "is damaged"
+            raise self._damaged(id, f"the value {digest:.12} {what}")
+        return bytes(row[0])
+
+    def release(self, lease: Lease, status: str | None, *, note: str = "") -> None:
 
         def work(cursor: Cursor, again: bool) -> None:
             try:
@@ -321,37 +716,77 @@ class SqlStore(ABC):
                 raise
             self._do(
                 cursor,
-                "UPDATE smachpy_missions SET status = ?, owner = NULL, mark = NULL, "
-                "lease_end = NULL WHERE id = ?",
-                *(status, lease.mission),
+                "UPDATE smachpy_missions SET status = COALESCE(?, status), owner = NULL, "
+                "mark = NULL, lease_end = NULL, note = ? WHERE id = ?",
+                *(status, note, lease.mission),
             )
+            self._wake(cursor)
 
         self._transact(work)
         self._written.pop(lease, None)
 
+    # -- at the end ----------------------------------------------------------------------------
+
     def forget(self, id: str) -> None:  # noqa: A002
-        """As `Store.forget`."""
 
         def work(cursor: Cursor, again: bool) -> None:
             try:
-                columns = "owner, mark, lease_end" + self.dialect.for_update
-                owner, mark, lease_end = self._known(cursor, id, columns)
+                held = self._known(cursor, id, _HELD + self.dialect.for_update)
             except UnknownMissionError:
                 if again:  # deleted by the first try
                     return
                 raise
-            self._refuse_held(id, owner, mark, lease_end, self._now(cursor))
-            for table, key in (
-                ("entries", "mission"),
-                ("snapshots", "mission"),
-                ("missions", "id"),
-            ):
-                self._do(cursor, f"DELETE FROM smachpy_{table} WHERE {key} = ?", id)
+            self._refuse_held(id, held, self._now(cursor))
+            self._delete(cursor, [id])
+            self._wake(cursor)
 
         self._transact(work)
 
+    def prune(self, seconds: float, *, keep: Callable[[MissionRow], bool]) -> int:
+        self.look()  # a process that was killed after the end of its mission still holds it
+        deleted = 0
+        after: tuple[float, str] | None = (-math.inf, "")
+        while after is not None:
+            start = after
+
+            def work(cursor: Cursor, _: bool, start: tuple[float, str] = start) -> Any:
+                now = self._now(cursor)
+                self._do(
+                    cursor,
+                    f"SELECT {_COLUMNS}, {_HELD} FROM smachpy_missions "
+                    "WHERE (status = 'ended' OR status = 'cancelled') AND owner IS NULL "
+                    "AND changed <= ? AND (changed > ? OR (changed = ? AND id > ?)) "
+                    f"ORDER BY changed, id LIMIT {PRUNED_AT_ONCE}",
+                    *(now - seconds, start[0], start[0], start[1]),
+                )
+                rows = [self._row(row, now) for row in cursor.fetchall()]
+                gone = [row.id for row in rows if not (row.problem or keep(row))]
+                self._delete(cursor, gone)
+                last = rows[-1] if len(rows) == PRUNED_AT_ONCE else None
+                return len(gone), None if last is None else (last.changed, last.id)
+
+            count, after = self._transact(work)
+            deleted += count
+        if deleted:
+            self._shrink()
+        return deleted
+
+    def _shrink(self) -> None:
+        """Give freed space back to the system, if the database does not do it itself."""
+        return
+
+    def _delete(self, cursor: Cursor, ids: Sequence[str]) -> None:
+        for table, key in (
+            ("entries", "mission"),
+            ("snapshots", "mission"),
+            ("blobs", "mission"),
+            ("missions", "id"),
+        ):
+            self._do_many(
+                cursor, f"DELETE FROM smachpy_{table} WHERE {key} = ?", ((one,) for one in ids)
+            )
+
     def begin_next(self, row: MissionRow, *, due: float | None, next_due: float) -> bool:
-        """As `Store.begin_next`."""
 
         def work(cursor: Cursor, again: bool) -> bool:
             if again:
@@ -366,40 +801,47 @@ class SqlStore(ABC):
             # Another runner has seen the same schedule and was faster: it has moved `due`.
             if schedule is None or tuple(schedule) != (QUEUED, due):
                 return False
-            self._insert(cursor, row)
+            now = self._now(cursor)
+            self._insert(cursor, row, now)
             self._do(
                 cursor,
                 "UPDATE smachpy_missions SET due = ?, changed = ? WHERE id = ?",
-                *(next_due, self._now(cursor), row.schedule),
+                *(next_due, now, row.schedule),
             )
             return True
 
         return self._transact(work)
 
     def request_cancel(self, id: str) -> None:  # noqa: A002
-        """As `Store.request_cancel`."""
 
         def work(cursor: Cursor, again: bool) -> None:
             (status,) = self._known(cursor, id, "status" + self.dialect.for_update)
             if status in OVER and not again:
                 raise MissionOverError(self.where, id, status)
             self._do(cursor, "UPDATE smachpy_missions SET cancel = 1 WHERE id = ?", id)
-            if status == QUEUED:
+            if status == QUEUED:  # perhaps reserved: the process that was started finds it over
                 self._do(
                     cursor,
-                    "UPDATE smachpy_missions SET status = ?, changed = ? WHERE id = ?",
-                    *(CANCELLED, self._now(cursor), id),
+                    "UPDATE smachpy_missions SET status = 'cancelled', owner = NULL, mark = NULL, "
+                    "changed = ? WHERE id = ?",
+                    *(self._now(cursor), id),
                 )
+                self._wake(cursor)
 
         self._transact(work)
+
+    def listen(self, on_news: Callable[[], object]) -> Callable[[], object] | None:
+        del on_news
+        return None
 
     @abstractmethod
     def _verify(self, cursor: Cursor) -> None:
         """Check that the database file is not damaged, if the database does not check it itself."""
 
     @abstractmethod
-    def close(self) -> None:
-        """As `Store.close`."""
+    def close(self) -> None: ...
+
+    # -- statements ----------------------------------------------------------------------------
 
     def _do(self, cursor: Cursor, sql: str, *values: object) -> None:
         try:
@@ -415,34 +857,62 @@ class SqlStore(ABC):
         self._do(cursor, sql, *values)
         return cursor.fetchone()
 
-    def _insert(self, cursor: Cursor, row: MissionRow) -> None:
-        columns = _COLUMNS.split(", ")
-        values = {name: getattr(row, name) for name in columns}
-        values.update(argv=json.dumps(list(row.argv)), owner=None, cancel=int(row.cancel))
-        places = ", ".join("?" * len(columns))
-        self._do(
-            cursor,
-            f"INSERT INTO smachpy_missions ({_COLUMNS}, fence) VALUES ({places}, 0)",
-            *values.values(),
+    def _wake(self, cursor: Cursor) -> None:
+        """Wake the runners that listen, when the transaction is committed."""
+        if self.dialect.notify:
+            self._do(cursor, self.dialect.notify)
+
+    def _stamped(self, row: MissionRow, now: float) -> MissionRow:
+        """Return a row as it is stored at time `now`."""
+        return replace(
+            row,
+            owner=None,
+            robot=row.robot and robot_identity(row.robot),
+            drives=row.drives and robot_identity(row.drives),
+            created=now,
+            changed=now,
         )
 
-    def _known(self, cursor: Cursor, id: str, columns: str) -> Any:  # noqa: A002
+    def _insert(self, cursor: Cursor, row: MissionRow, now: float) -> None:
+        row = self._stamped(row, now)
+        values = {name: getattr(row, name) for name in _FIELDS}
+        values.update(argv=json.dumps(list(row.argv)), cancel=int(row.cancel))
+        values["drives"] = row.held_robot
+        waits = row.every is not None or (row.due is not None and row.due > now)
+        ready = now if row.due is None else row.due
+        self._do(
+            cursor,
+            f"INSERT INTO smachpy_missions ({_COLUMNS}, waits, ready, fence) "
+            f"VALUES ({_places(values)}, ?, ?, 0)",
+            *(*values.values(), int(waits), ready),
+        )
+        self._wake(cursor)
+
+    def _one_mission(self, cursor: Cursor, id_: str, columns: str) -> Any:
+        names, lock, how = columns.partition(" FOR ")
+        return self._one(
+            cursor, f"SELECT {names} FROM smachpy_missions WHERE id = ?{lock}{how}", id_
+        )
+
+    def _known(self, cursor: Cursor, id_: str, columns: str) -> Any:
         """Return columns of a mission.
 
         Args:
             cursor: The cursor.
-            id: The mission.
+            id_: The mission.
             columns: Their names; an end that locks the row, as in `Dialect`, may follow.
 
         Raises:
             UnknownMissionError: there is no such mission.
         """
-        names, lock, how = columns.partition(" FOR ")
-        row = self._one(cursor, f"SELECT {names} FROM smachpy_missions WHERE id = ?{lock}{how}", id)
+        row = self._one_mission(cursor, id_, columns)
         if row is None:
-            self._do(cursor, "SELECT id FROM smachpy_missions ORDER BY created")
-            raise UnknownMissionError(self.where, id, [each[0] for each in cursor.fetchall()])
+            raise self._unknown(cursor, id_)
         return row
+
+    def _unknown(self, cursor: Cursor, id_: str) -> UnknownMissionError:
+        self._do(cursor, f"SELECT id FROM smachpy_missions ORDER BY created DESC LIMIT {PAGE}")
+        return UnknownMissionError(self.where, id_, [str(row[0]) for row in cursor.fetchall()])
 
     def _fenced(self, cursor: Cursor, lease: Lease) -> tuple[bool, int]:
         """Lock the mission's row; return whether a cancel was requested, and its last entry.
@@ -463,7 +933,9 @@ class SqlStore(ABC):
             raise FencedError(self.where, lease, row and row[1])
         return bool(row[2]), int(row[3])
 
-    def _compact(self, cursor: Cursor, mission: str, last: int, snapshot: bytes) -> None:
+    def _compact(
+        self, cursor: Cursor, mission: str, last: int, snapshot: bytes, kept: Collection[str]
+    ) -> None:
         self._do(
             cursor,
             "INSERT INTO smachpy_snapshots (mission, n, crc, data) VALUES (?, ?, ?, ?) "
@@ -472,63 +944,142 @@ class SqlStore(ABC):
             *(mission, last, zlib.crc32(snapshot), snapshot),
         )
         self._do(cursor, "DELETE FROM smachpy_entries WHERE mission = ? AND n <= ?", mission, last)
+        self._do(cursor, "SELECT digest FROM smachpy_blobs WHERE mission = ?", mission)
+        unused = [row[0] for row in cursor.fetchall() if row[0] not in kept]
+        if unused:
+            self._do_many(
+                cursor,
+                "DELETE FROM smachpy_blobs WHERE mission = ? AND digest = ?",
+                ((mission, digest) for digest in unused),
+            )
 
-    def _may_take(self, owner: str | None, mark: str | None, lease_end: Any, now: float) -> bool:
-        if owner is None:
-            return True
-        host, pid = host_and_pid(owner)
+    def _may_take(self, held: Sequence[Any], now: float) -> bool:
+        """Return whether a mission may be taken, by its columns `_HELD`."""
+        owner, mark, lease_end, lease_clock = held
+        try:
+            host, pid = host_and_pid(owner if isinstance(owner, str) else "")
+        except ValueError:
+            return True  # nobody, or nobody can be it
+        left = -self._since(lease_end, lease_clock, now) if _is_time(lease_end) else 0.0
         return may_take(
-            process_lives(pid, mark or ""),
-            (lease_end or 0.0) - now,
+            process_lives(pid, mark if isinstance(mark, str) else ""),
+            left,
             by_lease=self.by_lease,
             same_host=host == self._host,
         )
 
-    def _refuse_held(
-        self, mission: str, owner: str | None, mark: str | None, lease_end: Any, now: float
-    ) -> None:
-        if owner is not None and not self._may_take(owner, mark, lease_end, now):
-            raise MissionInUseError(self.where, mission, owner)
+    def _refuse_held(self, mission: str, held: Sequence[Any], now: float) -> None:
+        if not self._may_take(held, now):
+            raise MissionInUseError(self.where, mission, held[0])
 
-    def _take_robot(self, cursor: Cursor, mission: str, robot: str, now: float) -> None:
-        """Take the robot of this mission away from missions whose runner is gone.
+    def _take_shared(
+        self, cursor: Cursor, mission: str, robot: str | None, group: str | None, now: float
+    ) -> None:
+        """Take the robot and group of this mission from missions whose runner is gone.
 
         Raises:
             MissionInUseError: a mission with a living runner uses it.
         """
-        self._do(
-            cursor,
-            "SELECT id, owner, mark, lease_end FROM smachpy_missions "
-            "WHERE robot = ? AND id <> ? AND owner IS NOT NULL",
-            *(robot, mission),
-        )
-        for other, owner, mark, lease_end in cursor.fetchall():
-            if not self._may_take(owner, mark, lease_end, now):
-                raise MissionInUseError(self.where, other, owner, robot=robot)
-            # A higher fence: if its runner was only suspended, its next write is refused.
+        for column, name, shared in (
+            (_ROBOT.format(""), "robot", robot),
+            ("grp", "group", group),
+        ):
+            if shared is None:
+                continue
             self._do(
                 cursor,
-                "UPDATE smachpy_missions SET owner = NULL, mark = NULL, fence = fence + 1 "
-                "WHERE id = ?",
-                other,
+                f"SELECT id, {_HELD} FROM smachpy_missions "
+                f"WHERE {column} = ? AND id <> ? AND owner IS NOT NULL",
+                *(shared, mission),
             )
+            for other, *held in cursor.fetchall():
+                if not self._may_take(held, now):
+                    raise MissionInUseError(self.where, other, held[0], **{name: shared})
+                self._free(cursor, other)
 
     def _row(self, row: Sequence[Any], now: float) -> MissionRow:
-        *columns, mark, lease_end = row
-        fields = dict(zip(_COLUMNS.split(", "), columns, strict=True))
-        if fields["status"] == RUNNING and self._may_take(fields["owner"], mark, lease_end, now):
+        """Return a row of `_COLUMNS` and `_HELD`; one of other types has only `problem`."""
+        held = row[len(_FIELDS) :]
+        fields = dict(zip(_FIELDS, row, strict=False))
+        if not _is_sound(fields):
+            id_ = fields["id"] if isinstance(fields["id"], str) else repr(fields["id"])
+            return replace(_DAMAGED, id=id_[:200])
+        if fields["status"] == RUNNING and self._may_take(held, now):
             fields["status"] = INTERRUPTED
-        try:
-            fields["argv"] = tuple(json.loads(fields["argv"]))
-        except (TypeError, ValueError) as error:
-            raise self._damaged(str(fields["id"]), "its arguments are damaged") from error
+        fields["argv"] = tuple(json.loads(fields["argv"]))
         fields["cancel"] = bool(fields["cancel"])
+        if fields["drives"] == fields["robot"]:
+            fields["drives"] = None
         return MissionRow(**fields)
 
     def _damaged(self, mission: str, what: str) -> StoreError:
         return StoreError(
             self.where,
-            f"mission {mission!r}: got a damaged journal: {what}; expected an undamaged one. "
+            f"mission {mission!r}: got a damaged journal ({what}); expected an undamaged one. "
             "Nothing was changed. Try a copy, or: smachpy missions forget " + mission,
             reason="corrupt",
         )
+
+
+def robot_identity(name: str) -> str:
+    """Return the one name of a robot, however it is spelled: "r1" for "/r1" and "r1/".
+
+    Raises:
+        InvalidNameError: it is no name.
+    """
+    return clean_namespace(name) or "/"
+
+
+def _places(values: Collection[object]) -> str:
+    return ", ".join("?" * len(values))
+
+
+_LATEST: Final = 1e11
+"""[s since the Unix epoch]; later times, in the year 5138, cannot be shown."""
+
+_TEXTS: Final = ("id", "name", "target", "argv", "status", "note")
+_OPTIONAL_TEXTS: Final = ("outcome", "robot", "owner", "every", "schedule", "group", "drives")
+
+
+def _is_time(value: object) -> bool:
+    return isinstance(value, (int, float)) and 0 <= value < _LATEST
+
+
+def _is_sound(fields: Mapping[str, Any]) -> bool:
+    """Return whether the columns of a row have the types with which they are written."""
+    try:
+        argv = json.loads(fields["argv"])
+    except (TypeError, ValueError, RecursionError):
+        return False
+    return (
+        all(isinstance(fields[name], str) for name in _TEXTS)
+        and all(isinstance(fields[name], (str, NoneType)) for name in _OPTIONAL_TEXTS)
+        and isinstance(argv, list)
+        and all(isinstance(word, str) for word in argv)
+        and fields["status"] in {QUEUED, RUNNING, INTERRUPTED, *OVER}
+        and isinstance(fields["structure"], bytes)
+        and all(isinstance(fields[name], int) for name in ("version", "cancel", "priority"))
+        and all(_is_time(fields[name]) for name in ("created", "changed"))
+        and all(fields[name] is None or _is_time(fields[name]) for name in ("due", "not_after"))
+    )
+
+
+def _are(row: Sequence[object], kinds: Sequence[type]) -> bool:
+    return all(isinstance(value, kind) for value, kind in zip(row, kinds, strict=True))
+
+
+_DAMAGED: Final = MissionRow(
+    id="",
+    name="",
+    target="",
+    argv=(),
+    status=INTERRUPTED,
+    outcome=None,
+    robot=None,
+    created=0.0,
+    changed=0.0,
+    owner=None,
+    structure=b"{}",
+    version=0,
+    problem="corrupt",
+)

@@ -9,19 +9,27 @@ SQLite takes a file whose log is missing for a complete one, and shows an older 
 that, the file itself has the bit `_NEEDS_LOG` of `PRAGMA user_version` set, and the log has it
 cleared. Whenever the whole log is copied into the file and deleted (SQLite does so when the last
 connection is closed, even that of another program), the bit is cleared with it.
+
+A file may come from a stranger: what SQLite would execute while it is read, such as views and
+triggers, is refused when it is opened (https://sqlite.org/security.html), and each transaction has
+a deadline.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import sqlite3
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
-from actionlib_core.clock import current_clock
-from smachpy.durable.sql import VERSION, Cursor, Dialect, SqlStore
+from actionlib_core.clock import RealClock, current_clock
+from actionlib_core.clock.forks import is_copy
+from actionlib_core.process.private_files import make_private_file, make_private_folder
+from smachpy.durable.processes import boot_clock
+from smachpy.durable.sql import TABLES, VERSION, Cursor, Dialect, SqlStore
 from smachpy.durable.store import Reason, StoreError
 
 if TYPE_CHECKING:
@@ -34,6 +42,18 @@ _APPLICATION: Final = 0x736D6A6C  # in ASCII, "smjl"
 
 _NEEDS_LOG: Final = 1 << 16
 
+MAX_VALUE_BYTES: Final = 256 * 2**20
+"""The longest value of a file that is read or written [bytes]."""
+
+DEADLINE_S: Final = 20.0
+"""Longest time of a transaction, without the wait for other processes [s]."""
+
+CHECK_S: Final = 0.3
+"""Longest time for the check of a file that is opened [s]; a gigabyte takes several seconds."""
+
+_STEPS: Final = 20_000
+"""Steps of SQLite's machine between two looks at the deadline, about a millisecond."""
+
 _REASONS: Final[dict[int, tuple[Reason, str]]] = {
     sqlite3.SQLITE_BUSY: (
         "busy",
@@ -41,6 +61,14 @@ _REASONS: Final[dict[int, tuple[Reason, str]]] = {
     ),
     sqlite3.SQLITE_LOCKED: ("busy", "it is locked; expected an unlocked file. Try again"),
     sqlite3.SQLITE_FULL: ("full", "no space is left; expected some. Try to free space"),
+    sqlite3.SQLITE_INTERRUPT: (
+        "failed",
+        f"reading it takes more than {DEADLINE_S:g} s; expected a journal. Try another path",
+    ),
+    sqlite3.SQLITE_TOOBIG: (
+        "failed",
+        f"a value has more than {MAX_VALUE_BYTES} bytes; expected less. Try smaller userdata",
+    ),
     sqlite3.SQLITE_CORRUPT: ("corrupt", "it is damaged; expected an undamaged file. Try a copy"),
     sqlite3.SQLITE_NOTADB: (
         "foreign",
@@ -64,7 +92,9 @@ class SQLiteStore(SqlStore):
     """
 
     by_lease = False
-    dialect = Dialect(placeholder="?", blob="BLOB", real="REAL", clustered=" WITHOUT ROWID")
+    dialect = Dialect(
+        placeholder="?", blob="BLOB", real="REAL", big="INTEGER", clustered=" WITHOUT ROWID"
+    )
 
     def __init__(
         self,
@@ -77,13 +107,15 @@ class SQLiteStore(SqlStore):
         super().__init__()
         if synchronous not in {"FULL", "NORMAL"}:
             raise ValueError(f"synchronous: got {synchronous!r}; expected 'FULL' or 'NORMAL'.")
-        self._file = file = Path(path).absolute()
+        # Resolved: SQLite keeps the log beside the file itself, not beside a link to it.
+        self._file = file = Path(path).resolve()
         self.where = str(path)
         # Inode and modification time of the file when it last had the bit `_NEEDS_LOG`.
         self._marked: tuple[int, int] | None = None
         self._lock = threading.Lock()
+        self._deadline = math.inf
         if create:
-            self._make_folder(file.parent)
+            self._make_file(file)
         elif not file.exists():
             problem = (
                 "got no such file; expected a journal. Try `smachpy run MISSION --durable`, which "
@@ -100,14 +132,16 @@ class SQLiteStore(SqlStore):
                 isolation_level=None,  # `_transact` begins and ends transactions itself
                 check_same_thread=False,  # `_lock` lets one thread at a time use the connection
             )
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise self._error(error) from error
         try:
+            self._distrust()
             version = self._transact(self._check, reads=True)  # before anything is written
             self._pragmas(synchronous)
-            if version != VERSION:  # a new file, or a process was killed inside `_mark_file`
+            # A new or older file; or a process was killed inside `_mark_file`.
+            if version != VERSION:
                 self._transact(self._create_tables)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             self._connection.close()
             raise self._error(error) from error
         except BaseException:
@@ -115,16 +149,23 @@ class SQLiteStore(SqlStore):
             raise
 
     def close(self) -> None:
-        """As `Store.close`."""
+        if is_copy(self._pid):  # it is the parent's
+            return
         with self._lock:
             self._connection.close()
 
-    def _make_folder(self, folder: Path) -> None:
+    def _make_file(self, file: Path) -> None:
+        """Make the file and its folder, for this user only: they hold arguments and userdata."""
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_private_folder(file.parent)
+            if not file.exists():
+                # An empty file is an empty database for SQLite, which gives its log the same mode.
+                make_private_file(file)
         except OSError as error:
+            if isinstance(error, PermissionError) and file.parent.is_dir():
+                return  # SQLite's own text names the file
             reason: Reason = "unreachable"
-            problem = f"got {error.strerror} for its folder; expected one that can be made."
+            problem = f"got no folder for it ({error.strerror}); expected one that can be made."
             raise StoreError(self.where, problem, reason=reason) from error
 
     def _check_log(self) -> None:
@@ -154,6 +195,19 @@ class SQLiteStore(SqlStore):
             ours = raw.execute("PRAGMA application_id").fetchone()[0] == _APPLICATION
             return ours and bool(raw.execute("PRAGMA user_version").fetchone()[0] & _NEEDS_LOG)
 
+    def _distrust(self) -> None:
+        """Let nothing run that a file may bring, and set limits."""
+        connection = self._connection
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
+        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+        connection.setlimit(sqlite3.SQLITE_LIMIT_TRIGGER_DEPTH, 1)
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.execute("PRAGMA cell_size_check = ON")
+        connection.set_progress_handler(lambda: self._clock_now() > self._deadline, _STEPS)
+
+    def _clock_now(self) -> float:
+        return RealClock().now()
+
     def _check(self, cursor: Cursor, _: bool) -> int:
         """Refuse a file that is not a journal, or is newer; return its `user_version`."""
         user_version: int = self._one(cursor, "PRAGMA user_version")[0]
@@ -172,10 +226,37 @@ class SQLiteStore(SqlStore):
                 "Try a newer smachpy.",
                 reason="future",
             )
+        else:
+            self._check_schema(cursor)
         return user_version
+
+    def _check_schema(self, cursor: Cursor) -> None:
+        """Refuse what SQLite would execute while it reads the file."""
+        cursor.execute("SELECT type, name, tbl_name FROM sqlite_master LIMIT 1000")
+        found = cursor.fetchall()
+        foreign = [
+            f"{kind} {name!s:.60}"
+            for kind, name, table in found
+            if not (
+                (kind == "table" and name in {*TABLES, "sqlite_stat1"})
+                or (kind == "index" and table in TABLES)
+            )
+        ]
+        for table in TABLES & {name for _, name, _ in found}:
+            cursor.execute("SELECT name FROM pragma_table_xinfo(?) WHERE hidden <> 0", (table,))
+            foreign += [f"computed column {name!s:.60}" for (name,) in cursor.fetchall()]
+        if foreign:
+            raise StoreError(
+                self.where,
+                f"got a journal with {', '.join(sorted(foreign)[:3])}; expected the tables of "
+                "smachpy alone: a stranger may have made it. Try another path.",
+                reason="foreign",
+            )
 
     def _pragmas(self, synchronous: str) -> None:
         execute = self._connection.execute
+        if execute("PRAGMA page_count").fetchone()[0] == 0:
+            execute("PRAGMA auto_vacuum = INCREMENTAL")  # see `_shrink`
         attempts_left = 10
         while execute("PRAGMA journal_mode").fetchone()[0] != "wal":
             attempts_left -= 1
@@ -196,23 +277,39 @@ class SQLiteStore(SqlStore):
             for statement in self.dialect.tables():
                 cursor.execute(statement)
             cursor.execute(f"PRAGMA application_id = {_APPLICATION}")
+        cursor.execute("SELECT name FROM pragma_table_info('smachpy_missions')")
+        known = {name for (name,) in cursor.fetchall()}
+        for name, kind in self.dialect.columns().items():
+            if name not in known:
+                cursor.execute(f"ALTER TABLE smachpy_missions ADD COLUMN {name} {kind}")
+        for statement in self.dialect.additions():
+            cursor.execute(statement)
         cursor.execute(f"PRAGMA user_version = {VERSION}")
 
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:
+        self._check_process()
         with self._lock:
+            self._deadline = self._clock_now() + DEADLINE_S
             try:
                 # IMMEDIATE waits for other writers now. A transaction that reads first and then
                 # writes would fail at once, without waiting, if another one wrote in between.
                 self._connection.execute("BEGIN" if reads else "BEGIN IMMEDIATE")
                 try:
+                    self._deadline = self._clock_now() + DEADLINE_S
                     result = work(self._connection.cursor(), False)  # noqa: FBT003
                     self._connection.execute("COMMIT")
                 except BaseException:
                     if self._connection.in_transaction:
                         self._connection.execute("ROLLBACK")
                     raise
-            except sqlite3.Error as error:
+            except (sqlite3.Error, UnicodeDecodeError) as error:
                 raise self._error(error) from error
+            except OverflowError as error:  # a number of Python that SQLite cannot hold
+                raise StoreError(
+                    self.where, f"got a number that SQLite cannot hold ({error}).", reason="failed"
+                ) from error
+            finally:
+                self._deadline = math.inf
             if not reads:
                 self._mark_file()
             return result
@@ -227,7 +324,9 @@ class SQLiteStore(SqlStore):
         try:
             now = os.stat(self._file)  # noqa: PTH116  takes half the time of Path.stat
         except OSError as error:
-            problem = f"got {error.strerror} after a write; expected the file that was opened."
+            problem = (
+                f"got no file after a write ({error.strerror}); expected the one that was opened."
+            )
             raise StoreError(self.where, problem, reason="missing") from error
         if self._marked == (now.st_ino, now.st_mtime_ns):
             return
@@ -250,15 +349,63 @@ class SQLiteStore(SqlStore):
 
     def _verify(self, cursor: Cursor) -> None:
         # A page that is missing from the tree of a table would only look like fewer entries.
-        problem = self._one(cursor, "PRAGMA integrity_check(1)")[0]
+        self._deadline = self._clock_now() + CHECK_S
+        try:
+            problem = self._one(cursor, "PRAGMA quick_check(1)")[0]
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
+                return  # a large file: what is read has its checksums
+            raise
         if problem != "ok":
             reason, text = _REASONS[sqlite3.SQLITE_CORRUPT]
             raise StoreError(self.where, f"{text} ({problem}).", reason=reason)
 
+    def _shrink(self) -> None:
+        with self._lock:
+            try:
+                if self._connection.execute("PRAGMA auto_vacuum").fetchone()[0] == 0:
+                    # A file of an older smachpy: from now on as `_pragmas` sets it.
+                    self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+                    self._connection.execute("VACUUM")
+                else:
+                    # `execute` would free one page and stop: the statement has no rows to fetch.
+                    self._connection.executescript("PRAGMA incremental_vacuum")
+                self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            except sqlite3.Error as error:
+                raise self._error(error) from error
+            self._mark_file()
+
+    def _bytes(self, cursor: Cursor) -> int:
+        pages = self._one(cursor, "PRAGMA page_count")[0]
+        return int(pages * self._one(cursor, "PRAGMA page_size")[0])
+
     def _now(self, _: Cursor) -> float:
         return current_clock().time_ns() / 1e9
 
-    def _error(self, error: sqlite3.Error) -> StoreError:
+    def _now_text(self) -> str:
+        return repr(current_clock().time_ns() / 1e9)
+
+    def _steady(self, seconds: float = 0.0) -> str | None:
+        # The monotonic clock is the same for all processes between two boots.
+        clock, name = current_clock(), boot_clock()
+        if not name or not isinstance(clock, RealClock):
+            return None
+        return f"{name} {clock.now() + seconds!r}"
+
+    def _since(self, then: float, steady: str | None, now: float) -> float:
+        name, _, reading = (steady or "").rpartition(" ")
+        clock = current_clock()
+        if name and name == boot_clock() and isinstance(clock, RealClock):
+            with contextlib.suppress(ValueError):
+                return clock.now() - float(reading)
+        return now - then
+
+    def _error(self, error: sqlite3.Error | UnicodeDecodeError) -> StoreError:
+        if isinstance(error, UnicodeDecodeError):
+            # SQLite quotes a name of the damaged schema, which Python cannot read.
+            return StoreError(
+                self.where, f"{_REASONS[sqlite3.SQLITE_CORRUPT][1]}.", reason="corrupt"
+            )
         code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the primary code of an extended one
         reason, problem = _REASONS.get(code, ("failed", "SQLite cannot use it"))
         return StoreError(self.where, f"{problem} ({error}).", reason=reason)

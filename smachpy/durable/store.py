@@ -5,20 +5,27 @@ needs a lease. Each lease of a mission has a higher fence than the one before, a
 carries its fence, so a runner that was suspended and continues later can no longer change anything
 (a fencing token; M. Kleppmann, "How to do distributed locking", 2016).
 
+A runner reserves a mission before it starts a process for it, and hands that lease to the process,
+which claims the mission with it. One mission at a time holds a robot or a group: the database has
+an index that refuses a second one.
+
     store = open_store("journal.db")                      # SQLite
     store = open_store("postgresql://db.example/missions")  # pip install 'smachpy[postgres]'
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal, Protocol
+from urllib.parse import unquote
 
 from smachpy.exceptions import MissionError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
 QUEUED: Final = "queued"
@@ -27,6 +34,12 @@ INTERRUPTED: Final = "interrupted"
 ENDED: Final = "ended"
 CANCELLED: Final = "cancelled"
 OVER: Final = (ENDED, CANCELLED)
+
+_SECRETS: Final = frozenset({"password", "sslpassword"})
+"""Parameters of a PostgreSQL URL that are shown nowhere."""
+
+PAGE: Final = 1000
+"""The most missions that a list has unless more are asked for."""
 
 Reason = Literal["missing", "foreign", "future", "corrupt", "busy", "full", "unreachable", "failed"]
 """Reasons of a `StoreError`:
@@ -51,11 +64,16 @@ class Lease:
         fence: The number of the lease among those of this mission, from 1; only the newest is
             valid.
         runner: The process that holds it, "host:pid".
+        beat_ns: The mission's own time at its last sign of life before this lease, as given to
+            `append` or `renew` [ns]; None if there was none, or an older smachpy gave it.
+        silent: How long ago that was, by the store's clock [s].
     """
 
     mission: str
     fence: int
     runner: str
+    beat_ns: int | None = None
+    silent: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +88,7 @@ class MissionRow:
         status: "queued", "running", "interrupted" (its runner is gone), "ended" or "cancelled".
         outcome: The outcome with which it has ended, else None.
         robot: The robot that it uses, None for any.
-        created: The time of its creation [s since the Unix epoch].
+        created: The time of its creation, by the store's clock [s since the Unix epoch].
         changed: Its last sign of life, an entry or a renewal of its lease [s since the Unix epoch].
         owner: The runner that holds it, "host:pid", or None.
         structure: The shape of its machine, see `smachpy.durable.structure`.
@@ -80,6 +98,14 @@ class MissionRow:
             into the queue. The schedule itself is never run.
         schedule: The id of the schedule that created it, else None.
         cancel: Whether `request_cancel` was called.
+        priority: Missions with a higher number begin first.
+        not_after: The time from which it is not begun any more, but cancelled [s since the Unix
+            epoch]; None: never.
+        group: One mission of a group runs at a time; None: it has no group.
+        drives: The robot that it moves according to its names, if that is not `robot`.
+        note: Why a runner gave it back, else "".
+        problem: Why the row cannot be read, a `Reason`, or ""; its other fields are placeholders
+            then.
     """
 
     id: str
@@ -98,11 +124,44 @@ class MissionRow:
     every: str | None = None
     schedule: str | None = None
     cancel: bool = False
+    priority: int = 0
+    not_after: float | None = None
+    group: str | None = None
+    drives: str | None = None
+    note: str = ""
+    problem: str = ""
+
+    @property
+    def held_robot(self) -> str | None:
+        """The robot that no other mission uses while this one runs; None if it needs none."""
+        return self.drives or self.robot
 
     @property
     def run(self) -> str:
         """A unique name of this run: when a mission has ended, its id may be used again."""
         return f"{self.id} {round(self.created * 1e6)}"
+
+
+@dataclass(frozen=True)
+class QueueNews:
+    """What a runner learns from one look at a queue.
+
+    Attributes:
+        schedules: The schedules that are due.
+        cancelled: Ids of missions that were cancelled because their `not_after` has passed.
+        next_due: Time until the next mission is due [s]; None if none is.
+        next_schedule: Time until the next schedule is due [s]; None if there is none.
+        free: Whether a mission waits that may begin or be resumed now, if its robot and group are
+            free.
+        now: The time of the store's clock [s since the Unix epoch].
+    """
+
+    schedules: tuple[MissionRow, ...]
+    cancelled: tuple[str, ...]
+    next_due: float | None
+    next_schedule: float | None
+    free: bool
+    now: float
 
 
 class Store(Protocol):
@@ -113,19 +172,35 @@ class Store(Protocol):
     `patience`.
     """
 
-    def create(self, row: MissionRow) -> None:
-        """Add a mission; its `owner` is ignored.
+    def create(self, row: MissionRow) -> MissionRow:
+        """Add a mission, and return its row with the store's time in `created` and `changed`.
+
+        Its `owner` is ignored.
 
         Raises:
             MissionError: the id exists.
         """
         ...
 
-    def missions(self, *, open_only: bool = False) -> list[MissionRow]:
-        """Return all missions, the oldest first.
+    def missions(
+        self,
+        *,
+        open_only: bool = False,
+        statuses: Collection[str] = (),
+        robot: str | None = None,
+        target: str | None = None,
+        limit: int | None = PAGE,
+        skip: int = 0,
+    ) -> list[MissionRow]:
+        """Return the newest missions, the oldest of them first.
 
         Args:
             open_only: Omit missions that have ended or were cancelled.
+            statuses: Only missions with one of these statuses; empty: any.
+            robot: Only missions of this robot; None: any.
+            target: Only missions with this target; None: any.
+            limit: The most that are returned; None: all.
+            skip: Omit this many of the newest ones.
         """
         ...
 
@@ -133,23 +208,78 @@ class Store(Protocol):
         """Return the row of one mission."""
         ...
 
-    def claim(self, id: str, runner: str, *, seconds: float) -> Lease:  # noqa: A002
+    def find(self, id: str) -> MissionRow | None:  # noqa: A002
+        """Return the row of one mission; None if there is none of this id."""
+        ...
+
+    def holders(self) -> list[MissionRow]:
+        """Return the missions that a process runs or is about to run."""
+        ...
+
+    def look(self, *, robots: Collection[str] = ()) -> QueueNews:
+        """Look at the queue, and free missions, robots and groups of processes that have died.
+
+        Args:
+            robots: Only missions of these robots count for `next_due` and `free`; empty: all.
+        """
+        ...
+
+    def reserve(
+        self,
+        runner: str,
+        *,
+        seconds: float,
+        robots: Collection[str] = (),
+        leave: Collection[str] = (),
+        leave_targets: Collection[str] = (),
+    ) -> tuple[MissionRow, Lease] | None:
+        """Take the mission that comes next, for a process that will `claim` it with the lease.
+
+        Interrupted missions come first, then those with the highest priority, then those that have
+        waited longest. A mission whose robot or group another one holds is passed over. The status
+        does not change.
+
+        Args:
+            runner: This process, `this_runner()`.
+            seconds: The duration of the lease [s].
+            robots: Only missions of these robots; empty: all missions, with or without a robot.
+            leave: Ids of missions that are passed over.
+            leave_targets: Targets of missions that are passed over.
+        """
+        ...
+
+    def claim(
+        self,
+        id: str,  # noqa: A002
+        runner: str,
+        *,
+        seconds: float,
+        reserved: Lease | None = None,
+    ) -> Lease:
         """Take a lease of a mission, to begin or resume it; its status becomes "running".
 
         Args:
             id: The mission.
             runner: This process, `this_runner()`.
             seconds: The duration of the lease without `renew` [s].
+            reserved: The lease of the runner that reserved it for this process, if one did.
 
         Raises:
-            MissionInUseError: a living runner holds it, or another mission that uses its robot.
+            MissionInUseError: a living runner holds it, or another mission that uses its robot or
+                is of its group.
             MissionOverError: it has ended or was cancelled.
+            FencedError: `reserved` is void.
             MissionError: it is a schedule.
         """
         ...
 
-    def renew(self, lease: Lease, *, seconds: float) -> bool:
+    def renew(self, lease: Lease, *, seconds: float, beat_ns: int | None = None) -> bool:
         """Extend a lease to `seconds` [s] from now.
+
+        Args:
+            lease: The lease.
+            seconds: Its duration from now on [s].
+            beat_ns: The mission's own time, for `Lease.beat_ns` of the next process [ns].
 
         Returns:
             Whether `request_cancel` was called for the mission.
@@ -167,6 +297,9 @@ class Store(Protocol):
         snapshot: bytes | None = None,
         status: str | None = None,
         outcome: str | None = None,
+        blobs: Mapping[str, bytes] = MappingProxyType({}),
+        kept: Collection[str] = (),
+        beat_ns: int | None = None,
     ) -> None:
         """Add entries in one transaction, which is durable when this returns.
 
@@ -177,6 +310,10 @@ class Store(Protocol):
                 is replaced.
             status: The mission's new status; None: unchanged.
             outcome: The mission's outcome; None: unchanged.
+            blobs: Large values that the entries name by their digests: digest -> bytes. One that
+                the mission has already is not written again.
+            kept: With a snapshot, the digests that it names: other blobs are deleted.
+            beat_ns: The mission's own time, as for `renew`; None: unchanged.
 
         Raises:
             FencedError: another runner has taken the mission over; nothing is written.
@@ -187,8 +324,17 @@ class Store(Protocol):
         """Return the newest snapshot, or None, and the entries after it."""
         ...
 
-    def release(self, lease: Lease, status: str) -> None:
-        """Give a lease back, and set the status of the mission.
+    def blob(self, id: str, digest: str) -> bytes:  # noqa: A002
+        """Return a large value of a mission by its digest."""
+        ...
+
+    def release(self, lease: Lease, status: str | None, *, note: str = "") -> None:
+        """Give a lease back.
+
+        Args:
+            lease: The lease.
+            status: The new status of the mission; None: unchanged.
+            note: Why it is given back, for `MissionRow.note`.
 
         Raises:
             FencedError: another runner has taken the mission over.
@@ -201,6 +347,19 @@ class Store(Protocol):
         Raises:
             MissionInUseError: a living runner holds it.
         """
+        ...
+
+    def prune(self, seconds: float, *, keep: Callable[[MissionRow], bool]) -> int:
+        """Delete missions that have been over for some time, and return their number.
+
+        Args:
+            seconds: For how long [s].
+            keep: Returns whether a mission is kept all the same.
+        """
+        ...
+
+    def size(self) -> tuple[int, int]:
+        """Return the number of missions, and the size of the store [bytes]."""
         ...
 
     def begin_next(self, row: MissionRow, *, due: float | None, next_due: float) -> bool:
@@ -227,6 +386,14 @@ class Store(Protocol):
         """
         ...
 
+    def listen(self, on_news: Callable[[], object]) -> Callable[[], object] | None:
+        """Call `on_news`, in a thread, when something has changed in the queue.
+
+        Returns:
+            A function that ends this; None if the database cannot tell: look regularly then.
+        """
+        ...
+
     def close(self) -> None:
         """Close the file or the connection; leases are not released. May be called twice."""
         ...
@@ -234,6 +401,8 @@ class Store(Protocol):
 
 class StoreError(MissionError):
     """A store cannot be opened, read or written.
+
+    Try: see the reason: check the path, the rights, the space on the disk, or the server.
 
     Attributes:
         where: The file, or the server's URL without its password.
@@ -248,6 +417,8 @@ class StoreError(MissionError):
 
 class UnknownMissionError(MissionError):
     """A store has no mission of this id.
+
+    Try: `smachpy missions list` shows the ids.
 
     Attributes:
         mission: The id.
@@ -265,22 +436,37 @@ class UnknownMissionError(MissionError):
 
 
 class MissionInUseError(MissionError):
-    """A living process holds a mission, or another mission that uses the same robot.
+    """A living process holds a mission, or another mission of the same robot or group.
+
+    Try: wait for the other mission, or stop its process, which is named.
 
     Attributes:
-        mission: The mission that is held; if the robot is in use, the mission that uses it.
+        mission: The mission that is held; if the robot or group is in use, the mission that uses
+            it.
         runner: The process, "host:pid".
         host, pid: Its two parts.
         robot: The robot, if another mission uses it, else None.
+        group: The group, if another mission of it runs, else None.
     """
 
-    def __init__(self, where: str, mission: str, runner: str, *, robot: str | None = None) -> None:
+    def __init__(
+        self,
+        where: str,
+        mission: str,
+        runner: str,
+        *,
+        robot: str | None = None,
+        group: str | None = None,
+    ) -> None:
         self.mission = mission
         self.runner = runner
         self.host, self.pid = host_and_pid(runner)
         self.robot = robot
-        what = f"mission {mission!r}" if robot is None else f"robot {robot!r}"
-        for_what = "" if robot is None else f" for mission {mission!r}"
+        self.group = group
+        shared = f"robot {robot!r}" if robot is not None else f"group {group!r}"
+        alone = robot is None and group is None
+        what = f"mission {mission!r}" if alone else shared
+        for_what = "" if alone else f" for mission {mission!r}"
         super().__init__(
             f"{where}: {what}: got one that process {self.pid} on {self.host!r} runs{for_what}; "
             "expected one that no process runs. Try again when that process has ended."
@@ -289,6 +475,8 @@ class MissionInUseError(MissionError):
 
 class MissionOverError(MissionError):
     """A mission has ended already or was cancelled.
+
+    Try: start a new mission; `smachpy missions show ID` tells how this one ended.
 
     Attributes:
         mission: Its id.
@@ -306,6 +494,8 @@ class MissionOverError(MissionError):
 
 class FencedError(MissionError):
     """This process has lost its lease: another runner took the mission over, or it was deleted.
+
+    Try: nothing: the other runner goes on with the mission. A longer `--lease` bears longer pauses.
 
     Attributes:
         lease: The lost lease.
@@ -363,6 +553,41 @@ def open_store(
     return SQLiteStore(where, synchronous=synchronous, create=create, patience=patience)
 
 
+def store_name(where: str) -> str:
+    """Return a store's name for people: its path, or its URL without user and passwords."""
+    scheme, mark, rest = where.partition("://")
+    if not mark:
+        return where
+    place, ask, query = rest.partition("?")
+    words = [one for one in query.split("&") if unquote(one.partition("=")[0]) not in _SECRETS]
+    # The last "@": a password that is not escaped may have others.
+    shown = place + (ask + "&".join(words) if words else "")
+    return f"{scheme}://{shown.rpartition('@')[2]}"
+
+
+def for_child(where: str) -> tuple[str, dict[str, str]]:
+    """Return a store's address for the command line of a process, which `ps` shows to all users.
+
+    Returns:
+        The address without its password, and environment variables with it.
+    """
+    scheme, mark, rest = where.partition("://")
+    place, ask, query = rest.partition("?")
+    login, at, host = place.rpartition("@")
+    user, _, password = login.partition(":")
+    words = []
+    for one in query.split("&") if ask else ():
+        key, _, value = one.partition("=")
+        if unquote(key) == "password":
+            password = value
+        else:
+            words.append(one)
+    if not (mark and password):
+        return where, {}
+    address = f"{scheme}://{user}{at}{host}{'?' if words else ''}{'&'.join(words)}"
+    return address, {"PGPASSWORD": unquote(password)}
+
+
 def host_and_pid(runner: str) -> tuple[str, int]:
     """Split "host:pid".
 
@@ -374,6 +599,11 @@ def host_and_pid(runner: str) -> tuple[str, int]:
     if not colon or not host or not pid.isdecimal():
         raise ValueError(f"runner: got {runner!r}; expected 'host:pid'.")
     return host, int(pid)
+
+
+def digest_of(data: bytes) -> str:
+    """Return the digest by which entries name a large value."""
+    return hashlib.blake2b(data, digest_size=20).hexdigest()
 
 
 def check_lease_seconds(seconds: float) -> None:

@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from smachpy.introspection import describe
+from smachpy.events.introspection import describe
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from smachpy.introspection import Described, StateRecord
+    from smachpy.durable.store import MissionRow
+    from smachpy.events.introspection import Described, StateRecord
 
 Shape = dict[str, dict[str, Any]]
 """Path -> the facts that a position depends on: kind, outcomes, keys; for a container its children
-and transitions; for a plan its net.
+and transitions; for a plan its net. No position depends on `success`, the good outcomes of the root
+if it says which.
 """
 
 
@@ -23,7 +25,20 @@ def shape_of(machine: Described) -> Shape:
 
     Timeouts, texts, classes and callbacks are no part of it.
     """
-    return {record.path: _facts(record) for record in describe(machine).walk()}
+    root = describe(machine)
+    shape = {record.path: _facts(record) for record in root.walk()}
+    if root.success is not None:
+        shape[root.path]["success"] = sorted(root.success)
+    return shape
+
+
+def success_of(row: MissionRow) -> tuple[str, ...] | None:
+    """Return the good outcomes of a mission, None if its machine does not say or is damaged."""
+    try:
+        success = from_bytes(row.structure).get(f"/{row.name}", {}).get("success")
+    except ValueError:
+        return None
+    return tuple(map(str, success)) if isinstance(success, list) else None
 
 
 def _facts(record: StateRecord) -> dict[str, Any]:
@@ -39,7 +54,8 @@ def _facts(record: StateRecord) -> dict[str, Any]:
     if record.is_container:
         facts["children"] = [child.label for child in record.children]
         facts["edges"] = {
-            f"{edge.source} -{edge.outcome}->": edge.target for edge in record.transitions
+            f"{edge.source} -{edge.outcome}->{edge.guard and f' if {edge.guard}'}": edge.target
+            for edge in record.transitions
         }
         facts["rules"] = sorted(f"{rule.outcome}: {rule.text}" for rule in record.rules)
     if record.net is not None:
@@ -66,7 +82,10 @@ def from_bytes(data: bytes) -> Shape:
     Raises:
         ValueError: the data are damaged.
     """
-    shape = json.loads(data)
+    try:
+        shape = json.loads(data)
+    except RecursionError as error:
+        raise ValueError("structure: it is nested too deeply") from error
     if not isinstance(shape, dict) or not all(isinstance(facts, dict) for facts in shape.values()):
         raise ValueError(f"structure: got {shape!r:.80}; expected path -> facts.")
     return shape
@@ -78,7 +97,7 @@ def differences(old: Shape, new: Shape) -> list[str]:
     found += [f"{path}: is new" for path in new if path not in old]
     for path in old.keys() & new.keys():
         was, now = old[path], new[path]
-        for fact in sorted({*was, *now}):
+        for fact in sorted({*was, *now} - {"success"}):
             found += _changes(f"{path}: {fact}", was.get(fact), now.get(fact))
     return sorted(found)
 

@@ -3,7 +3,7 @@
     python killed_mission.py
 
 Each line of the input is a life to live, a JSON object with the arguments of `live` and, in
-`after`, how many seconds it has at most. The answer is a line, too: its exit code. Processes are
+`after`, how many seconds it has at most; `by` is the signal that ends it then. The answer is a line, too: its exit code. Processes are
 forked from this one, which has all modules loaded: most of a short life would be imports.
 """
 
@@ -204,16 +204,17 @@ def live(folder: str, machine: int, kill_at: int = 0, *, written: bool = False) 
 def main() -> None:
     for line in sys.stdin:
         life = json.loads(line)
-        after = life.pop("after", None)
+        after, by = life.pop("after", None), life.pop("by", "SIGKILL")
         pid = os.fork()
         if pid == 0:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            for number in (signal.SIGTERM, signal.SIGHUP):
+                signal.signal(number, signal.SIG_DFL)
             sys.stdin = open(os.devnull)  # noqa: SIM115  the parent's is not to be read
             live(**life)
             return
         ends = os.pidfd_open(pid)
         if after is not None and not select.select([ends], [], [], after)[0]:
-            os.kill(pid, signal.SIGKILL)
+            os.kill(pid, signal.Signals[by])
         code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
         os.close(ends)
         print(code, flush=True)

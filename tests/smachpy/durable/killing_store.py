@@ -24,6 +24,7 @@ class KillingStore:
         self.rows: dict[str, MissionRow] = {}
         self.snapshots: dict[str, bytes] = {}
         self.entries: dict[str, list[bytes]] = {}
+        self.blobs: dict[str, bytes] = {}
         self.writes = 0
         self.kill_at = 0
         self.written = False
@@ -37,22 +38,24 @@ class KillingStore:
         self.rows[row.id] = row
         self.entries[row.id] = []
 
-    def missions(self) -> list[MissionRow]:
-        return list(self.rows.values())
+    def find(self, id: str) -> MissionRow | None:
+        return self.rows.get(id)
 
     def mission(self, id: str) -> MissionRow:
         return self.rows[id]
 
-    def claim(self, id: str, runner: str, *, seconds: float) -> Lease:
-        del seconds
+    def claim(self, id: str, runner: str, *, seconds: float, reserved: Lease | None) -> Lease:
+        del seconds, reserved
         self._set(id, status=RUNNING)
         return Lease(id, 1, runner)
 
-    def renew(self, lease: Lease, *, seconds: float) -> bool:
-        del lease, seconds
+    def renew(self, lease: Lease, *, seconds: float, beat_ns: int | None = None) -> bool:
+        del lease, seconds, beat_ns
         return False
 
-    def append(self, lease, entries, *, snapshot=None, status=None, outcome=None) -> None:
+    def append(
+        self, lease, entries, *, snapshot=None, status=None, outcome=None, blobs=(), **_
+    ) -> None:
         if self.dead:
             raise Kill
         self.writes += 1
@@ -60,6 +63,7 @@ class KillingStore:
         if self.dead and not self.written:
             raise Kill
         self.entries[lease.mission] += entries
+        self.blobs.update(blobs)
         if snapshot is not None:
             self.snapshots[lease.mission] = snapshot
             self.entries[lease.mission] = []
@@ -71,7 +75,10 @@ class KillingStore:
     def read(self, id: str) -> tuple[bytes | None, list[bytes]]:
         return self.snapshots.get(id), list(self.entries[id])
 
-    def release(self, lease: Lease, status: str) -> None:
+    def blob(self, _: str, digest: str) -> bytes:
+        return self.blobs[digest]
+
+    def release(self, lease: Lease, status: str, *, note: str = "") -> None:
         self._set(lease.mission, status=status)
 
     def forget(self, id: str) -> None:

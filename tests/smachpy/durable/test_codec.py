@@ -21,6 +21,7 @@ from actionlib_core.interfaces.ros2.geometry_msgs.msg import PoseStamped as Ros2
 from actionlib_core.time import Duration, Time
 from smachpy.durable.codec import JournalValueError, NotDurableError, decode, encode
 from smachpy.exceptions import InvalidStateError
+from smachpy.places.pose import Pose2D
 from smachpy.userdata.kept_types import REGISTERED, register_annotations, register_type
 from smachpy.userdata.readonly import read_only
 from tests.smachpy.durable import kept_types
@@ -37,6 +38,8 @@ from tests.smachpy.durable.kept_types import (
     Ways,
     WithInitVar,
 )
+
+REGISTERED_BY_SMACHPY = dict(REGISTERED)
 
 
 @pytest.fixture(autouse=True)
@@ -138,6 +141,14 @@ def test_any_nesting_of_them_does(value):
     assert same(through_json(value), value)
 
 
+def test_poses_of_earlier_journals_come_back():
+    REGISTERED.update(REGISTERED_BY_SMACHPY)
+    data = encode(Pose2D(1.0, 2.0, 0.5))
+    assert data["$type"] == "smachpy.places.pose:Pose2D"
+    data["$type"] = "smachpy.sim.geometry:Pose2D"
+    assert decode(data) == Pose2D(1.0, 2.0, 0.5)
+
+
 def test_what_comes_back_is_a_copy_that_can_change():
     array = np.zeros(3)
     kept = encode([array, {"a": [1]}])
@@ -147,6 +158,21 @@ def test_what_comes_back_is_a_copy_that_can_change():
     restored[1]["a"].append(2)
     assert decode(kept)[0][0] == 0.0
     assert decode(kept)[1] == {"a": [1]}
+
+
+@pytest.mark.parametrize("kind", [PoseStamped, Ros2PoseStamped])
+def test_a_message_whose_definition_has_changed_does_not_come_back(kind):
+    """A field `int32 n` that is `string n` now would get a number."""
+    data = encode([kind()])
+    data[0]["sum"] = "of another definition"
+    with pytest.raises(
+        JournalValueError, match=r"\$\[0\]: got a \S+ of another definition, of ano"
+    ):
+        decode(data)
+    data[0]["fields"]["pose"]["sum"] = "of another definition"
+    del data[0]["sum"]  # as in journals of earlier versions
+    with pytest.raises(JournalValueError, match=r"\$\[0\]\.pose: got a"):
+        decode(data)
 
 
 def test_message_fields_need_not_fit_the_wire():

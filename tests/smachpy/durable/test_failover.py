@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import tempfile
+import threading
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import smachpy
 from smachpy import CBState, StateMachine
 from smachpy.durable.journal import read_position
+from smachpy.durable.processes import this_runner
 from smachpy.durable.store import open_store
 from tests.postgres_server import PostgresServer
+from tests.smachpy.durable.test_stores import LONG_S, ROW
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -108,3 +113,66 @@ def test_a_server_restarts_under_a_running_mission(
     assert smachpy.run_durable(errand(restart), store, mission="m") == "done"
     assert read_position(store, "m").userdata["/ERRAND"] == {"parcel": 1}
     store.close()
+
+
+def crash_after(server: PostgresServer, kill_at: int) -> bool:
+    """Crash the server after that statement of one of four runners; return whether it came to it."""
+    url = server.new_database(f"queue_{kill_at}")
+    names = [f"m{n}" for n in range(8)]
+    with contextlib.closing(open_store(url)) as store:
+        for name in names:
+            store.create(replace(ROW, id=name, group="lift" if name == "m0" else None))
+    ran: list[str] = []
+    reached: list[int] = []
+    left = [kill_at]
+    barrier = threading.Barrier(4)
+
+    def runner(left: list[int] | None) -> None:
+        with contextlib.closing(open_store(url, patience=PATIENCE_S)) as store:
+            do = store._do
+
+            def counted(cursor: Any, sql: str, *values: object) -> None:
+                do(cursor, sql, *values)
+                assert left is not None
+                left[0] -= 1
+                if left[0] == 0:
+                    reached.append(len(ran))
+                    server.kill()
+                    server.start()
+
+            if left is not None:
+                store._do = counted
+            barrier.wait(PATIENCE_S)
+            while (found := store.reserve(this_runner(), seconds=LONG_S)) is not None:
+                row, lease = found
+                lease = store.claim(row.id, this_runner(), seconds=LONG_S, reserved=lease)
+                ran.append(row.id)
+                store.append(lease, [b"x"], status="ended", outcome="done")
+                store.release(lease, "ended")
+
+    threads = [threading.Thread(target=runner, args=(left if n == 0 else None,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(4 * PATIENCE_S)
+    assert sorted(ran) == names
+    with contextlib.closing(open_store(url)) as store:
+        assert {row.status for row in store.missions()} == {"ended"}
+        assert all(len(store.read(name)[1]) == 1 for name in names)
+    return bool(reached)
+
+
+@pytest.mark.postgres
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_each_mission_runs_once_if_the_database_is_killed_at_any_statement(folder: Path) -> None:
+    """Four runners share a queue; after each statement of one of them, the server crashes once."""
+    (folder / "own").mkdir()
+    folder.chmod(0o777)
+    server = PostgresServer(folder / "own")
+    server.start()
+    try:
+        # How many statements are that runner's depends on how quick the others are.
+        assert sum(crash_after(server, kill_at) for kill_at in range(1, 25)) >= 5
+    finally:
+        server.stop()

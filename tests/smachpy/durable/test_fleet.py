@@ -6,15 +6,20 @@ import contextlib
 import json
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
 from actionlib_core import node
 from smachpy.command import main
+from smachpy.command.durable import whole_target
+from smachpy.command.fleet import MAX_UNFIT_STARTS, _Rest
 from smachpy.durable.store import open_store
+from tests.smachpy.durable.test_stores import ROW
 
 pytestmark = pytest.mark.timeout(240)  # several processes after one another, on a busy computer
 
@@ -76,7 +81,17 @@ def submit(errand, place, name, *options):
 def runner(place, *options):
     """Start a runner with its processes in one group, as on one computer."""
     return subprocess.Popen(
-        [sys.executable, "-m", "smachpy.command", "runner", "--db", place, *options],
+        [
+            sys.executable,
+            "-m",
+            "smachpy.command",
+            "runner",
+            "--db",
+            place,
+            "--allow",
+            "/",
+            *options,
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -217,16 +232,96 @@ def test_a_robot_has_one_mission_at_a_time(errand, tmp_path):
     }
 
 
-def test_a_mission_that_cannot_run_here_is_left_for_a_while(errand, tmp_path):
+def test_a_mission_that_cannot_run_here_is_left_to_others(errand, tmp_path, capsys):
     place = str(tmp_path / "queue.db")
-    submit(errand, place, "a")
-    submit(errand, place, "b")
+    for name in "abcde":
+        submit(errand, place, name)
     errand.rename(tmp_path / "gone.py")
     process = runner(place, "--until-empty")
     output, _ = process.communicate(timeout=WITHIN_S)
+    assert process.returncode == 2, output  # work is left
+    assert statuses(place) == dict.fromkeys("abcde", ("queued", None))
+    assert output.count("begins") == 5
+    capsys.readouterr()
+    assert main(["missions", "list", "--durable", place]) == 0
+    assert "exit code 2" in capsys.readouterr().out
+
+
+def test_pauses_grow_with_each_attempt_that_fails():
+    rest, target_rest = _Rest(), _Rest()
+    pauses = []
+    for _ in range(2000):
+        rest.fail(100.0)
+        target_rest.fail(100.0, MAX_UNFIT_STARTS - 1)
+        pauses.append((rest.until - 100.0, target_rest.until - 100.0))
+    assert pauses[:4] == [(5.0, 0.0), (10.0, 0.0), (20.0, 5.0), (40.0, 10.0)]
+    assert pauses[-1] == (300.0, 300.0)
+
+
+@pytest.mark.slow
+def test_the_last_runner_resumes_what_died_before_it_ends(errand, tmp_path, capsys):
+    """The pause after an attempt that failed was taken for an empty queue."""
+    place = str(tmp_path / "queue.db")
+    submit(errand, place, "a")
+    process = runner(place, "--until-empty")
+    os.kill(pid_that(errand, "wait", "a"), signal.SIGKILL)
+    (tmp_path / "go_a").touch()
+    output, _ = process.communicate(timeout=WITHIN_S)
     assert process.returncode == 0, output
-    assert statuses(place) == {"a": ("queued", None), "b": ("queued", None)}
-    assert output.count("exit code 2") == 2
+    assert statuses(place) == {"a": ("ended", "done")}
+
+
+@pytest.mark.slow
+def test_each_mission_runs_once_while_runners_are_killed_and_others_start(
+    errand, tmp_path, store_place
+):
+    names = [f"m{n}" for n in range(12)]
+    for name in names:
+        submit(errand, store_place, name)
+        (tmp_path / f"go_{name}").touch()
+    runners = [runner(store_place) for _ in range(3)]
+    try:
+        for after in (1, 3, 5, 7):  # missions that have begun
+            until(lambda least=after: len(log_of(errand)) > 3 * least)
+            end(runners.pop(0))
+            runners.append(runner(store_place))
+        until(lambda: set(statuses(store_place).values()) == {("ended", "done")})
+    finally:
+        for one in runners:
+            end(one)
+    ran = [line[:2] for line in log_of(errand)]
+    assert sorted(ran) == sorted(
+        (what, name) for what in ("first", "wait", "end") for name in names
+    )
+
+
+@pytest.mark.slow
+def test_one_mission_that_cannot_be_started_stops_no_other(errand, tmp_path, capsys):
+    place = str(tmp_path / "queue.db")
+    store = open_store(place)
+    good = whole_target(str(errand))
+    schedule = {"every": "0 8 * * * Nowhere/Land", "due": 1.0}
+    store.create(replace(ROW, id="null", target=good, argv=("a\0b",), robot="r1"))
+    store.create(replace(ROW, id="long", target=good, argv=("x" * 200_000,), robot="r2"))
+    store.create(replace(ROW, id="zone", target=good, **schedule))
+    store.close()
+    raw = sqlite3.connect(place)
+    raw.execute("UPDATE smachpy_missions SET structure = 'text' WHERE id = 'null'")
+    raw.commit()
+    raw.close()
+    submit(errand, place, "good")
+    (tmp_path / "go_good").touch()
+    process = runner(place)
+    try:
+        until(lambda: statuses(place)["good"] == ("ended", "done"))
+    finally:
+        process.send_signal(signal.SIGTERM)
+        output, _ = process.communicate(timeout=WITHIN_S)
+    assert process.returncode == 0, output
+    assert "mission zone: its schedule is left to other runners" in output
+    assert output.count("mission zone") == 1
+    left = open_store(place).missions(statuses=["queued"])
+    assert {row.id for row in left} >= {"long", "zone"}
 
 
 def test_a_schedule_is_kept_and_shown(errand, tmp_path, capsys, monkeypatch):
@@ -255,6 +350,12 @@ def test_a_schedule_is_kept_and_shown(errand, tmp_path, capsys, monkeypatch):
         ["--every", "* * * * * Nowhere"],
         ["--at", "soon"],
         ["--at", "08:00", "--every", "* * * * *"],
+        ["--at", "2020-01-01T00:00"],
+        ["--at", "2100-01-02T00:00", "--not-after", "2100-01-01T00:00"],
+        ["--every", "* * * * *", "--not-after", "2100-01-01T00:00"],
+        ["--priority", "high"],
+        ["--priority", "1e3"],
+        ["--group", "no good"],
         ["--robot", "no good"],
         ["--input", "nothing=1"],
         ["--db", "mysql://db"],

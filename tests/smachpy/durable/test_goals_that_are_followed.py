@@ -212,6 +212,23 @@ def test_exec_timeout_counts_from_where_the_server_took_it(world: World) -> None
     assert world.clock.now() - begun == pytest.approx(6.0, abs=0.5)
 
 
+@pytest.mark.parametrize("world", ["own"], indirect=True)  # on ROS 2 feedback shows that it runs
+def test_exec_timeout_of_one_that_waits_at_the_server_begins_with_its_acceptance(
+    world: World,
+) -> None:
+    world.serve(accepts=False)
+    world.clock.call_later(1.0, lambda: world.handles[0].publish_feedback(Feedback(1)))
+    world.kill(exec_timeout=10.0)
+    visit = read_position(world.store, "m").visits["/M/GO"]
+    assert (visit["goal"]["taken_ns"] is not None, visit["goal"]["begun_ns"]) == (True, None)
+    world.clock.sleep(20.0)
+    machine = world.machine(exec_timeout=10.0)
+    world.clock.call_later(4.0, lambda: world.handles[0].set_accepted())
+    begun = world.clock.now()
+    assert world.run(machine) == "aborted"
+    assert world.clock.now() - begun == pytest.approx(14.0, abs=0.5)
+
+
 @pytest.mark.parametrize(
     ("options", "outcome", "sent"),
     [

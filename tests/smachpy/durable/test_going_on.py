@@ -13,9 +13,10 @@ from actionlib_core.node import use_node
 from smachpy import Concurrence, InvalidStateError, NotDurableError, State, StateMachine, events
 from smachpy.durable.journal import read_position
 from smachpy.durable.mission import MachineChangedError, OutageError
+from smachpy.durable.position import VERSION
 from smachpy.durable.store import FencedError, StoreError
+from smachpy.engine.preempt import asking
 from smachpy.exceptions import MissionError
-from smachpy.run.grace import asking
 from smachpy.states.questions import AnswerRefusedError, find_questions, give_answer
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 from tests.two_nodes import TwoNodes
@@ -442,6 +443,11 @@ def test_a_changed_machine_is_refused_with_the_differences(store: KillingStore) 
     assert go_on(store, changed, migrate={"/M/S0": "/M/S0"}) == "ok"
 
 
+def test_a_machine_that_names_other_outcomes_as_good_goes_on(store: KillingStore) -> None:
+    kill(store, machine_of(Doing(killed), success=["ok"]))
+    assert go_on(store, machine_of(Doing(fine), success=["ok", "late"])) == "ok"
+
+
 def test_a_path_that_moved_is_followed(store: KillingStore) -> None:
     def build(label: str, do: Any) -> StateMachine:
         machine = StateMachine(["ok", "skipped", "late"], name="M")
@@ -508,7 +514,7 @@ def test_an_entry_that_cannot_be_read_is_told(store: KillingStore, entry: bytes)
 
 def test_entries_of_a_newer_smachpy_are_not_read(store: KillingStore) -> None:
     kill(store, machine_of(Doing(killed)))
-    store.rows["m"] = dataclasses.replace(store.rows["m"], version=2)
+    store.rows["m"] = dataclasses.replace(store.rows["m"], version=VERSION + 1)
     before = list(store.entries["m"])
     with pytest.raises(StoreError, match="Try a newer smachpy") as caught:
         go_on(store, machine_of(Doing(fine)))
@@ -603,3 +609,48 @@ def test_the_id_of_a_mission_is_a_text(tmp_path: Path, mission: Any) -> None:
     with pytest.raises(InvalidStateError, match="run_durable: mission: got"):
         smachpy.run_durable(machine_of(Doing(fine)), tmp_path / "j.db", mission=mission)
     assert not (tmp_path / "j.db").exists()
+
+
+# -- keys with a dot ---------------------------------------------------------------------------
+
+
+def test_keys_with_a_dot_are_kept_and_constants_come_from_the_code(store: KillingStore) -> None:
+    """A dot once marked constants, so a key such as "arm.pose" was lost without a word."""
+
+    def build(do: Callable[..., str], speed: int) -> StateMachine:
+        keys: dict[str, Any] = {"output_keys": ["arm.pose"]}
+        machine = StateMachine(["ok"], name="M")
+        with machine:
+            measure = smachpy.CBState(measured, outcomes=["ok"], **keys)
+            StateMachine.add("MEASURE", measure, {"ok": "CARRY"}, constants={"speed": speed})
+            reads = {"input_keys": ["arm.pose", "speed"]}
+            carry = smachpy.CBState(do, outcomes=["ok"], **reads)
+            StateMachine.add("CARRY", carry, constants={"speed": speed})
+        return machine
+
+    def measured(userdata: Any) -> str:
+        userdata["arm.pose"] = [userdata.speed]
+        return "ok"
+
+    seen: list[Any] = []
+
+    def carried(userdata: Any) -> str:
+        seen.append((userdata["arm.pose"], userdata.speed))
+        return "ok"
+
+    kill(store, build(killed, 1))
+    assert read_position(store, "m").userdata["/M"] == {"arm.pose": [1]}  # type: ignore[arg-type]
+    assert go_on(store, build(carried, 2)) == "ok"
+    assert seen == [([1], 2)]
+
+
+def test_a_dot_does_not_take_a_key_past_the_check_of_typed_userdata() -> None:
+    class Facts:
+        count: int = 0
+
+    machine = StateMachine(["ok"], userdata_type=Facts)
+    with pytest.raises(smachpy.UserDataKeyError):
+        machine.userdata["arm.pose"] = 1
+    state = smachpy.CBState(fine, outcomes=["ok"], output_keys=["arm.pose"])
+    with pytest.raises(smachpy.InconsistentMachineError, match=r"arm\.pose"), machine:
+        StateMachine.add("A", state)

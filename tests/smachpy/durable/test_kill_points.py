@@ -25,7 +25,7 @@ LEAVES = st.sampled_from(["plain", "once", "retry", "list", "loop"])
 TREES: st.SearchStrategy[Tree] = st.recursive(
     st.tuples(LEAVES, st.just(())),
     lambda below: st.tuples(
-        st.sampled_from(["machine", "sequence", "concurrence", "iterator"]),
+        st.sampled_from(["machine", "sequence", "concurrence", "iterator", "tidied"]),
         st.lists(below, min_size=1, max_size=3).map(tuple),
     ),
     max_leaves=6,
@@ -97,6 +97,8 @@ def build(tree: Tree, world: World, name: str = "M") -> Any:
                 Sequence.add(f"S{number}", child)
     else:
         container = StateMachine(["ok"], **keys)
+        if kind == "tidied" and len(children) > 1:
+            container.add_cleanup("LAST", children.pop())
         last = len(children) - 1
         with container:
             for number, child in enumerate(children):

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
 
-from smachpy.durable.schedule import (
-    ScheduleError,
-    due_schedules,
-    next_due,
-    next_mission,
-    next_time,
-    read_time,
-)
+from smachpy.durable.processes import this_runner
+from smachpy.durable.schedule import ScheduleError, next_due, next_of, read_time
 from smachpy.durable.store import open_store
 from tests.smachpy.durable.test_stores import ROW
 
@@ -25,53 +20,25 @@ def row(id, **changes):  # noqa: A002
     return replace(ROW, id=id, created=NOW - 100, changed=NOW - 100, **changes)
 
 
-@pytest.mark.parametrize(
-    ("rows", "robots", "expected"),
-    [
-        ([], (), None),
-        ([row("a"), row("b", due=NOW - 200)], (), "b"),
-        ([row("a", due=NOW + 1)], (), None),
-        ([row("a"), row("b", status="interrupted")], (), "b"),
-        ([row("a", status="running"), row("b", status="ended")], (), None),
-        ([row("a", every="* * * * *", due=NOW - 1)], (), None),
-        ([row("a"), row("b", robot="r1"), row("c", robot="r2")], ("r2",), "c"),
-        ([row("a", robot="r1")], (), "a"),
-        ([row("a", robot="r1", status="running"), row("b", robot="r1")], (), None),
-        ([row("a", robot="r1", status="interrupted"), row("b", robot="r1")], ("r1",), "a"),
-    ],
-)
-def test_what_was_begun_comes_first_then_what_is_due_longest(rows, robots, expected):
-    found = next_mission(rows, NOW, robots)
-    assert (found and found.id) == expected
-
-
-def test_a_runner_leaves_what_it_could_not_run():
-    assert next_mission([row("a"), row("b")], NOW, (), {"a"}).id == "b"
-
-
-def test_the_next_time_to_look_is_when_something_is_due():
-    rows = [row("a", due=NOW + 50), row("b", due=NOW + 5, status="ended"), row("c", due=NOW - 1)]
-    assert next_time(rows, NOW) == NOW + 50
-    assert next_time(rows[1:], NOW) is None
-
-
 def test_a_schedule_begins_one_mission_however_long_nobody_looked(tmp_path):
     store = open_store(tmp_path / "journal.db")
     schedule = row("night", due=NOW - 3 * 86400, every="0 9 * * *", argv=("--x",), robot="r1")
-    store.create(schedule)
-    ((found, begun, due),) = due_schedules(store.missions(), NOW)
+    schedule = store.create(replace(schedule, priority=3, group="lift"))
+    (found,) = store.look().schedules
+    begun, due = next_of(found, NOW)
     assert (found, due) == (schedule, NOW + 86400)
     assert begun.id == "night-20260324T090000Z"
     assert (begun.every, begun.schedule, begun.argv, begun.robot) == (None, "night", ("--x",), "r1")
+    assert (begun.priority, begun.group) == (3, "lift")
     # Two runners that saw the same begin it once.
     assert store.begin_next(begun, due=found.due, next_due=due) is True
     assert store.begin_next(begun, due=found.due, next_due=due) is False
     assert {each.id: each.due for each in store.missions()} == {"night": due, begun.id: found.due}
-    assert due_schedules(store.missions(), NOW) == []
-    assert next_mission(store.missions(), NOW, ()).id == begun.id
     store.request_cancel("night")
     assert store.begin_next(replace(begun, id="x"), due=due, next_due=due + 1) is False
     assert [each.id for each in store.missions(open_only=True)] == [begun.id]
+    assert store.look().schedules == ()
+    assert store.reserve(this_runner(), seconds=1)[0].id == begun.id
     store.close()
 
 
@@ -117,6 +84,35 @@ def test_times_of_a_person():
     )
     local = datetime(2026, 3, 28, 8, 30).timestamp()  # noqa: DTZ001
     assert read_time("2026-03-28 08:30", NOW) == read_time("2026-03-28T08:30", NOW) == local
+
+
+@pytest.fixture
+def berlin(monkeypatch):
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.mark.parametrize(
+    ("text", "now"),
+    [
+        ("2026-03-29T02:30", NOW),
+        ("02:30", datetime(2026, 3, 28, 12, 0, tzinfo=UTC).timestamp()),
+        ("02:30", datetime(2026, 3, 28, 23, 30, tzinfo=UTC).timestamp()),
+    ],
+)
+def test_a_time_that_the_clocks_skip_is_refused(berlin, text, now):
+    with pytest.raises(ScheduleError, match="put forward"):
+        read_time(text, now)
+    assert read_time("2026-03-29T02:30+01:00", NOW) == NOW + 40.5 * 3600
+
+
+def test_a_time_that_has_passed_is_refused():
+    with pytest.raises(ScheduleError, match=r"--not-after: got .*a time in the future"):
+        read_time("2026-03-27T08:59:59Z", NOW, "--not-after")
+    assert read_time("2026-03-27T09:00:00Z", NOW) == NOW
 
 
 @pytest.mark.parametrize(

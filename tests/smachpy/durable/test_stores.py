@@ -88,24 +88,50 @@ def store(store_place):
 
 
 def test_a_mission_is_read_as_it_was_created(store):
-    row = replace(ROW, robot="robot_3", due=5.5, every="0 8 * * *")
-    store.create(row)
-    assert store.mission("m1") == row
-    assert store.missions() == [row]
+    facts = {"due": 5.5, "every": "0 8 * * *", "priority": 3, "not_after": 7.0, "group": "lift"}
+    row = replace(ROW, robot="robot_3", drives="robot_4", **facts)
+    made = store.create(row)
+    assert made == replace(row, created=made.created, changed=made.created)
+    assert store.mission("m1") == store.find("m1") == made
+    assert store.missions() == [made]
     assert store.read("m1") == (None, [])
+    assert store.find("m2") is None
 
 
-def test_missions_are_listed_from_the_oldest_on(store):
-    for number in (3, 1, 2):
-        store.create(replace(ROW, id=f"m{number}", created=float(number)))
-    assert [row.id for row in store.missions()] == ["m1", "m2", "m3"]
+def test_a_mission_is_created_at_the_time_of_the_stores_clock(store):
+    """A submitter whose clock is an hour ahead delayed its mission by an hour."""
+    for number, created in (("1", 4e9), ("2", 2.0), ("3", 3.0)):
+        store.create(replace(ROW, id=f"m{number}", created=created, changed=created))
+    rows = store.missions()
+    assert [row.id for row in rows] == ["m1", "m2", "m3"]
+    assert rows[0].created < 3e9
+    assert store.reserve(this_runner(), seconds=LONG_S)[0].id == "m1"
+
+
+def test_a_list_has_the_newest_missions_and_filters(store):
+    for number in range(5):
+        robot = "r1" if number % 2 else None
+        store.create(replace(ROW, id=f"m{number}", target=f"{number // 2}.py", robot=robot))
+    store.request_cancel("m3")
+
+    def ids(**options):
+        return [row.id for row in store.missions(**options)]
+
+    assert ids(limit=2) == ["m3", "m4"]
+    assert ids(limit=2, skip=2) == ["m1", "m2"]
+    assert ids(limit=None) == ["m0", "m1", "m2", "m3", "m4"]
+    assert ids(open_only=True, limit=2) == ["m2", "m4"]
+    assert ids(robot="/r1") == ["m1", "m3"]
+    assert ids(target="1.py") == ["m2", "m3"]
+    assert ids(statuses=["cancelled"]) == ["m3"]
+    assert ids(statuses=["ended"]) == []
 
 
 def test_an_id_is_taken_once(store):
-    store.create(ROW)
+    made = store.create(ROW)
     with pytest.raises(MissionError, match="m1"):
         store.create(replace(ROW, created=2.0))
-    assert store.mission("m1") == ROW
+    assert store.mission("m1") == made
 
 
 @pytest.mark.parametrize(
@@ -332,8 +358,8 @@ def test_two_that_open_a_new_store_at_once_both_get_it(store_place):
         thread.join()
     try:
         assert errors == []
-        opened[0].create(ROW)
-        assert all(store.mission("m1") == ROW for store in opened)
+        made = opened[0].create(ROW)
+        assert all(store.mission("m1") == made for store in opened)
     finally:
         for store in opened:
             store.close()

@@ -1,0 +1,350 @@
+"""Requests to stop, and kills at every write around them: none is lost, none comes back."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+
+import smachpy
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
+from smachpy import Concurrence, Iterator, State, StateMachine
+from tests.smachpy.durable.killing_store import Kill, KillingStore
+
+ENDS = ["done", "cleaned", "preempted"]
+REQUEST_S = 5.0
+
+
+class Work(State):
+    """Works for ten seconds, or until it is asked to stop; what it returned is in `ends`."""
+
+    def __init__(self, ends, name, outcomes=("done", "preempted"), seconds=10.0):
+        super().__init__(outcomes)
+        self.ends, self.name, self.seconds = ends, name, seconds
+
+    def execute(self, userdata):
+        stopped = self.sleep(self.seconds)
+        outcome = self.end(stopped=stopped)
+        self.ends.append(f"{self.name} {outcome}")
+        return outcome
+
+    def end(self, *, stopped):
+        return "preempted" if stopped else "done"
+
+
+class Finishes(Work):
+    """Has finished its work when it is asked to stop."""
+
+    def end(self, *, stopped):
+        return "done"
+
+
+def cleans_up(ends, kind=Work, **options):
+    """DRIVE, after which comes a tidy-up if it was stopped, and more work after that."""
+    sm = StateMachine(ENDS, name="M", **options)
+    sm.add("DRIVE", kind(ends, "DRIVE"), {"preempted": "HOME"})
+    sm.add("HOME", Work(ends, "HOME"), {"done": "LOOK"})
+    sm.add("LOOK", Work(ends, "LOOK"), {"done": "cleaned"})
+    return sm
+
+
+def within(inner):
+    sm = StateMachine(ENDS, name="R")
+    sm.add("M", inner)
+    return sm
+
+
+def beside(inner):
+    both = Concurrence(ENDS, "preempted", outcome_map={o: {"M": o} for o in ENDS})
+    both.add("M", inner)
+    sm = StateMachine(ENDS, name="R")
+    sm.add("BOTH", both)
+    return sm
+
+
+def for_each(inner):
+    each = Iterator(ENDS, [], [], it=[1], exhausted_outcome="done")
+    each.set_contained_state("M", inner, ["done"], ["cleaned", "preempted"])
+    sm = StateMachine(ENDS, name="R")
+    sm.add("EACH", each)
+    return sm
+
+
+SHAPES = {
+    "root": (cleans_up, "/M"),
+    "nested": (lambda *a, **o: within(cleans_up(*a, **o)), "/R/M"),
+    "branch": (lambda *a, **o: beside(cleans_up(*a, **o)), "/R/BOTH/M"),
+    "item": (lambda *a, **o: for_each(cleans_up(*a, **o)), "/R/EACH/M"),
+}
+
+
+def of_the_run(sm, _path):
+    sm.request_preempt(by="the door sensor")
+
+
+def of_a_container(sm, path):
+    sm.control.preempt(path)
+
+
+def of_a_leaf(sm, path):
+    sm.control.preempt(f"{path}/DRIVE")
+
+
+def forced(sm, path):
+    sm.control.force_outcome(f"{path}/DRIVE", "done")
+
+
+def jumped(sm, path):
+    sm.control.jump(f"{path}/LOOK")
+
+
+def paused(sm, _path):
+    sm.control.pause(running="cancel")
+    sm._smachpy.live.frame.run.clock.call_later(3.0, sm.control.resume)
+
+
+REQUESTS = [of_the_run, of_a_container, of_a_leaf, forced, jumped, paused]
+
+
+def live(make, path, ask, ends, store):
+    """Run, or go on, in a process of its own; None: it was killed."""
+    sm = make(ends)
+    written = any(b'"PreemptRequested"' in entry for entry in store.entries.get("m", ()))
+
+    def request():
+        with contextlib.suppress(Kill, smachpy.SmachError):  # it ends, or DRIVE has ended
+            ask(sm, path)
+
+    with VirtualClock() as clock, use_clock(clock):
+        if ask is not None and not written:
+            clock.call_later(REQUEST_S, request)
+        try:
+            return smachpy.run_durable(sm, store, mission="m")
+        except Kill:
+            return None
+
+
+def lives(make, path, ask=None):
+    """Yield, for a kill at each write, where it was, and what it ended with after the resume."""
+    calm, store = [], KillingStore()
+    expected = live(make, path, ask, calm, store)
+    yield "never", expected, calm
+    for kill_at in range(1, store.writes):
+        for written in (False, True):
+            ends, killed = [], KillingStore()
+            killed.arm(kill_at, written=written)
+            if live(make, path, ask, ends, killed) is None and killed.rows["m"].status != "ended":
+                killed.arm(0, written=False)
+                yield (kill_at, written), live(make, path, ask, ends, killed), ends
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("ask", REQUESTS)
+def test_a_request_comes_once_however_often_the_process_is_killed(shape, ask):
+    """HOME was stopped as well, by the request that DRIVE had serviced long before."""
+    make, path = SHAPES[shape]
+    found = list(lives(make, path, ask))
+    _, expected, calm = found[0]
+    assert "HOME preempted" not in calm
+    for place, outcome, ends in found[1:]:
+        assert outcome == expected, (place, ends)
+        assert ends[-1] == calm[-1], (place, ends)
+
+
+# A timer's thread writes to the journal, and is killed there, as all others.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_timeout_comes_once_however_often_the_process_is_killed(shape):
+    make, path = SHAPES[shape]
+    found = list(lives(lambda ends: make(ends, timeout=5.0, timeout_outcome="preempted"), path))
+    _, expected, calm = found[0]
+    for place, outcome, ends in found[1:]:
+        assert outcome == expected, (place, ends)
+        assert not [end for end in ends if end in {"HOME preempted", "LOOK preempted"}], place
+        assert ends[-1] == calm[-1], (place, ends)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_work_that_a_pause_did_not_stop_is_not_done_again_after_a_kill(shape):
+    make, path = SHAPES[shape]
+    for place, outcome, ends in lives(lambda ends: make(ends, Finishes), path, paused):
+        assert outcome == "done", (place, ends)
+
+
+def stopped_by_a_sibling(ends):
+    both = Concurrence(
+        ENDS,
+        "preempted",
+        outcome_map={o: {"M": o} for o in ENDS},
+        child_termination_cb=lambda _: True,
+    )
+    both.add("M", cleans_up(ends))
+    both.add("WATCH", Work([], "WATCH", seconds=REQUEST_S))
+    sm = StateMachine(ENDS, name="R")
+    sm.add("BOTH", both)
+    return sm
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_sibling_stops_a_child_once_however_often_the_process_is_killed():
+    """The resumed run called the callback for the ended sibling again, which stopped HOME."""
+    found = list(lives(stopped_by_a_sibling, ""))
+    _, expected, calm = found[0]
+    assert expected == "cleaned"
+    for place, outcome, ends in found[1:]:
+        assert outcome == expected, (place, ends)
+        assert not [end for end in ends if end in {"HOME preempted", "LOOK preempted"}], place
+        assert ends[-1] == calm[-1], (place, ends)
+
+
+class Deaf(Work):
+    """Does not hear that it is asked to stop, and finishes its work just after that."""
+
+    def execute(self, userdata):
+        current_clock().sleep(REQUEST_S + 1.0)
+        self.ends.append(f"{self.name} done")
+        return "done"
+
+
+class Serves(Work):
+    """Services the request, and has finished its work: its container goes on."""
+
+    def end(self, *, stopped):
+        if stopped:
+            self.service_preempt()
+        return "done"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize(("kind", "outcome"), [(Deaf, "preempted"), (Serves, "cleaned")])
+def test_a_sibling_s_end_reaches_a_branch_that_is_quicker_after_a_kill(kind, outcome):
+    """The branch had ended, and begun its next child, before the sibling's end was seen again."""
+
+    def machine(ends):
+        branch = StateMachine(ENDS, name="M")
+        branch.add("DRIVE", kind(ends, "DRIVE"), {"done": "LOOK"})
+        branch.add("LOOK", Work(ends, "LOOK"), {"done": "cleaned"})
+        both = Concurrence(
+            ENDS,
+            "preempted",
+            outcome_map={o: {"M": o} for o in ENDS},
+            child_termination_cb=lambda _: True,
+        )
+        both.add("M", branch)
+        both.add("WATCH", Work([], "WATCH", seconds=REQUEST_S))
+        sm = StateMachine(ENDS, name="R")
+        sm.add("BOTH", both)
+        return sm
+
+    for place, ended, ends in lives(machine, ""):
+        assert ended == outcome, (place, ends)
+        assert ("LOOK done" in ends) is (outcome == "cleaned"), (place, ends)
+
+
+# -- requests that a state withdraws ---------------------------------------------------------------
+
+
+class Recalls(Work):
+    """Withdraws each request to stop, and finishes its work; `ends` has when it heard of one."""
+
+    def execute(self, userdata):
+        end = current_clock().now() + self.seconds
+        while current_clock().now() < end:
+            if self.sleep(end - current_clock().now()):
+                self.recall_preempt()
+                self.ends.append(f"{self.name} heard")
+        self.ends.append(f"{self.name} done")
+        return "done"
+
+
+def is_written(store, kind):
+    return any(f'"kind":"{kind}"'.encode() in entry for entry in store.entries.get("m", ()))
+
+
+def timed_out(sm, _path):
+    """Nobody asks: a timeout does."""
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("ask", [of_the_run, of_a_container, of_a_leaf, timed_out])
+def test_a_request_that_a_state_has_withdrawn_does_not_come_back_after_a_kill(shape, ask):
+    make, path = SHAPES[shape]
+    options = {"timeout": REQUEST_S, "timeout_outcome": "preempted"} if ask is timed_out else {}
+
+    def build(ends):
+        return make(ends, Recalls, **options)
+
+    calm = []
+    store = KillingStore()
+    expected = live(build, path, ask, calm, store)
+    assert calm[:2] == ["DRIVE heard", "DRIVE done"]
+    late = 0
+    for kill_at in range(1, store.writes):
+        for written in (False, True):
+            ends, killed = [], KillingStore()
+            killed.arm(kill_at, written=written)
+            if (
+                live(build, path, ask, ends, killed) is not None
+                or killed.rows["m"].status == "ended"
+            ):
+                continue
+            withdrawn = is_written(killed, "Recalled")
+            before = len(ends)
+            killed.arm(0, written=False)
+            assert live(build, path, ask, ends, killed) == expected, (kill_at, written, ends)
+            if withdrawn:
+                late += 1
+                assert "DRIVE heard" not in ends[before:], (kill_at, written, ends)
+            assert "DRIVE done" in ends, (kill_at, written, ends)
+    assert late  # kills came after the state had withdrawn the request
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_state_that_withdraws_its_own_timeout_goes_on_after_a_kill():
+    def build(ends):
+        sm = StateMachine([*ENDS, "aborted"], name="M")
+        sm.add(
+            "DRIVE",
+            Recalls(ends, "DRIVE", ("done", "preempted", "aborted"), seconds=20.0),
+            {"done": "LOOK"},
+        )
+        smachpy.set_options(sm["DRIVE"], timeout=REQUEST_S)
+        sm.add("LOOK", Work(ends, "LOOK"))
+        return sm
+
+    for place, outcome, ends in lives(build, "/M"):
+        assert outcome == "done", (place, ends)
+        assert "DRIVE done" in ends
+
+
+# -- time that an operator takes -------------------------------------------------------------------
+
+HELD_S = 100.0
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("shape", SHAPES)
+def test_time_at_the_gate_does_not_count_after_a_kill_either(shape):
+    """DRIVE takes 10 s, HOME 10 s and LOOK 10 s of 40 s; an operator holds HOME for 100 s."""
+    make, path = SHAPES[shape]
+
+    def build(ends):
+        return make(ends, Quick, timeout=40.0, timeout_outcome="preempted")
+
+    def hold(sm, _path):
+        sm.control.pause()
+        sm._smachpy.live.frame.run.clock.call_later(HELD_S, sm.control.resume)
+
+    found = list(lives(build, path, hold))
+    assert found[0][1] == "cleaned"
+    for place, outcome, ends in found[1:]:
+        assert outcome == "cleaned", (place, ends)
+
+
+class Quick(Work):
+    """Its work is done once it has ended 'preempted', so that HOME follows."""
+
+    def end(self, *, stopped):
+        assert not stopped
+        return "preempted"
