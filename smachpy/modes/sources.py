@@ -1,0 +1,115 @@
+"""Where events come from: topics, services and signals, while the modes run."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+from actionlib_core.clock import RealClock
+from actionlib_core.inputs.expression import Expression
+from smachpy.base import log
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class Source(Protocol):
+    """Something that can trigger events."""
+
+    def open(self, trigger: Callable[[str], bool]) -> Callable[[], object]:
+        """Begin to call `trigger` with events; return a function that ends that."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Topic:
+    topic: str
+    kind: Any
+    event: str
+    when: Expression | None
+
+    def open(self, trigger: Callable[[str], bool]) -> Callable[[], object]:
+        from actionlib_core.pubsub.topic import Subscriber
+
+        before = False
+
+        def take(message: Any) -> None:
+            nonlocal before
+            holds = self.when is None or bool(self.when(message))
+            # A condition triggers when it begins to hold: a joystick sends 50 times a second.
+            if holds and (self.when is None or not before):
+                trigger(self.event)
+            before = holds
+
+        return Subscriber(self.topic, self.kind, take).unregister
+
+
+@dataclass(frozen=True, slots=True)
+class _Service:
+    name: str
+    event: str
+
+    def open(self, trigger: Callable[[str], bool]) -> Callable[[], object]:
+        from actionlib_core.interfaces.std_srvs.srv import Trigger, TriggerResponse
+        from actionlib_core.pubsub.service import Service
+
+        def handle(_request: Any) -> Any:
+            done = trigger(self.event)
+            text = "" if done else f"{self.event!r} means nothing in this mode"
+            return TriggerResponse(success=done, message=text)
+
+        return Service(self.name, Trigger, handle).shutdown
+
+
+@dataclass(frozen=True, slots=True)
+class _Signal:
+    number: signal.Signals
+    event: str
+
+    def open(self, trigger: Callable[[str], bool]) -> Callable[[], object]:
+        if threading.current_thread() is not threading.main_thread():
+            log.logwarn(
+                f"modes: {self.number.name} triggers nothing: they do not run in the main thread."
+            )
+            return lambda: None
+
+        def note(_number: int, _frame: object) -> None:
+            # The interrupted code may hold any lock: another thread passes it on.
+            RealClock().spawn(partial(trigger, self.event), name=f"event {self.event}")
+
+        before = signal.signal(self.number, note)
+        return lambda: signal.signal(self.number, before)
+
+
+def on_topic(topic: str, msg_type: Any, event: str, when: str = "") -> Source:
+    """Return a source: messages of a topic trigger an event.
+
+    Args:
+        topic: Name of the topic.
+        msg_type: Its class.
+        event: The event.
+        when: An expression over the message, such as "percentage < 0.2": triggers when it begins to
+            hold. "" triggers with every message.
+
+    Raises:
+        ExpressionError: `when` cannot be parsed.
+    """
+    return _Topic(topic, msg_type, event, Expression(when) if when else None)
+
+
+def on_service(name: str, event: str) -> Source:
+    """Return a source: a call of the service `name` (std_srvs/Trigger) triggers an event.
+
+    The response says whether it meant something.
+    """
+    return _Service(name, event)
+
+
+def on_signal(number: signal.Signals | int, event: str) -> Source:
+    """Return a source: a signal of the process, such as `signal.SIGUSR1`, triggers an event.
+
+    Threads: only modes that run in the main thread get signals.
+    """
+    return _Signal(signal.Signals(number), event)

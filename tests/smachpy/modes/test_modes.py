@@ -1,0 +1,513 @@
+"""Modes: events move a robot from mode to mode, one mission at a time, and a stop is never lost."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import warnings
+from typing import Any
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import smachpy
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from actionlib_core.interfaces.std_srvs.srv import Trigger
+from smachpy import Concurrence, State, StateMachine
+from smachpy.checks import check
+from smachpy.modes import Modes, ModesError, Table, on_service, on_signal, on_topic
+from smachpy.testing import explore, mission_kit
+
+
+class Step(State):
+    def __init__(self, seconds: float = 1.0) -> None:
+        super().__init__(["done", "preempted"])
+        self.seconds = seconds
+
+    def execute(self, userdata: Any) -> str:
+        return "preempted" if self.sleep(self.seconds) else "done"
+
+
+class Counting(Step):
+    def __init__(self, seconds: float) -> None:
+        super().__init__(seconds)
+        self.register_io_keys(["index"])
+
+    def execute(self, userdata: Any) -> str:
+        outcome = super().execute(userdata)
+        if outcome == "done":
+            userdata.index += 1
+        return outcome
+
+
+def mission(cleanup: float = 2.0) -> StateMachine:
+    sm = StateMachine(["done", "preempted"], userdata={"index": 0})
+    sm.add("A", Counting(10.0), {"done": "B"})
+    sm.add("B", Counting(10.0))
+    sm.add_cleanup("DOCK", Step(cleanup))
+    return sm
+
+
+WAYS = [
+    ["start", "idle", "auto"],
+    ["joy", "auto", "teleop"],
+    ["free", "teleop", "auto"],
+    ["low", "*", "charging"],
+    ["done", "auto", "idle"],
+    ["full", "charging", "idle"],
+    ["reset", "estop", "idle"],
+]
+
+
+def robot(resume: bool = False, **options: Any) -> Modes:
+    states = [
+        "idle",
+        {"name": "auto", "mission": mission, "resume": resume},
+        "teleop",
+        {"name": "charging", "mission": mission},
+        "estop",
+    ]
+    return Modes(states, WAYS, emergency="estop", name="ROBOT", **options)
+
+
+def run_of(modes: Modes, *events: tuple[float, Any], end: float) -> Any:
+    with mission_kit() as kit:
+        for at, event in events:
+            kit.trigger(event, at=at)
+        kit.preempt(at=end)
+        return kit(modes)
+
+
+def leaves(run: Any) -> list[str]:
+    return [path.removeprefix("/ROBOT/") for path in run.path]
+
+
+def test_an_event_starts_a_mission_and_its_end_leads_on():
+    run = run_of(robot(), (5.0, "start"), end=40.0)
+    assert leaves(run) == ["idle", "auto/A", "auto/B", "auto/DOCK", "idle"]
+    assert run.outcome == "preempted"
+
+
+def test_leaving_a_mode_waits_for_the_clean_up_of_its_mission():
+    run = run_of(robot(), (5.0, "start"), (8.0, "joy"), end=40.0)
+    assert leaves(run) == ["idle", "auto/A", "auto/DOCK", "teleop"]
+    begins = {event.path: event.t for event in run.events if type(event).__name__ == "Entered"}
+    start = run.events[0].t
+    assert begins["/ROBOT/teleop"] - start == 10.0
+
+
+def test_a_mission_without_resume_begins_anew():
+    run = run_of(robot(), (0.5, "start"), (12.0, "joy"), (20.0, "free"), end=25.0)
+    assert leaves(run)[-2:] == ["auto/A", "auto/DOCK"]
+
+
+def test_a_mission_with_resume_goes_on_where_it_was_with_its_userdata():
+    modes = robot(resume=True)
+    run = run_of(modes, (0.5, "start"), (12.0, "joy"), (20.0, "free"), end=60.0)
+    assert leaves(run) == [
+        *("idle", "auto/A", "auto/B", "auto/DOCK", "teleop"),
+        *("auto/B", "auto/DOCK", "idle"),
+    ]
+    assert modes["auto"].userdata["index"] == 2
+
+
+def test_after_its_end_a_resumed_mission_begins_anew():
+    modes = robot(resume=True)
+    events = [(0.5, "start"), (12.0, "joy"), (20.0, "free"), (40.0, "start")]
+    run = run_of(modes, *events, end=80.0)
+    assert leaves(run)[-4:] == ["auto/A", "auto/B", "auto/DOCK", "idle"]
+    assert modes["auto"].userdata["index"] == 2
+
+
+def test_an_event_that_means_nothing_changes_nothing():
+    heard = []
+    modes = robot()
+    run = run_of(modes, (1.0, lambda m: heard.append(m.trigger("joy"))), end=5.0)
+    assert heard == [False]
+    assert leaves(run) == ["idle"]
+    assert not modes.trigger("start")
+
+
+def test_the_last_of_several_events_counts():
+    run = run_of(robot(), (1.0, "start"), (2.0, "joy"), (2.5, "free"), (3.0, "low"), end=60.0)
+    assert leaves(run)[:4] == ["idle", "auto/A", "auto/DOCK", "charging/A"]
+
+
+def test_the_mode_is_that_of_the_last_event():
+    modes = robot()
+    seen = []
+    note = lambda m: seen.append(m.mode)  # noqa: E731
+    run_of(modes, (1.0, "start"), (1.1, note), (2.0, "joy"), (2.1, note), end=9.0)
+    assert seen == ["auto", "teleop"]
+
+
+def test_an_exception_of_a_mission_does_not_end_the_modes():
+    @smachpy.state(["done"])
+    def broken(userdata):
+        raise OSError("no motor")
+
+    def made():
+        sm = StateMachine(["done"])
+        sm.add("A", broken)
+        return sm
+
+    modes = Modes(
+        ["idle", {"name": "auto", "mission": made}, "fault"],
+        [["start", "idle", "auto"], ["error", "auto", "fault"]],
+        name="ROBOT",
+    )
+    assert leaves(run_of(modes, (1.0, "start"), end=5.0)) == ["idle", "auto/A", "fault"]
+
+
+def test_conditions_of_ways_read_the_userdata():
+    ways = [
+        {"trigger": "go", "source": "a", "dest": "b", "when": "level > 3"},
+        {"trigger": "go", "source": "a", "dest": "c"},
+    ]
+    for level, expected in [(5, "b"), (1, "c")]:
+        modes = Modes(["a", "b", "c"], ways, userdata={"level": level}, name="ROBOT")
+        assert leaves(run_of(modes, (1.0, "go"), end=2.0)) == ["a", expected]
+
+
+def test_conditions_count_for_the_end_of_a_mission_too():
+    ways = [
+        ["start", "idle", "auto"],
+        ["done", "auto", "charging", "battery < 0.3"],
+        ["done", "auto", "teleop"],
+    ]
+    states = ["idle", {"name": "auto", "mission": mission}, "charging", "teleop"]
+    for battery, after in ((0.2, "charging"), (0.9, "teleop"), (None, "teleop")):
+        userdata = {} if battery is None else {"battery": battery}
+        modes = Modes(states, ways, userdata=userdata, name="ROBOT")
+        assert leaves(run_of(modes, (1.0, "start"), end=60.0))[-1] == after
+
+
+def test_modes_in_modes_share_the_ways_of_those_around_them():
+    states = ["idle", {"name": "manual", "children": ["slow", "fast"], "initial": "slow"}]
+    ways = [
+        ["take", "idle", "manual"],
+        ["faster", "manual_slow", "manual_fast"],
+        ["leave", "manual", "idle"],
+        ["leave", "manual_fast", "manual_slow"],
+    ]
+    modes = Modes(states, ways, name="ROBOT")
+    events = [(1.0, "take"), (2.0, "faster"), (3.0, "leave"), (4.0, "leave")]
+    run = run_of(modes, *events, end=5.0)
+    assert leaves(run) == ["idle", "manual_slow", "manual_fast", "manual_slow", "idle"]
+
+
+# -- the emergency stop ------------------------------------------------------------------------
+
+
+def stop(modes: Modes) -> None:
+    modes.emergency_stop("button")
+
+
+def entered_after(run: Any, seconds: float, until: float) -> list[str]:
+    start = run.events[0].t
+    return [
+        event.path
+        for event in run.events
+        if type(event).__name__ == "Entered" and seconds < event.t - start < until
+    ]
+
+
+def test_an_emergency_stop_stops_at_once_and_holds_everything_until_its_release():
+    modes = robot()
+    seen = []
+    events = [
+        (1.0, "start"),
+        (4.0, stop),
+        (5.0, "joy"),
+        (6.0, lambda m: seen.append(m.mode)),
+        (30.0, "reset"),
+    ]
+    run = run_of(modes, *events, end=60.0)
+    assert seen == ["estop"]
+    assert entered_after(run, 4.0, 30.0) == []
+    assert leaves(run) == ["idle", "auto/A", "auto/DOCK", "idle"]
+    left = [e.t - run.events[0].t for e in run.events if type(e).__name__ == "Left"]
+    assert 4.0 in left
+
+
+def test_it_stops_a_clean_up_too_which_begins_again_after_the_release():
+    events = [(1.0, "start"), (4.0, "joy"), (5.0, stop), (30.0, "reset")]
+    run = run_of(robot(), *events, end=60.0)
+    assert entered_after(run, 5.0, 30.0) == []
+    assert leaves(run) == ["idle", "auto/A", "auto/DOCK", "auto/DOCK", "idle"]
+
+
+def test_what_was_stopped_can_go_on():
+    events = [(1.0, "start"), (4.0, stop), (30.0, lambda m: m.release())]
+    run = run_of(robot(), *events, end=90.0)
+    assert leaves(run) == ["idle", "auto/A", "auto/A", "auto/B", "auto/DOCK", "idle"]
+
+
+def test_it_holds_also_before_the_run():
+    modes = robot()
+    modes.emergency_stop()
+    run = run_of(modes, (5.0, "start"), (10.0, "reset"), (11.0, "start"), end=20.0)
+    assert entered_after(run, -1.0, 9.9) == []
+    assert "auto/A" in leaves(run)
+
+
+def test_it_ends_with_the_run_and_with_the_pause_that_it_is():
+    modes = robot()
+    run_of(modes, (1.0, "start"), (4.0, stop), end=10.0)
+    assert modes.mode == "idle"
+    run = run_of(
+        modes,
+        *[(1.0, "start"), (4.0, stop), (5.0, lambda m: m.control.resume()), (6.0, "joy")],
+        *[
+            (10.0, lambda m: m.control.pause()),
+            (11.0, "free"),
+            (12.0, lambda m: m.control.resume()),
+        ],
+        end=20.0,
+    )
+    assert leaves(run) == ["idle", "auto/A", "auto/A", "auto/DOCK", "teleop", "auto/A", "auto/DOCK"]
+
+
+def test_a_second_stop_is_not_released_with_the_first():
+    modes = robot()
+    first = []
+
+    def between(m: Modes) -> None:
+        held = m.control.emergency()
+        m.emergency_stop("second")
+        m.control.end_emergency(held)
+        first.append(m.mode)
+
+    run = run_of(modes, (1.0, "start"), (4.0, stop), (5.0, between), (20.0, "reset"), end=60.0)
+    assert first == ["estop"]
+    assert entered_after(run, 4.0, 20.0) == []
+    assert leaves(run)[-1] == "idle"
+
+
+def test_what_one_run_wanted_does_not_reach_the_next():
+    modes = robot(resume=True)
+    run_of(modes, (1.0, "start"), (13.0, "joy"), (14.0, "low"), end=14.5)
+    run = run_of(modes, (1.0, "start"), end=5.0)
+    assert leaves(run)[:2] == ["idle", "auto/A"]
+
+
+def test_it_is_told_to_all_leaves_before_it_returns():
+    both = Concurrence(["done", "preempted"], "done")
+    told = []
+
+    class Deaf(State):
+        def __init__(self, name: str) -> None:
+            super().__init__(["done", "preempted"])
+            self.name = name
+
+        def execute(self, userdata: Any) -> str:
+            self.on_preempt(lambda: None)
+            self.wait_preempt()
+            return "preempted"
+
+    both.add("A", Deaf("a"))
+    both.add("B", Deaf("b"))
+    modes = Modes([{"name": "auto", "mission": both}, "estop"], [], emergency="estop")
+
+    def act(m: Modes) -> None:
+        m.emergency_stop()
+        told.extend(state.preempt_requested() for state in both.get_children().values())
+
+    run_of(modes, (1.0, act), end=30.0)
+    assert told == [True, True]
+
+
+# -- sources -----------------------------------------------------------------------------------
+
+
+def test_a_topic_triggers_when_its_condition_begins_to_hold():
+    listen = [on_topic("battery", BatteryState, "low", "percentage < 0.2")]
+    modes = robot(listen=listen)
+    with mission_kit() as kit:
+        battery = kit.topic("battery", BatteryState)
+        for at, level in [(1.0, 0.5), (2.0, 0.1), (3.0, 0.1)]:
+            battery.publish_at(at, BatteryState(percentage=level))
+        kit.preempt(at=6.0)
+        run = kit(modes)
+    assert leaves(run)[:2] == ["idle", "charging/A"]
+    assert run.visits("charging") == 1
+
+
+def test_a_service_triggers_and_says_whether_it_meant_something():
+    modes = robot(listen=[on_service("start", "start"), on_service("joy", "joy")])
+    answers = []
+
+    def call(_modes: Modes) -> None:
+        def ask() -> None:
+            from actionlib_core.pubsub.service_proxy import ServiceProxy
+
+            for name in ("joy", "start"):
+                proxy = ServiceProxy(name, Trigger, node=kit.node)
+                proxy.wait_for_service(2.0)
+                answers.append(proxy().success)
+
+        kit.clock.spawn(ask, name="caller")
+
+    with mission_kit() as kit:
+        kit.trigger(call, at=1.0)
+        kit.preempt(at=8.0)
+        run = kit(modes)
+    assert answers == [False, True]
+    assert "auto/A" in leaves(run)
+
+
+def test_a_signal_triggers():
+    modes = robot(listen=[on_signal(signal.SIGUSR1, "start")])
+    handler = signal.getsignal(signal.SIGUSR1)
+
+    def act(event: Any) -> None:
+        if type(event).__name__ == "Entered":
+            if event.path == "/ROBOT/idle":
+                signal.raise_signal(signal.SIGUSR1)
+            elif event.path == "/ROBOT/auto/A":
+                threading.Thread(target=modes.request_preempt).start()
+
+    modes.subscribe(act)
+    assert modes.execute() == "preempted"
+    assert signal.getsignal(signal.SIGUSR1) is handler
+
+
+# -- structure ---------------------------------------------------------------------------------
+
+
+def test_it_is_described_drawn_and_checked():
+    modes = robot()
+    edges = {
+        (edge.source, edge.outcome, edge.target) for edge in smachpy.describe(modes).transitions
+    }
+    assert {
+        ("idle", "start", "auto"),
+        ("auto", "joy", "teleop"),
+        ("auto", "low", "charging"),
+    } <= edges
+    assert "teleop" in modes._repr_svg_()
+    assert [p.rule for p in check(modes).problems if p.severity == "error"] == []
+
+
+def test_a_mode_that_no_event_reaches_is_found():
+    modes = Modes(["a", "b", "c"], [["go", "a", "b"], ["go", "b", "a"]], name="ROBOT")
+    assert [
+        p.rule for p in check(modes).problems if p.path == "/ROBOT/c" and p.severity == "error"
+    ] == ["unreachable-state"]
+
+
+def test_exploration_tries_orders_of_events():
+    paths = set()
+
+    def note(run: Any) -> None:
+        paths.update(run.path)
+
+    modes = [["go", "a", "b"], ["back", "b", "a"], ["on", "b", "c"]]
+    explore(
+        lambda: Modes(["a", "b", "c"], modes, name="R"), invariants=[note], max_runs=50, max_depth=6
+    )
+    assert paths == {"/R/a", "/R/b", "/R/c"}
+
+
+def test_all_problems_of_a_table_come_at_once():
+    with pytest.raises(ModesError) as caught:
+        Table(
+            ["idle", "idle", {"name": "x", "misson": 1}, 3],
+            [
+                ["go", "idle", "auot"],
+                ["a"],
+                {"trigger": "b", "source": "idle", "dest": "x", "when": "("},
+            ],
+            "none",
+        )
+    assert len(caught.value.problems) == 7
+    assert "Did you mean 'mission'?" in str(caught.value)
+
+
+def test_a_machine_of_transitions_can_be_given():
+    from transitions import Machine
+
+    machine = Machine(
+        states=["idle", "auto"], transitions=[["start", "idle", "auto"]], initial="idle"
+    )
+    modes = Modes.from_machine(machine, {"auto": mission}, name="ROBOT")
+    assert leaves(run_of(modes, (1.0, "start"), end=5.0))[:2] == ["idle", "auto/A"]
+    with pytest.raises(ModesError, match="missions"):
+        Modes.from_machine(machine, {"aut": mission})
+
+
+def test_a_way_is_not_for_a_mode_whose_name_only_begins_with_that_of_its_source():
+    ways = [["stop", "auto", "idle"]]
+    table = Table(["auto", "auto_return", {"name": "manual", "children": ["slow"]}, "idle"], ways)
+    assert set(table.ways) == {("auto", "stop")}
+
+
+@pytest.mark.parametrize(
+    ("states", "rows", "problem"),
+    [
+        (["a"], [["x", "a", "*"]], "got mode '\\*'"),
+        (["a"], [["x", 3, "a"]], "transition 'x': source: got 3"),
+        (["a"], [["x", ["a", 3], "a"]], "transition 'x': source: got"),
+        ([{"name": "a", "children": [3]}], [], "states: got 3"),
+        ([{"name": "a", "children": "bc"}], [], "a: children: got 'bc'"),
+    ],
+)
+def test_what_no_table_can_hold_is_refused(states, rows, problem):
+    with pytest.raises(ModesError, match=problem):
+        Modes(states, rows)
+
+
+# -- random modes, random missions -------------------------------------------------------------
+
+EVENTS = st.sampled_from(["start", "joy", "free", "low", "full", "reset", "stop", "go on"])
+TIMES = st.lists(st.tuples(st.floats(0.01, 60.0), EVENTS), max_size=12)
+
+
+# The same mode again, and another event as that one's clean-up ends.
+@example([(1.0, "start"), (2.0, "low"), (22.0, "low"), (25.0, "full")], False, 3.0)
+@example([(1.0, "stop"), (1.0, "low")], False, 0.5)
+@example([(1.0, "start"), (22.0, "joy")], False, 20.0)
+@settings(max_examples=60, deadline=None)
+@given(TIMES, st.booleans(), st.sampled_from([0.5, 3.0, 20.0]))
+def test_one_mission_at_a_time_one_clean_up_each_and_no_stop_is_lost(events, resume, cleanup):
+    modes = Modes(
+        [
+            "idle",
+            {"name": "auto", "mission": lambda: mission(cleanup), "resume": resume},
+            "teleop",
+            {"name": "charging", "mission": lambda: mission(cleanup)},
+            "estop",
+        ],
+        WAYS,
+        emergency="estop",
+        name="ROBOT",
+    )
+    special = {"stop": stop, "go on": lambda m: m.release()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        acts = [(at, special.get(event, event)) for at, event in events]
+        run = run_of(modes, *acts, end=200.0)
+    active: list[str] = []  # modes with a mission that run
+    cleaned = 0
+    for event in run.events:
+        kind, parts = type(event).__name__, event.path.split("/")
+        mode = parts[2] if len(parts) > 2 else ""
+        if mode not in {"auto", "charging"}:
+            continue
+        if kind == "Entered" and len(parts) == 3:
+            assert active == []
+            active, cleaned = [mode], 0
+        elif kind == "Entered":
+            assert active == [mode]
+        elif kind == "Left" and parts[3:] == ["DOCK"] and event.outcome == "done":
+            cleaned += 1
+        elif kind == "Left" and len(parts) == 3:
+            assert cleaned == 1 or run.events[-1].t - event.t < 60.0
+            active = []
+    start = run.events[0].t
+    stops = [at for at, event in events if event == "stop"]
+    for at in stops:
+        releases = [t for t, event in events if event in {"reset", "go on"} and t >= at]
+        assert entered_after(run, at, min([*releases, 200.0])) == []
+    assert start <= run.events[-1].t
