@@ -1,0 +1,314 @@
+"""Writes a machine as a mission file; says what cannot be written."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smachpy.exceptions import MissionError
+from smachpy.files.reading import ItemsOf, StopOthers
+from smachpy.files.reference import Origin
+from smachpy.machines.concurrence import Concurrence
+from smachpy.machines.container import Container
+from smachpy.machines.iterator import Iterator
+from smachpy.machines.state import FunctionState, State
+from smachpy.machines.state_machine import Sequence, StateMachine
+from smachpy.userdata.user_data import ConstantKey, data_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from collections.abc import Sequence as SequenceOf
+
+PLAIN = (str, int, float, bool, type(None))
+
+
+class NotWrittenError(MissionError):
+    """A machine has parts that no file can name.
+
+    Try: give the parts that are listed a name that can be imported, or leave them in Python.
+
+    Attributes:
+        problems: The parts, as texts.
+    """
+
+    def __init__(self, problems: SequenceOf[str]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(problems))
+
+
+def write(machine: StateMachine, path: str | Path | None = None) -> str:
+    """Write a machine as a mission file; return the text.
+
+    States must be named by a file that was loaded, or be functions and classes of a module that can
+    be imported, made without arguments. Comments and the order of a file that is there already are
+    kept where its parts stay.
+
+    Args:
+        machine: A state machine.
+        path: Where to write it; None only returns the text.
+
+    Raises:
+        NotWrittenError: some parts cannot be written; all at once, nothing was written.
+        OSError: the file cannot be written.
+    """
+    from ruamel.yaml import YAML
+
+    writer = _Writer()
+    name, about = machine.name or "SM_ROOT", machine._smachpy.made_from
+    shown = about if isinstance(about, dict) else {}  # of the file that it was loaded from
+    data = {"name": name, **shown, **writer.container(machine, f"/{name}")}
+    if writer.problems:
+        raise NotWrittenError(writer.problems)
+    yaml = YAML()
+    yaml.width = 120
+    old: Any = None
+    if path is not None and Path(path).is_file():
+        old = yaml.load(Path(path).read_text(encoding="utf-8"))
+    if isinstance(old, dict):
+        for key in ("smachpy", "help", "parameters"):
+            if key in old:
+                data = {**data, key: old[key]}
+        _merge(old, data)
+        data = old
+    stream = io.StringIO()
+    yaml.dump(data, stream)
+    text = stream.getvalue()
+    if path is not None:
+        Path(path).write_text(text, encoding="utf-8")
+    return text
+
+
+def _merge(old: Any, new: Mapping[str, Any]) -> None:
+    """Make `old`, which has comments, equal to `new`."""
+    for key in [key for key in old if key not in new]:
+        del old[key]
+    for key, value in new.items():
+        if isinstance(value, dict) and isinstance(old.get(key), dict):
+            _merge(old[key], value)
+        elif isinstance(old.get(key), str) and "${" in old[key]:
+            continue  # the value of a parameter
+        elif key not in old or old[key] != value:
+            old[key] = value
+
+
+class _Writer:
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+
+    def _refuse(self, path: str, what: str) -> None:
+        self.problems.append(f"{path}: {what}")
+
+    def container(self, container: Container, path: str) -> dict[str, Any]:
+        """Return the section of a container."""
+        data: Any = container._smachpy
+        if data.start_cbs or data.transition_cbs or data.termination_cbs:
+            self._refuse(path, "got callbacks; expected none.")
+        if type(container) not in {StateMachine, Sequence, Concurrence, Iterator}:
+            self._refuse(
+                path, f"got a {type(container).__name__}; expected a container of smachpy."
+            )
+            return {}
+        found: dict[str, Any] = {"outcomes": list(data.outcomes)}
+        for key in ("input_keys", "output_keys"):
+            if getattr(data, key):
+                found[key] = list(getattr(data, key))
+        values = {
+            k: v for k, v in data_of(container.userdata).items() if type(k) is not ConstantKey
+        }
+        values |= data.begins_with
+        if values:
+            found["userdata"] = {
+                k: self._plain(v, f"{path}: userdata {k}") for k, v in values.items()
+            }
+        found |= self._options(container, path)
+        if isinstance(container, Iterator):
+            return found | self._iterator(container, path)
+        if isinstance(container, Concurrence):
+            found |= self._policy(container, path)
+        if isinstance(container, Sequence):
+            found["connector"] = data.connector_outcome
+        return found | self._children(container, path)
+
+    def _children(self, container: Container, path: str) -> dict[str, Any]:
+        """Return the states and the clean-up."""
+        data: Any = container._smachpy
+        others, found = data.others(), dict[str, Any]()
+        if isinstance(container, StateMachine) and data.initial != next(iter(others), None):
+            found["initial"] = data.initial
+        found["states"] = {
+            label: self._entry(container, label, state, f"{path}/{label}")
+            for label, state in others.items()
+        }
+        if data.cleanup:
+            state = data.children[data.cleanup]
+            entry = self._entry(container, data.cleanup, state, f"{path}/{data.cleanup}")
+            found["cleanup"] = {data.cleanup: entry}
+        return found
+
+    def _entry(self, parent: Container, label: str, state: State, path: str) -> dict[str, Any]:
+        data: Any = parent._smachpy
+        found = self._state(state, path)
+        names = data.remappings[label]
+        constants = {
+            key: data_of(parent.userdata)[name]
+            for key, name in names.items()
+            if type(name) is ConstantKey
+        }
+        renamed = {key: name for key, name in names.items() if type(name) is not ConstantKey}
+        if renamed:
+            found["remapping"] = renamed
+        if constants:
+            found["constants"] = {k: self._plain(v, f"{path}: {k}") for k, v in constants.items()}
+        transitions = getattr(data, "transitions", {}).get(label, {})
+        guards = getattr(data, "guards", {}).get(label, {})
+        if transitions:
+            found["on"] = {
+                outcome: self._target(target, guards.get(outcome, ()), outcome, path)
+                for outcome, target in transitions.items()
+            }
+        return found
+
+    def _target(self, target: str | None, cases: Any, outcome: str, path: str) -> Any:
+        if not cases:
+            return target
+        rows = []
+        for case in cases:
+            if not isinstance(case.condition, str):
+                self._refuse(
+                    path, f"got the function {case.text!r} as a condition; expected a text."
+                )
+            rows.append({"when": case.text, "to": case.target})
+        return [*rows, {"to": target or outcome}]
+
+    def _state(self, state: State, path: str) -> dict[str, Any]:
+        origin = state._smachpy.made_from
+        origin = getattr(origin, "origin", origin)
+        if isinstance(origin, Origin):
+            found: dict[str, Any] = {origin.kind: origin.name}
+            if origin.arguments:
+                found["with"] = dict(origin.arguments)
+            return {**found, **origin.keys, **origin.options}
+        if isinstance(state, Container):
+            kinds = {
+                StateMachine: "machine",
+                Sequence: "sequence",
+                Concurrence: "concurrence",
+                Iterator: "iterator",
+            }
+            return {kinds.get(type(state), "machine"): self.container(state, path)}
+        name = self._name(state)
+        if name is None:
+            self._refuse(
+                path,
+                f"got a {type(state).__name__} made by code; expected a state of a module, made "
+                "without arguments, or a registered one. Try a function in a module that returns "
+                "it.",
+            )
+            return {}
+        return {
+            "state": name,
+            "outcomes": list(state._smachpy.outcomes),
+            **self._options(state, path),
+        }
+
+    def _name(self, state: State) -> str | None:
+        """Return `module:Name` of a state, if importing that gives an equal one."""
+        if isinstance(state, FunctionState):
+            function: Any = state.__wrapped__
+            module, name = function.__module__, function.__qualname__
+            there = _attribute(module, name)
+            same = isinstance(there, FunctionState) and there.__wrapped__ is function
+            return f"{module}:{name}" if same else None
+        kind = type(state)
+        if _attribute(kind.__module__, kind.__qualname__) is not kind:
+            return None
+        try:
+            fresh = kind()
+        except Exception:  # noqa: BLE001  it needs arguments: told by the caller
+            return None
+        own = {k: v for k, v in vars(state).items() if not k.startswith("_smachpy")}
+        plain = {k: v for k, v in vars(fresh).items() if not k.startswith("_smachpy")}
+        same = own == plain and state._smachpy.outcomes == fresh._smachpy.outcomes
+        return f"{kind.__module__}:{kind.__qualname__}" if same else None
+
+    def _options(self, state: State, path: str) -> dict[str, Any]:
+        options = state._smachpy.options
+        found: dict[str, Any] = {}
+        if options.timeout is not None:
+            found |= {"timeout": options.timeout, "timeout_outcome": options.timeout_outcome}
+        if options.preempt_timeout != "inherit":
+            found["preempt_timeout"] = options.preempt_timeout
+        if options.retry is not None:
+            retry = options.retry
+            found["retry"] = {
+                "attempts": retry.attempts,
+                "backoff": retry.backoff,
+                "on": self._plain(retry.on, f"{path}: retry: on"),
+            }
+        for name in ("on_exception", "on_enter", "on_exit", "on_resume"):
+            if getattr(options, name):
+                self._refuse(path, f"{name}: got code; expected none.")
+        if options.resume is not None:
+            found["resume"] = self._plain(options.resume, f"{path}: resume")
+        if options.idempotent:
+            found["idempotent"] = True
+        if options.transient:
+            found["transient"] = list(options.transient)
+        return found
+
+    def _policy(self, container: Concurrence, path: str) -> dict[str, Any]:
+        data = container._smachpy
+        found: dict[str, Any] = {"default_outcome": data.default_outcome}
+        if data.outcome_cb is not None:
+            self._refuse(path, "outcome_cb: got a function; expected rules.")
+        stop = data.child_termination_cb
+        if isinstance(stop, StopOthers):
+            found["stop_others"] = True if stop.labels is None else list(stop.labels)
+        elif stop is not None:
+            self._refuse(path, "child_termination_cb: got a function; expected `stop_others`.")
+        rules: dict[str, Any] = {}
+        for outcome, rule in data.rules:
+            if outcome in rules:
+                self._refuse(path, f"got two rules for {outcome!r}; expected one.")
+            of = {k: list(w) if len(w) > 1 else w[0] for k, w in rule.conditions}
+            is_all = rule.need == len(rule.conditions)
+            rules[outcome] = of if is_all else {"need": rule.need, "of": of}
+        if rules:
+            found["outcome_map"] = rules
+        return found
+
+    def _iterator(self, container: Iterator, path: str) -> dict[str, Any]:
+        data = container._smachpy
+        found: dict[str, Any] = {"item_key": data.items_label, "exhausted": data.exhausted_outcome}
+        if isinstance(data.items, ItemsOf):
+            found["items_from"] = data.items.key
+        elif isinstance(data.items, (list, tuple, range)):
+            found["items"] = [self._plain(one, f"{path}: items") for one in data.items]
+        else:
+            self._refuse(path, "items: got code; expected a list.")
+        for key in ("loop_outcomes", "break_outcomes"):
+            if getattr(data, key):
+                found[key] = list(getattr(data, key))
+        if data.final_outcome_map:
+            found["final_outcomes"] = dict(data.final_outcome_map)
+        ((label, state),) = data.children.items()
+        return {**found, "each": {label: self._entry(container, label, state, f"{path}/{label}")}}
+
+    def _plain(self, value: Any, where: str) -> Any:
+        if isinstance(value, (list, tuple)):
+            return [self._plain(one, where) for one in value]
+        if isinstance(value, dict) and all(isinstance(key, str) for key in value):
+            return {key: self._plain(one, where) for key, one in value.items()}
+        if not isinstance(value, PLAIN):
+            self._refuse(where, f"got a {type(value).__name__}; expected plain data.")
+            return None
+        return value
+
+
+def _attribute(module: str, name: str) -> Any:
+    found: Any = sys.modules.get(module)
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    return found

@@ -1,0 +1,87 @@
+"""The commands that take, list, write and begin mission files."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from smachpy.command import main
+from smachpy.files import load
+from tests.smachpy.files.test_reading import GOOD
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_new_begins_a_file_that_check_finds_good(folder, capsys):
+    assert main(["new", "first.yaml"]) == 0
+    assert load(folder / "first.yaml").name == "FIRST"
+    assert main(["check", "first.yaml"]) == 0
+    assert main(["new", "first.yaml"]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_run_takes_its_parameters(folder, capsys):
+    (folder / "rounds.yaml").write_text(GOOD)
+    words = ["run", "rounds.yaml", "--time", "virtual", "--plain", "--input", "seconds=5.0"]
+    assert main(words) == 0
+    assert "done after 9.00 s" in capsys.readouterr().out
+
+
+def test_mistakes_are_told_all_at_once_with_their_lines(folder, capsys):
+    (folder / "bad.yaml").write_text("outcomes: [done]\nstates: {A: {state: wat}}\nnam: x\n")
+    assert main(["run", "bad.yaml"]) == 2
+    said = capsys.readouterr().err
+    assert "bad.yaml:2:14: states.A.state" in said
+    assert "bad.yaml:3:1: nam" in said
+
+
+def test_a_file_that_is_not_there_names_the_nearest(folder, capsys):
+    (folder / "rounds.yaml").write_text(GOOD)
+    assert main(["check", "round.yaml"]) == 2
+    assert "Did you mean 'rounds.yaml'?" in capsys.readouterr().err
+
+
+def test_check_refuses_the_code_that_a_run_would_refuse(folder, capsys, monkeypatch):
+    (folder / "code.yaml").write_text(
+        "outcomes: [done]\nstates:\n  A: {state: 'antigravity:fly', on: {done: done}}\n"
+    )
+    monkeypatch.delitem(sys.modules, "antigravity", raising=False)
+    assert main(["check", "code.yaml"]) == 2
+    assert "code.yaml:3:7: states.A.state: got 'antigravity'" in capsys.readouterr().err
+    assert main(["check", "code.yaml", "--allow", "antigravity"]) == 0
+    assert main(["render", "code.yaml", "-o", "code.svg"]) == 0  # it is only looked at
+    assert "antigravity" not in sys.modules
+
+
+def test_simulate_takes_a_file_and_the_packages_that_it_may_name(folder, capsys):
+    (folder / "code.yaml").write_text(
+        "outcomes: [done, preempted]\nstates:\n  A: {state: 'smachpy.states:Wait', with: {seconds: 3}, on: {done: done}}\n"
+    )
+    words = ["simulate", "code.yaml", "--runs", "2", "--jobs", "1"]
+    assert main(words) == 2
+    assert "Try --allow smachpy" in capsys.readouterr().err
+    assert main([*words, "--allow", "smachpy"]) == 0
+    assert "done x2" in capsys.readouterr().out
+
+
+def test_states_are_listed_and_shown(capsys):
+    assert main(["states", "list"]) == 0
+    assert "drive_to" in capsys.readouterr().out
+    assert main(["states", "show", "wait"]) == 0
+    assert "seconds: How long [s]" in capsys.readouterr().out
+    assert main(["states", "show", "wayt"]) == 2
+    assert "Did you mean 'wait'?" in capsys.readouterr().err
+
+
+def test_export_writes_a_file_and_says_what_it_cannot(folder, capsys):
+    (folder / "rounds.yaml").write_text(GOOD)
+    assert main(["export", "rounds.yaml", "-o", "other.yaml"]) == 0
+    assert load(folder / "other.yaml").name == "ROUNDS"
+    assert main(["export", "patrol", "-o", "patrol.yaml"]) == 2
+    assert "/PATROL/ROUND" in capsys.readouterr().err
+    assert not (folder / "patrol.yaml").exists()

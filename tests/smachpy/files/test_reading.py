@@ -1,0 +1,347 @@
+"""Mission files: what they build, what is refused and where, and that loading runs no code."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+import smachpy
+from smachpy.checks import check
+from smachpy.files import MissionFileError, load, read, resolve
+from smachpy.files.reference import ResolveError
+from smachpy.testing import explore, mission_kit
+
+HERE = Path(__file__).parent
+
+GOOD = """\
+name: ROUNDS
+help: Counts, then waits.
+parameters:
+  seconds: {type: number, default: 2.0, unit: s, help: how long}
+  last: {type: whole, default: 3}
+outcomes: [done, preempted]
+userdata: {count: 0, last: "${last}"}
+states:
+  COUNT:
+    state: compute
+    with: {count: count + 1}
+    on:
+      done:
+        - {when: count >= last, to: BOTH}
+        - {to: COUNT}
+  BOTH:
+    concurrence:
+      outcomes: [done, preempted]
+      default_outcome: done
+      outcome_map: {done: {need: 1, of: {A: done, B: done}}}
+      stop_others: true
+      states:
+        A: {state: wait, with: {seconds: "${seconds}"}}
+        B: {state: wait, with: {seconds: 60}}
+    on: {done: EACH}
+  EACH:
+    iterator:
+      outcomes: [done, preempted]
+      items: [1, 2]
+      each:
+        PART:
+          sequence:
+            outcomes: [done, preempted]
+            connector: done
+            states:
+              X: {state: wait, with: {seconds: 1}}
+              Y: {state: wait, with: {seconds: 1}, timeout: 5, retry: {attempts: 2, on: [aborted]}, on: {aborted: done}}
+cleanup:
+  TIDY: {state: set, with: {count: 0}}
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(text: str, name: str = "mission.yaml") -> Path:
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def problems_of(path: Path, **arguments) -> list[str]:
+    with pytest.raises(MissionFileError) as caught:
+        load(path, **arguments)
+    return [problem.removeprefix(f"{path}:") for problem in caught.value.problems]
+
+
+def test_all_kinds_of_containers_run(file):
+    with mission_kit() as mission:
+        run = mission(load(file(GOOD)))
+    assert (run.outcome, run.duration) == ("done", 6.0)
+    assert run.visits("COUNT") == 3
+    assert run.userdata["count"] == 0
+
+
+def test_the_public_name_loads_too(file):
+    assert smachpy.load(file(GOOD)).name == "ROUNDS"
+
+
+def test_parameters_change_it_and_are_described(file):
+    path = file(GOOD)
+    with mission_kit() as mission:
+        run = mission(load(path, seconds=5.0, last=1))
+    assert (run.duration, run.visits("COUNT")) == (9.0, 1)
+    text, parameters = read(path)
+    assert text == "Counts, then waits."
+    assert [(one.name, one.type, one.unit) for one in parameters] == [
+        ("seconds", "number", "s"),
+        ("last", "whole", ""),
+    ]
+
+
+def test_wrong_parameters_are_all_told(file):
+    path = file(GOOD)
+    assert problems_of(path, seconds="x", lst=3) == [
+        (
+            "3:1: parameters: got an argument 'lst'; expected one of ['last', 'seconds']. "
+            "Did you mean 'last'?"
+        ),
+        "4:3: parameters.seconds: got 'x'; expected a number [s].",
+    ]
+
+
+def test_a_required_parameter_is_asked_for(file):
+    text = "outcomes: [done, preempted]\nparameters: {n: {type: number}}\nstates:\n  A: {state: wait}\n"
+    assert problems_of(file(text)) == [
+        "2:14: parameters.n: got no value; expected one, it is required."
+    ]
+
+
+def test_every_mistake_has_its_place_and_a_suggestion(file):
+    path = file(
+        """\
+nam: X
+outcomes: [done, preempted]
+states:
+  A:
+    state: wayt
+    on: {done: B}
+  B:
+    state: wait
+    with: {secnds: 3}
+    on:
+      done:
+        - {when: "x <", to: A}
+        - {to: A}
+  C: {state: wait, with: {seconds: "${m}"}, timeot: 3}
+  D: {mission: ../x.yaml}
+  E: {mission: mission.yaml}
+  F: {plan: nothing.pnml}
+  G: {machine: {outcomes: [x], states: {Q: {state: wait, on: {done: nowhere}}}}}
+  H: {}
+  I: {state: wait, machine: {}}
+  J: {state: set, on: {done: [{to: A}, {to: B}]}}
+"""
+    )
+    found = problems_of(path)
+    begins = [
+        "1:1: nam: got an unknown field",
+        "5:5: states.A.state: got 'wayt'",
+        "9:5: states.B.with: wait: got 'secnds'",
+        "12:12: states.B.on.done[0].when: condition",
+        "14:27: states.C.with.seconds: got '${m}'",
+        "14:45: states.C.timeot: got an unknown field",
+        "15:7: states.D.mission: got '../x.yaml', which is not in",
+        "16:7: states.E.mission: got 'mission.yaml', which contains this file",
+        "17:7: states.F.plan: got 'nothing.pnml', which is no file",
+        "18:41: states.G.machine.states.Q: transition 'done' leads nowhere",
+        "19:3: states.H: got no kind of state",
+        "20:20: states.I.machine: got ['state', 'machine']",
+        "21:31: states.J.on.done[0]: got a case without a condition before the last",
+    ]
+    assert [begin for begin, one in zip(begins, found, strict=True) if begin not in one] == []
+    assert "Did you mean 'name'?" in found[0]
+    assert "Did you mean 'seconds'?" in found[2]
+    assert "Did you mean 'timeout'?" in found[5]
+
+
+def test_a_transition_from_an_unknown_outcome_is_told_with_its_line(file):
+    text = "outcomes: [done, preempted]\nstates:\n  A: {state: wait, on: {dne: done}}\n"
+    (problem,) = problems_of(file(text))
+    assert problem.startswith("3:3: states.A: transition from an unknown outcome: got 'dne'")
+
+
+# -- code --------------------------------------------------------------------------------------
+
+NAMES_CODE = """\
+outcomes: [enough, preempted]
+userdata: {count: 0}
+states:
+  COUNT:
+    state: some_states:Count
+    on: {more: COUNT, enough: enough}
+"""
+
+
+@pytest.fixture
+def with_code(file, tmp_path):
+    shutil.copy(HERE / "own_states.py", tmp_path / "some_states.py")
+    yield file
+    sys.modules.pop("some_states", None)
+
+
+def test_nothing_is_imported_before_it_runs(with_code):
+    machine = load(with_code(NAMES_CODE))
+    smachpy.describe(machine)
+    assert check(machine).ok
+    machine._repr_svg_()
+    explore(machine)
+    assert "some_states" not in sys.modules
+    assert machine.execute() == "enough"
+    assert "some_states" in sys.modules
+
+
+def test_a_function_with_arguments_makes_a_state(with_code):
+    text = "outcomes: [done, preempted]\nstates:\n  A: {state: 'some_states:step', with: {seconds: 7}, outcomes: [done, preempted]}\n"
+    with mission_kit() as mission:
+        assert mission(load(with_code(text))).duration == 7.0
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("some_states:Cont", "Did you mean 'Count'?"),
+        ("some_states:NUMBER", "it is ready|expected none|made 3|got"),
+        ("some_state:Count", "which is not in"),
+        ("os:system", "which is not in .*Try --allow os"),
+        ("smachpy.states:Wait", "Try --allow smachpy"),
+        ("..some_states:Count", "which is not in"),
+        (":Count", "got '', which is not in .*expected a module there.\nMore"),
+        ("some_states:os.getcwd", "got 'os', which is not in .*Try --allow os"),
+        ("some_states:State", "got 'smachpy.*which is not in .*Try --allow smachpy"),
+        ("some_states:step.__globals__.clear", "got '__globals__'"),
+    ],
+)
+def test_code_that_cannot_be_used_is_refused_before_anything_starts(with_code, name, problem):
+    path = with_code(NAMES_CODE.replace("some_states:Count", name))
+    with pytest.raises(
+        (MissionFileError, ResolveError), match=f"5:5: states.COUNT.state: .*({problem})"
+    ):
+        load(path).execute()
+
+
+def test_an_allowed_package_gives_only_its_own_code(file, tmp_path):
+    arguments = f"with: {{path: '{tmp_path / 'made'}'}}"
+    text = f"outcomes: [done]\nstates:\n  A: {{state: 'smachpy.base.log:logging.os.mkdir', {arguments}, on: {{done: done}}}}\n"
+    with pytest.raises(ResolveError, match="Try --allow logging"):
+        load(file(text), allow=["smachpy"]).execute()
+    assert not (tmp_path / "made").exists()
+
+
+def test_an_allowed_package_may_be_named(file):
+    text = "outcomes: [done, preempted]\nstates:\n  A: {state: 'smachpy.states:Wait', with: {seconds: 0}, outcomes: [done, preempted]}\n"
+    path = file(text)
+    assert load(path, allow=["smachpy"]).execute() == "done"
+    assert load(path, to_run=False)["A"].get_registered_outcomes() == ("done", "preempted")
+    with pytest.raises(ResolveError, match="Try --allow smachpy"):
+        resolve(load(path, to_run=False))
+
+
+def test_outcomes_that_the_code_does_not_have_are_refused(with_code):
+    path = with_code(NAMES_CODE.replace("more: COUNT", "less: COUNT"))
+    machine = load(path)
+    with pytest.raises(ResolveError, match="less"):
+        machine.execute()
+    assert machine["COUNT"].get_registered_outcomes() == ("less", "enough")
+
+
+def test_a_module_of_the_standard_library_is_not_taken_for_one_of_the_folder(file, tmp_path):
+    (tmp_path / "json.py").write_text("raise SystemExit")
+    text = NAMES_CODE.replace("some_states:Count", "json:loads")
+    with pytest.raises(ResolveError, match=r"which is .* already"):
+        load(file(text)).execute()
+
+
+# -- other files -------------------------------------------------------------------------------
+
+
+def test_another_mission_is_a_state_with_arguments(file):
+    file(GOOD, "inner.yaml")
+    outer = file(
+        "outcomes: [done, preempted]\nstates:\n"
+        "  IN: {mission: inner.yaml, with: {seconds: 1.0, last: 1}, on: {done: done}}\n",
+        "outer.yaml",
+    )
+    with mission_kit() as mission:
+        assert mission(load(outer)).duration == 5.0
+
+
+def test_mistakes_in_another_mission_have_its_place(file):
+    file("outcomes: [done]\nstates: {A: {state: wat}}\n", "inner.yaml")
+    outer = file("outcomes: [done]\nstates:\n  IN: {mission: inner.yaml}\n", "outer.yaml")
+    (problem,) = problems_of(outer)
+    assert "inner.yaml:2:14: states.A.state" in problem
+
+
+@pytest.mark.parametrize("name", ["../x.yaml", "/etc/passwd", "a/../../x.yaml", "link.yaml"])
+def test_files_outside_of_the_folder_are_refused(file, tmp_path, name):
+    (tmp_path / "link.yaml").symlink_to("/etc/hostname")
+    text = f"outcomes: [done]\nstates:\n  A: {{mission: {name}}}\n"
+    (problem,) = problems_of(file(text))
+    assert "which is not in" in problem
+
+
+@pytest.mark.parametrize("name", ['"a\\0b"', "a" * 5000])
+def test_a_name_that_no_file_can_have_is_refused_with_its_place(file, name):
+    (problem,) = problems_of(file(f"outcomes: [done]\nstates:\n  A: {{mission: {name}}}\n"))
+    assert problem.startswith("3:7: states.A.mission: got a name of no file")
+
+
+def test_a_plan_that_cannot_be_read_is_told_with_its_place(file):
+    file("no net", "net.pnml")
+    (problem,) = problems_of(file("outcomes: [done]\nstates:\n  A: {plan: net.pnml}\n"))
+    assert problem.startswith("3:7: states.A.plan: ")
+    assert "is no XML" in problem
+
+
+def test_stop_others_names_states_of_the_concurrence(file):
+    text = "outcomes: [done, preempted]\nstates:\n  A: {concurrence: {outcomes: [done, preempted], default_outcome: done, stop_others: [LET], states: {LEFT: {state: wait}}}}\n"
+    (problem,) = problems_of(file(text))
+    assert problem.startswith("3:73: states.A.concurrence.stop_others: ")
+    assert "got 'LET'" in problem
+
+
+# -- hostile texts -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "a: &a [*a]",
+        "\n".join(
+            [
+                "a0: &a0 [x]",
+                *(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 9)),
+            ]
+        ),
+        "outcomes: !!python/object/apply:os.system ['touch evil']\nstates: {}",
+        "outcomes: [done]\nstates: {A: {state: wait, on: {done: [{when: '().__class__', to: done}, {to: done}]}}}",
+        "outcomes: [done]\nstates: {A: {state: wait, on: {done: [{when: '9**9**9', to: done}, {to: done}]}}}",
+        "outcomes: 3\nstates: x",
+        "outcomes: [done]\nstates: {A: 3, B: [], C: null}",
+        "outcomes: [done]\nstates: {A: {machine: 3}, B: {concurrence: []}, C: {iterator: null}}",
+        "{" * 5000,
+        "\x00",
+    ],
+)
+def test_hostile_texts_are_refused(file, tmp_path, text):
+    assert problems_of(file(text))
+    assert not (tmp_path / "evil").exists()
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(MissionFileError, match="No such file"):
+        load(tmp_path / "none.yaml")

@@ -1,0 +1,160 @@
+"""Machines written as files: Python -> YAML -> Python, the schema, and what cannot be written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import smachpy
+from smachpy import Concurrence, Iterator, Sequence, State, StateMachine, any_of, when
+from smachpy.files import NotWrittenError, load, schema, write
+from smachpy.states import Wait
+from tests.smachpy.files import own_states
+from tests.smachpy.files.own_states import Up
+from tests.smachpy.files.test_reading import GOOD
+
+LEAVES = st.sampled_from(["up", "down", "wait"])
+TREES = st.recursive(
+    LEAVES,
+    lambda below: st.tuples(
+        st.sampled_from(["machine", "sequence", "concurrence", "iterator"]),
+        st.lists(below, min_size=1, max_size=3),
+        st.booleans(),
+    ),
+    max_leaves=6,
+)
+KEYS: dict[str, Any] = {"input_keys": ["count"], "output_keys": ["count"]}
+
+
+def build(tree: Any) -> State:
+    if tree == "up":
+        return Up()
+    if tree == "down":
+        return own_states.down
+    if tree == "wait":
+        return Up()
+    kind, below, extra = tree
+    children = [build(child) for child in below]
+    outcomes = ["a", "b"]
+    if kind == "iterator":
+        iterator = Iterator(outcomes, it=[1, 2], it_label="number", exhausted_outcome="a", **KEYS)
+        loop = ["a"] if extra else []
+        iterator.set_contained_state("EACH", children[0], loop, ["b"] if extra else [])
+        return iterator
+    if kind == "concurrence":
+        concurrence = Concurrence(
+            outcomes,
+            "b",
+            outcome_map={"a": any_of({"S0": "a"})} if extra else {"a": {"S0": "a"}},
+            **KEYS,
+        )
+        concurrence.add("S0", children[0])
+        return concurrence
+    machine: Any = (
+        StateMachine(outcomes, **KEYS) if kind == "machine" else Sequence(outcomes, "a", **KEYS)
+    )
+    last = len(children) - 1
+    for number, child in enumerate(children):
+        target = "a" if number == last else f"S{number + 1}"
+        to: Any = [when("count > 40", "b"), target] if extra else target
+        remapping = {"count": "count"} if extra else {}
+        machine.add(f"S{number}", child, {"a": to, "b": target}, remapping)
+    if extra:
+        machine.add_cleanup("TIDY", Up())
+    return machine
+
+
+def root_of(tree: Any) -> StateMachine:
+    root = StateMachine(["a", "b"], name="ROOT", userdata={"count": 0})
+    root.add("TOP", build(tree), {"a": "a", "b": "b"})
+    return root
+
+
+def facts(record: Any) -> Any:
+    """What must be the same: all but the classes of leaves that were not imported yet."""
+    return (
+        record.path,
+        record.kind if record.is_container else "leaf",
+        set(record.outcomes),
+        record.remapping,
+        record.initial,
+        record.transitions,
+        record.rules,
+        record.default_outcome,
+        record.cleanup,
+        [facts(child) for child in record.children],
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(TREES)
+def test_python_to_yaml_to_python_is_the_same_machine(tmp_path_factory, tree):
+    path = tmp_path_factory.mktemp("files") / "machine.yaml"
+    first = root_of(tree)
+    text = write(first, path)
+    second = load(path, allow=["tests"])
+    assert facts(smachpy.describe(second)) == facts(smachpy.describe(first))
+    stories = []
+    for machine in (first, second):
+        story: list[tuple[str, str]] = []
+        machine.subscribe(
+            lambda event, story=story: (
+                type(event).__name__ in {"Left", "Entered"}
+                and story.append((type(event).__name__, event.path, getattr(event, "outcome", "")))
+            )
+        )
+        outcome = machine.execute()
+        stories.append((outcome, machine.userdata["count"], story))
+    assert stories[0] == stories[1]
+    assert write(load(path, allow=["tests"])) == text
+
+
+def test_comments_stay_on_rewriting(tmp_path):
+    path = tmp_path / "mission.yaml"
+    path.write_text(GOOD.replace("  COUNT:\n", "  COUNT:  # counts\n", 1) + "# the end\n")
+    machine = load(path)
+    machine["BOTH"]["B"]
+    write(machine, path)
+    text = path.read_text()
+    assert "# counts" in text
+    assert "seconds: ${seconds}" in text.replace('"', "").replace("'", "")
+    assert "unit: s" in text
+    load(path)
+
+
+def test_what_cannot_be_written_is_told_all_at_once(tmp_path):
+    sm = StateMachine(["done", "preempted"], name="M", userdata={"where": Path("x")})
+    sm.add("A", Wait(3.0))
+    sm.add(
+        "B",
+        smachpy.CBState(lambda userdata: "done", outcomes=["done"]),
+        {"done": [when(bool, "A"), "A"]},
+    )
+    sm.register_start_cb(lambda *_: None)
+    path = tmp_path / "m.yaml"
+    with pytest.raises(NotWrittenError) as caught:
+        write(sm, path)
+    assert len(caught.value.problems) == 5
+    assert all(problem.startswith("/M") for problem in caught.value.problems)
+    assert not path.exists()
+
+
+def test_the_shipped_schema_is_the_one_of_the_code():
+    shipped = Path(smachpy.__file__).parent / "files" / "mission.schema.json"
+    assert json.loads(shipped.read_text()) == schema()
+
+
+def test_the_schema_takes_a_good_file_and_refuses_a_bad_one():
+    validator = pytest.importorskip("jsonschema").Draft202012Validator(schema())
+    from actionlib_core.inputs.yaml_text import load_yaml
+
+    assert list(validator.iter_errors(load_yaml(GOOD))) == []
+    assert list(validator.iter_errors(load_yaml(GOOD.replace("outcomes", "outcome", 1))))
+    assert list(
+        validator.iter_errors({"outcomes": ["a"], "states": {"A": {"state": "x", "plan": "y"}}})
+    )
