@@ -1,0 +1,290 @@
+"""Runs the mission of a recording again, in the world of the recording, and compares."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import sys
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from actionlib_core import border
+from actionlib_core.clock import Deadlock, RealClock
+from actionlib_core.exceptions import ActionlibError
+from actionlib_core.names import parse_arguments
+from smachpy.command.arguments import Text
+from smachpy.command.durable import whole_target
+from smachpy.command.mission_run import build
+from smachpy.command.queued import Allowed, check_is_mission
+from smachpy.command.targets import load_target
+from smachpy.engine.journal import NO_JOURNAL, RunJournal
+from smachpy.events.code import code_facts
+from smachpy.events.introspection import describe
+from smachpy.exceptions import MissionError, SmachError, error_text
+from smachpy.reproduce.changes import changes
+from smachpy.reproduce.compare import compare, steps_of
+from smachpy.reproduce.play import Player
+from smachpy.reproduce.world import first_run, world_of
+from smachpy.testing.kit import MissionKit, TimeLimitError
+from smachpy.userdata.json_text import decoded
+from smachpy.userdata.secret import MASK
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator
+    from pathlib import Path
+
+    from actionlib_core.border import Crossing
+    from smachpy.engine.frame import Frame
+    from smachpy.events.introspection import StateRecord
+    from smachpy.events.recording import Recording
+    from smachpy.machines.container import Container
+    from smachpy.reproduce.compare import Comparison
+    from smachpy.reproduce.world import World
+
+LONGER_S: Final = 60.0
+"""A run may take so much longer than its recording; then it is ended [s]."""
+
+LARGEST_BUFFER: Final = 10_000_000
+
+
+class ReproductionError(SmachError):
+    """A recording cannot be reproduced.
+
+    Try: record again with `--record`; docs/reproduce.md says what a recording needs.
+
+    Attributes:
+        path: The file.
+        problem: Why not.
+    """
+
+    def __init__(self, path: object, problem: str) -> None:
+        self.path = str(path)
+        self.problem = problem
+        super().__init__(f"{self.path}: cannot be reproduced: {problem}")
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """A run of today's code in the world of a recording.
+
+    Attributes:
+        name: The machine's name.
+        comparison: How it compares.
+        duration: How long the recorded run took [s].
+        seconds: How long this one took on the computer [s].
+        outcome: Outcome of this run; None if it did not end.
+        notes: What was lacking or could not be played, in words.
+        changed: What has changed in machine, constants and files, in words.
+        events: The events of this run, as records.
+        record: The machine of today.
+    """
+
+    name: str
+    comparison: Comparison
+    duration: float
+    seconds: float
+    outcome: str | None
+    notes: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+    events: list[dict[str, Any]] = field(default_factory=list)
+    record: StateRecord | None = None
+
+    @property
+    def is_same(self) -> bool:
+        """Whether there is no difference."""
+        return self.comparison.difference is None
+
+
+def reproduce(
+    recording: Recording,
+    *,
+    mission: str = "",
+    allow: Iterable[str | Path] = (),
+    make: Callable[[], Container] | None = None,
+    seed: int | None = None,
+    tolerate: Collection[str] = (),
+    world: World | None = None,
+) -> Reproduction:
+    """Run the mission of a recording again, and compare.
+
+    Args:
+        recording: The recording.
+        mission: The mission, as for `smachpy run`; "": the one that it names.
+        allow: Places whose missions it may name, besides the installed ones: files, folders and
+            modules.
+        make: Makes the machine instead.
+        seed: Picks the interleaving of threads.
+        tolerate: What may differ, see `steps_of`.
+        world: The world; None: as recorded.
+
+    Raises:
+        ReproductionError: the recording does not say enough, or the mission cannot be made.
+
+    Blocks: until the run has ended, in virtual time.
+    """
+    events = first_run(recording.events)
+    if not events:
+        raise ReproductionError(
+            recording.path,
+            "it does not begin with the begin of a run; expected all of a run, or its first part.",
+        )
+    if recording.origin is None:
+        raise ReproductionError(
+            recording.path,
+            "it has no inputs; expected what the mission was answered. It was made by an older "
+            "version, or with --record-inputs none.",
+        )
+    world = world or world_of(recording)
+    make = make or maker(recording, mission, allow)
+    started = RealClock().now()
+    then = dict(recording.origin["mission"])
+    random.seed(then.get("seed"))
+    begin_ns = recording.stamp_ns
+    cancelled: set[str] = set()
+    kit = MissionKit(
+        seed=seed,
+        begin_ns=max(0, begin_ns),
+        namespace=str(recording.origin.get("namespace") or ""),
+        arguments=parse_arguments(list(then.get("names", ()))),
+    )
+    kit.draws = False
+    with kit, _cancels(cancelled):
+        try:
+            machine = make()
+            _restore_userdata(machine, recording)
+        except (SmachError, ActionlibError) as error:
+            raise ReproductionError(recording.path, str(error)) from error
+        record = describe(machine)
+        player = Player(kit, world, events)
+        player.open()
+        buffer = machine.event_buffer(limit=LARGEST_BUFFER)
+        end = player.begin(machine)
+        machine._smachpy.live.journal = Recorded(world, player)
+        notes: list[str] = []
+        outcome = None
+        try:
+            outcome = kit(machine, limit=world.ended - world.began + LONGER_S).outcome
+        except (Deadlock, TimeLimitError, AssertionError, SmachError) as error:
+            if not isinstance(error, SmachError) or isinstance(error, TimeLimitError):
+                notes.append(str(error).splitlines()[0])
+        finally:
+            end()
+            buffer.close()
+            machine._smachpy.live.journal = NO_JOURNAL
+        with contextlib.suppress(Exception):
+            kit._take_errors()  # noqa: SLF001
+        now = buffer.read()
+    comparison = compare(
+        steps_of(events, recording.record, recorded_cancels(world), tolerate),
+        steps_of(now, record, cancelled, tolerate),
+        is_complete=world.is_complete,
+    )
+    is_same = comparison.difference is None
+    return Reproduction(
+        name=recording.record.label,
+        comparison=comparison,
+        duration=world.ended - world.began,
+        seconds=RealClock().now() - started,
+        outcome=outcome,
+        notes=(*world.lacks, *(() if is_same else notes), *dict.fromkeys(player.problems)),
+        changed=() if is_same else tuple(changes(recording, record, code_facts())),
+        events=now,
+        record=record,
+    )
+
+
+class Recorded(RunJournal):
+    """The journal of a reproduced run: calls of `smachpy.once` return what they returned then."""
+
+    def __init__(self, world: World, player: Player) -> None:
+        self._left = {place: list(values) for place, values in world.once.items()}
+        self._player = player
+
+    def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:
+        """Return the recorded result, or that of `call` if there is none."""
+        left = self._left.get((frame.path, key))
+        if not left:
+            return call()
+        try:
+            return decoded(left.pop(0), key)
+        except ValueError as error:
+            self._player.problems.append(f"{frame.path}: once {key!r}: {error}")
+            return call()
+
+
+@contextlib.contextmanager
+def _cancels(found: set[str]) -> Iterator[None]:
+    """Collect the ids of goals that are cancelled inside the block."""
+
+    def note(crossing: Crossing) -> None:
+        if crossing.what == "cancel":
+            found.add(crossing.key)
+
+    leave = border.listen(note)
+    try:
+        yield
+    finally:
+        leave()
+
+
+def recorded_cancels(world: World) -> set[str]:
+    """Return the ids of the goals that the recorded run cancelled."""
+    goals = (goal for action in world.actions.values() for goal in action.goals)
+    return {goal.id for goal in goals if goal.cancelled is not None}
+
+
+def maker(
+    recording: Recording, mission: str = "", allow: Iterable[str | Path] = ()
+) -> Callable[[], Container]:
+    """Return a function that makes the machine of a recording.
+
+    A recording is data of others: it chooses among the installed missions and those of `allow`.
+
+    Raises:
+        ReproductionError: the recording names no mission, or one that is not allowed, or was begun
+            with secrets.
+    """
+    assert recording.origin is not None
+    then = recording.origin["mission"]
+    recorded = str(then.get("target") or "")
+    if not (mission or recorded):
+        raise ReproductionError(
+            recording.path,
+            "it does not name its mission, as a program has made it; expected one. Try --mission "
+            "MODULE:FUNCTION",
+        )
+    problem = "" if mission else Allowed(allow).problem(recorded, "recording")
+    if problem:
+        raise ReproductionError(recording.path, f"{recorded}: {problem}")
+    words, inputs = tuple(then.get("words", ())), dict(then.get("inputs", {}))
+    if MASK in [*words, *inputs.values()]:
+        raise ReproductionError(
+            recording.path,
+            "it was begun with a secret, which is not recorded. Try --mission with a function that "
+            "needs none.",
+        )
+
+    def make() -> Container:
+        if mission and whole_target(mission) != recorded:
+            return load_target(mission).build()
+        folder = str(then.get("folder") or "")
+        if folder and folder not in sys.path:
+            sys.path.append(folder)  # as for a module that is named from there
+        target = load_target(mission or recorded)
+        if not mission:
+            check_is_mission(target, "recording")
+        return build(target, {key: Text(value) for key, value in inputs.items()}, words)
+
+    return make
+
+
+def _restore_userdata(machine: Container, recording: Recording) -> None:
+    """Give the machine the values that keys had at the begin and have no longer."""
+    assert recording.origin is not None
+    for key, value in recording.origin["userdata"].items():
+        if key not in machine.userdata or not recording.origin["mission"]:
+            try:
+                machine.userdata[key] = decoded(value, key)
+            except ValueError as error:
+                if key not in machine.userdata:
+                    raise MissionError(f"userdata key {key!r}: {error_text(error)}") from error

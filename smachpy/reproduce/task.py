@@ -1,0 +1,76 @@
+"""Reproduces one file, in this process or in a worker."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from actionlib_core.clock import RealClock
+from smachpy.events.recording import read_recording
+from smachpy.exceptions import SmachError
+from smachpy.reproduce.report import Verdict, lines_of
+from smachpy.reproduce.run import reproduce
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.reproduce.run import Reproduction
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How recordings are reproduced; see `smachpy.reproduce.run.reproduce`."""
+
+    mission: str = ""
+    allow: tuple[str, ...] = ()
+    seed: int | None = None
+    tolerate: tuple[str, ...] = ()
+
+
+def reproduce_file(path: str, options: Options) -> Verdict:
+    """Reproduce a file; a file that cannot be is a verdict, too."""
+    started = RealClock().now()
+    try:
+        found = run_file(path, options)
+    except SmachError as error:
+        took = RealClock().now() - started
+        text = str(error)
+        return Verdict(
+            path, "failed", (text if text.startswith(path) else f"{path}: {text}",), seconds=took
+        )
+    kind = "same" if found.is_same else "differs"
+    comparison = found.comparison
+    return Verdict(
+        path, kind, lines_of(found), comparison.same, comparison.total, RealClock().now() - started
+    )
+
+
+def run_file(path: str, options: Options) -> Reproduction:
+    """Reproduce a file.
+
+    Raises:
+        RecordingError, ReproductionError: it cannot be read, or does not say enough.
+    """
+    with quiet():
+        return reproduce(
+            read_recording(path),
+            mission=options.mission,
+            allow=options.allow,
+            seed=options.seed,
+            tolerate=options.tolerate,
+        )
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Let the mission log nothing, and print to standard error."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        logging.disable(before)

@@ -1,0 +1,491 @@
+"""Recorded runs that are run again: the same, or the first difference."""
+
+from __future__ import annotations
+
+import json
+import os as ENVIRONMENT
+import subprocess
+import sys
+import tempfile
+import uuid
+import warnings
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+import smachpy
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from smachpy import CBState, StateMachine
+from smachpy.command import main
+from smachpy.events.recording import Recorder, read_recording
+from smachpy.reproduce.report import lines_of
+from smachpy.reproduce.run import ReproductionError, reproduce
+from smachpy.testing import mission_kit
+from tests.smachpy.reproduce.random_missions import Plan, plans
+
+
+def recorded(plan: Plan, folder: Path):
+    path = folder / "run.jsonl"
+    with mission_kit() as kit, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a preempt after the end of the run
+        plan.play(kit)
+        machine = plan.machine()
+        with Recorder(path, machine):
+            kit(machine)
+    return read_recording(path)
+
+
+@pytest.mark.slow
+@settings(
+    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
+)
+@given(plan=plans())
+def test_random_machines_among_random_servers_are_reproduced(plan):
+    with tempfile.TemporaryDirectory() as folder:
+        recording = recorded(plan, Path(folder))
+        found = reproduce(recording, make=plan.machine)
+        assert found.comparison.difference is None, (found.comparison.difference, found.notes)
+        assert found.comparison.same == found.comparison.total > 0
+
+
+MISSION = """
+import smachpy
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from smachpy import CBState, Concurrence, MonitorState, SimpleActionState, StateMachine
+
+LOW = 0.30
+
+
+def is_good(_, state):
+    return state.percentage > LOW
+
+
+def note(userdata):
+    userdata.trips = userdata.trips + 1
+    return "noted"
+
+
+def mission() -> StateMachine:
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="ROUND", userdata={"trips": 0})
+    with sm:
+        visit = Concurrence(
+            ["succeeded", "aborted", "preempted", "low"],
+            default_outcome="aborted",
+            child_termination_cb=lambda ended: True,
+            outcome_map={"succeeded": {"DRIVE": "succeeded"}, "low": {"WATCH": "invalid"}},
+        )
+        with visit:
+            visit.add("DRIVE", SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0))
+            visit.add("WATCH", MonitorState("battery", BatteryState, is_good))
+        sm.add("VISIT", visit, {"low": "HOME", "aborted": "HOME", "succeeded": "NOTE"})
+        sm.add(
+            "NOTE",
+            CBState(note, outcomes=["noted"], input_keys=["trips"], output_keys=["trips"]),
+            {"noted": "HOME"},
+        )
+        sm.add("HOME", SimpleActionState("move_base", MoveBaseAction), {"aborted": "aborted"})
+    return sm
+"""
+
+
+FRAMED = """SimpleActionState(
+            "move_base",
+            MoveBaseAction,
+            goal_cb=lambda _, goal: setattr(goal.target_pose.header, "frame_id", "odom"),
+        ), {"""
+
+
+@pytest.fixture
+def night(tmp_path, monkeypatch):
+    """A mission in a file, and the recording of a run in which the battery got low."""
+    file = tmp_path / "night.py"
+    file.write_text(MISSION)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    # A test that imports the mission takes cached bytecode if it has changed within a second.
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    path = tmp_path / "incident.jsonl"
+    with mission_kit() as kit:
+        robot = kit.action_server("move_base", MoveBaseAction)
+        robot.never_finish()
+        robot.reply(status="aborted", duration=31.2, text="the door is shut")
+        battery = kit.topic("battery", BatteryState)
+        battery.publish_at(5.0, percentage=0.8)
+        battery.publish_at(32.4, percentage=0.29)
+        from smachpy.command.targets import load_target
+
+        machine = load_target(str(file)).build()
+        with Recorder(path, machine, origin={"target": str(file)}):
+            kit(machine)
+    return file, path
+
+
+def test_the_same_code_does_the_same(night, capsys):
+    _, path = night
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("ROUND: the same 15 of 15 events, 63 s in ")
+
+
+EVIL = """
+import pathlib
+pathlib.Path(__file__).with_name("executed").touch()
+def mission():
+    ...
+"""
+
+
+@pytest.mark.parametrize(
+    "target", ["subprocess:getoutput", "FOLDER/evil.py", "evil", "evil:mission"]
+)
+def test_a_recording_runs_no_code_that_nobody_allowed(night, capsys, target):
+    """It comes from anybody: what it names was imported, and called with its words."""
+    file, path = night
+    (file.parent / "evil.py").write_text(EVIL)
+    header, *rest = path.read_text().splitlines(keepends=True)
+    data = json.loads(header)
+    there = target.replace("FOLDER", str(file.parent))
+    data["origin"]["mission"] |= {"target": there, "words": [f"touch {file.parent}/executed"]}
+    path.write_text(json.dumps(data) + "\n" + "".join(rest))
+    for more in ([], ["-o", str(file.with_name("test_x.py"))]):
+        assert main(["runs", "reproduce", str(path), *more]) == 2
+        assert "a recording names it; expected" in "".join(capsys.readouterr())
+        assert not (file.parent / "executed").exists()
+
+
+def test_a_recording_names_a_mission_and_nothing_else_of_an_allowed_place(night, capsys):
+    file, path = night
+    path.write_text(path.read_text().replace(str(file), f"{file}:visit"))
+    file.write_text(f"{MISSION}\ndef visit(*words):\n    raise SystemExit('called')\n")
+    assert main(["runs", "reproduce", str(path), f"--allow={file}"]) == 2
+    assert "expected a mission" in capsys.readouterr().out
+
+
+MUTATIONS = [
+    # what is changed, at which step the first effect is, and a word of what is said
+    ("LOW = 0.30", "LOW = 0.25", 32.4, "WATCH  invalid", "goes on", ".LOW is 0.25 now, was 0.3"),
+    ('"low": "HOME", "ab', '"low": "aborted", "ab', 32.4, "HOME  begins", "ends: aborted", "VISIT"),
+    (
+        '{"aborted": "aborted"}',
+        '{"aborted": "succeeded"}',
+        63.6,
+        "ends: aborted",
+        "ends: succeeded",
+        "HOME",
+    ),
+    (
+        "exec_timeout=60.0",
+        "exec_timeout=20.0",
+        20.0,
+        "to stop (concurrence)",
+        "DRIVE",
+        "exec_timeout: 20 s",
+    ),
+    ('MonitorState("battery"', 'MonitorState("akku"', 32.4, "WATCH  invalid", "goes on", "topic"),
+    ('"trips": 0', '"trips": 7', None, "", "", ""),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "at", "then", "now", "said"), MUTATIONS)
+def test_a_change_is_found_at_its_first_effect(night, capsys, old, new, at, then, now, said):
+    file, path = night
+    assert old in MISSION
+    file.write_text(MISSION.replace(old, new))
+    code = main(["runs", "reproduce", str(path), f"--allow={path.parent}"])
+    out = capsys.readouterr().out
+    if at is None:  # a change without an effect in this run
+        assert code == 0, out
+        return
+    assert code == 1, out
+    assert f"differs at 00:{at:04.1f}" in out or f"differs at 01:{at - 60:04.1f}" in out, out
+    recorded = next(line for line in out.splitlines() if line.startswith("  recorded"))
+    present = next(line for line in out.splitlines() if line.startswith("  now"))
+    assert then in recorded
+    assert now in present
+    assert any(said in line for line in out.splitlines() if line.startswith("  changed: ")), out
+
+
+@pytest.mark.parametrize("name", ["HOME", "VISIT/WATCH", "goals", "trips"])
+def test_what_may_differ_is_left_out(night, name, capsys):
+    file, path = night
+    changes = {
+        "HOME": ('SimpleActionState("move_base", MoveBaseAction), {', FRAMED),
+        "goals": ('SimpleActionState("move_base", MoveBaseAction), {', FRAMED),
+    }
+    old, new = changes.get(name, ("LOW = 0.30", "LOW = 0.25"))
+    file.write_text(MISSION.replace(old, new))
+    code = main(["runs", "reproduce", str(path), f"--allow={path.parent}", "--tolerate", name])
+    assert code == (0 if name in changes else 1), capsys.readouterr().out
+
+
+def test_a_folder_has_a_report_for_ci_whatever_the_number_of_processes(night, tmp_path, capfd):
+    _, path = night
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for name in ("a", "b", "c"):
+        (folder / f"{name}.jsonl").write_bytes(path.read_bytes())
+    (folder / "cut.jsonl").write_bytes(path.read_bytes()[:9_000])
+    texts = []
+    for jobs in ("1", "2"):
+        report = tmp_path / f"{jobs}.xml"
+        arguments = [str(folder), "--jobs", jobs, "--junit", str(report), "--json"]
+        assert main(["runs", "reproduce", f"--allow={path.parent}", *arguments]) in {0, 1, 2}
+        lines = capfd.readouterr().out.splitlines()
+        found = [json.loads(line) for line in lines]
+        assert [one["file"].rpartition("/")[2] for one in found] == [
+            "a.jsonl",
+            "b.jsonl",
+            "c.jsonl",
+            "cut.jsonl",
+        ]
+        texts.append([(one["result"], one["same"], one["events"]) for one in found])
+        assert report.read_text().count("<testcase") == 4
+    assert texts[0] == texts[1]
+    assert texts[0][0] == ("same", 15, 15)
+
+
+def test_a_recording_that_ends_early_is_reproduced_up_to_there(night):
+    _, path = night
+    lines = path.read_bytes().splitlines(keepends=True)
+    last = next(n for n, line in enumerate(lines) if b'"Left"' in line and b'"invalid"' in line)
+    path.write_bytes(b"".join(lines[: last + 1]) + lines[last + 1][:20])
+    found = reproduce(read_recording(path), allow=[path.parent])
+    assert found.is_same, found.comparison
+    assert found.comparison.total == 6
+    assert "the run is recorded up to 32.4 s" in found.notes
+
+
+def test_a_gap_ends_the_reproduction(night):
+    _, path = night
+    lines = path.read_bytes().splitlines(keepends=True)
+    at = next(n for n, line in enumerate(lines) if b'"Left"' in line and b'"invalid"' in line)
+    event = json.loads(lines[at]) | {"dropped": 3}
+    path.write_bytes(b"".join([*lines[:at], json.dumps(event).encode() + b"\n", *lines[at + 1 :]]))
+    found = reproduce(read_recording(path), allow=[path.parent])
+    assert found.is_same
+    assert any("where 3 events are missing" in note for note in found.notes)
+
+
+def test_older_recordings_say_what_they_lack(night, capsys):
+    _, path = night
+    header, *rest = path.read_text().splitlines(keepends=True)
+    old = {key: value for key, value in json.loads(header).items() if key != "origin"}
+    path.write_text(
+        json.dumps(old) + "\n" + "".join(line for line in rest if '"Crossed"' not in line)
+    )
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}"]) == 2
+    out = capsys.readouterr().out
+    assert "it has no inputs" in out
+    assert len(out.splitlines()) == 1
+
+
+def test_a_mission_that_is_gone_is_one_line(night, capsys):
+    file, path = night
+    file.unlink()
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}"]) == 2
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
+def test_a_recording_of_a_program_needs_to_know_the_mission(night, tmp_path):
+    file, path = night
+    header, *rest = path.read_text().splitlines(keepends=True)
+    data = json.loads(header)
+    data["origin"]["mission"] = {}
+    path.write_text(json.dumps(data) + "\n" + "".join(rest))
+    with pytest.raises(ReproductionError, match="Try --mission"):
+        reproduce(read_recording(path), allow=[path.parent])
+    assert reproduce(read_recording(path), mission=str(file)).is_same
+
+
+def test_a_changed_goal_shows_both(night):
+    file, path = night
+    file.write_text(MISSION.replace('SimpleActionState("move_base", MoveBaseAction), {', FRAMED))
+    text = "\n".join(lines_of(reproduce(read_recording(path), allow=[path.parent])))
+    assert "HOME  sends move_base" in text
+    assert "odom" in text
+
+
+def make_asking():
+    from smachpy.states import AskOperator
+
+    sm = StateMachine(["done", "preempted"], name="ASKS")
+    with sm:
+        ask = AskOperator("Go on?", answers=["yes", "no"], patience=30.0)
+        sm.add("ASK", ask, {"yes": "WORK", "no": "done", "no_answer": "done"})
+        sm.add("WORK", CBState(lambda _: "done", outcomes=["done"]))
+    return sm
+
+
+def test_answers_and_commands_of_operators_come_again(tmp_path):
+    path = tmp_path / "run.jsonl"
+    with mission_kit() as kit:
+        machine = make_asking()
+
+        def answer():
+            from smachpy.states.questions import find_questions, give_answer
+
+            kit.clock.sleep(7.0)
+            machine.control.pause()
+            [question] = find_questions(node=kit.node)
+            give_answer(question.service, "yes", "Ada", node=kit.node)
+            kit.clock.sleep(3.0)
+            machine.control.resume()
+
+        kit.clock.spawn(answer, name="operator")
+        with Recorder(path, machine):
+            kit(machine)
+    recording = read_recording(path)
+    kinds = [event["kind"] for event in recording.events]
+    assert "Paused" in kinds
+    found = reproduce(recording, make=make_asking)
+    assert found.is_same, lines_of(found)
+    assert found.outcome == "done"
+    again = [event["kind"] for event in found.events]
+    assert again == kinds
+
+
+def written(path, folder, *arguments):
+    file = folder / "test_incident.py"
+    file.unlink(missing_ok=True)
+    assert (
+        main(
+            ["runs", "reproduce", str(path), f"--allow={path.parent}", "-o", str(file), *arguments]
+        )
+        == 0
+    )
+    return file
+
+
+def pytest_in(folder):
+    """Run pytest alone in a folder; return its exit code and output."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(folder)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+EXPECTED_TEST = """
+def test_round_aborted(mission, action_server, topic):
+    move_base = action_server("move_base", MoveBaseAction)
+    move_base.never_finish()
+    move_base.reply(status="aborted", duration=31)
+    battery = topic("battery", BatteryState)
+    battery.publish_at(32, percentage=0.28999999165534973)
+    run = mission(make_mission())
+    run.assert_path(["DRIVE", "WATCH", "HOME"])
+    assert run.outcomes("DRIVE") == ("preempted",)
+    assert run.outcomes("WATCH") == ("invalid",)
+    assert run.outcomes("HOME") == ("aborted",)
+    run.assert_outcome("aborted")
+    assert len(move_base.goals) == 2
+    assert len(move_base.cancelled) == 1
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)  # seven processes
+def test_the_written_test_reads_like_a_person_s_and_fails_after_a_change(night, tmp_path):
+    file, path = night
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    test = written(path, fresh)
+    path.unlink()  # it needs no recording
+    assert test.read_text().endswith(EXPECTED_TEST)
+    assert pytest_in(fresh)[0] == 0
+    for old, new, at, *_ in MUTATIONS:
+        file.write_text(MISSION.replace(old, new))
+        code, out = pytest_in(fresh)
+        assert code == (0 if at is None else 1), (old, new, out)
+
+
+@pytest.mark.slow
+def test_a_test_that_expects_better_fails_until_the_mission_is_mended(night, tmp_path):
+    file, path = night
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    text = written(path, fresh, "--expect", "succeeded").read_text()
+    assert 'run.assert_outcome("succeeded")' in text
+    assert "assert_path" not in text
+    assert pytest_in(fresh)[0] == 1
+    file.write_text(MISSION.replace('{"aborted": "aborted"}', '{"aborted": "succeeded"}'))
+    assert pytest_in(fresh)[0] == 0
+
+
+def test_an_existing_file_is_not_overwritten(night, tmp_path, capsys):
+    _, path = night
+    (tmp_path / "test_incident.py").write_text("mine")
+    arguments = [
+        "runs",
+        "reproduce",
+        str(path),
+        f"--allow={path.parent}",
+        "-o",
+        str(tmp_path / "test_incident.py"),
+    ]
+    assert main(arguments) == 2
+    assert "File exists" in capsys.readouterr().err
+    assert (tmp_path / "test_incident.py").read_text() == "mine"
+
+
+def test_expect_needs_a_file_to_write(night, capsys):
+    _, path = night
+    assert (
+        main(["runs", "reproduce", str(path), f"--allow={path.parent}", "--expect", "succeeded"])
+        == 2
+    )
+    assert "--expect: got it without -o" in capsys.readouterr().err
+
+
+def test_results_of_once_come_from_the_recording(tmp_path):
+    dice = iter(range(100))
+
+    def throw(userdata):
+        userdata.eyes = smachpy.once("dice", lambda: next(dice))
+        return "done"
+
+    def make():
+        sm = StateMachine(["done"], name="DICE")
+        keys = ["eyes"]
+        sm.add("ONE", CBState(throw, outcomes=["done"], output_keys=keys), {"done": "TWO"})
+        sm.add("TWO", CBState(throw, outcomes=["done"], output_keys=keys))
+        return sm
+
+    machine = make()
+    with mission_kit() as kit, Recorder(tmp_path / "run.jsonl", machine):
+        kit(machine)
+    found = reproduce(read_recording(tmp_path / "run.jsonl"), make=make)
+    assert found.is_same, lines_of(found)
+    assert next(dice) == 2
+
+
+def looks_around(userdata):
+
+    with open("/etc/hostname", encoding="utf-8") as file:
+        userdata.host = file.read() + ENVIRONMENT.environ.get("HOME", "")
+    userdata.id = smachpy.once("id", lambda: uuid.uuid4().hex)
+    return "done"
+
+
+def test_the_check_names_what_cannot_be_reproduced():
+    sm = StateMachine(["done"], name="LOOKS")
+    sm.add("LOOK", CBState(looks_around, outcomes=["done"], output_keys=["host", "id"]))
+    found = [p.message for p in smachpy.check(sm, enable=["outside"]) if p.rule == "outside"]
+    assert [text.split()[2].strip(",") for text in found] == ["open", "os.environ.get"]
+    assert not [p for p in smachpy.check(sm) if p.rule == "outside"]
+
+
+def test_what_is_broken_in_the_inputs_is_left_out(night):
+    _, path = night
+    lines = path.read_text().splitlines(keepends=True)
+    broken = [
+        line.replace('"t":', '"u":')
+        if '"subscriber"' in line
+        else line.replace('"key":', '"key":[],"k":')
+        if '"server"' in line
+        else line
+        for line in lines
+    ]
+    path.write_text("".join(broken))
+    found = reproduce(read_recording(path), allow=[path.parent])
+    assert found.comparison.total == 15
