@@ -21,6 +21,7 @@ from smachpy.checks.model import Place as Place
 from smachpy.checks.model import Problem as Problem
 from smachpy.checks.properties import Property as Property
 from smachpy.checks.properties import PropertyError as PropertyError
+from smachpy.checks.properties import after_any_end as after_any_end
 from smachpy.checks.properties import after_preempt as after_preempt
 from smachpy.checks.properties import always_reaches as always_reaches
 from smachpy.checks.properties import before as before
@@ -30,7 +31,8 @@ from smachpy.checks.suppression import Ignore as Ignore
 from smachpy.checks.suppression import IgnoreError as IgnoreError
 from smachpy.checks.suppression import check_rule
 from smachpy.checks.suppression import ignore as ignore
-from smachpy.introspection import describe
+from smachpy.events.introspection import describe
+from smachpy.machines.container import allow_depth
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -46,6 +48,7 @@ __all__ = [
     "Property",
     "PropertyError",
     "Report",
+    "after_any_end",
     "after_preempt",
     "always_reaches",
     "before",
@@ -73,6 +76,7 @@ def check(
         name: Name of the machine in paths; default: its own.
 
     Raises:
+        InconsistentMachineError: its containers are nested too deeply to be run.
         PropertyError: a property names a state or outcome that does not exist.
         IgnoreError: a comment switches off a rule that does not exist, or gives no reason; or
             `enable` names one that does not exist.
@@ -82,14 +86,11 @@ def check(
     for rule in enable:
         check_rule("check: enable", rule)
         on.add(rule)
+    allow_depth(machine)
     record = describe(machine, name=name)
     subject = facts.collect(machine, record)
     wanted = [properties_of_runs.parse(p) if isinstance(p, str) else p for p in properties]
     problems = list(facts.find_problems(machine, record.path))
-    if any(state.net is not None for state in record.walk()):
-        from smachpy.checks import plans  # most machines have none
-
-        problems += plans.find(machine, record.path)
     # The graph of an inconsistent machine would have edges to nowhere: report only what keeps it
     # from running.
     if not any(problem.rule in facts.PREVENTS_RUN for problem in problems):

@@ -16,12 +16,12 @@ from smachpy.machines.container import Container, problems_of, state_problems
 from smachpy.machines.iterator import Iterator as IteratorState
 from smachpy.machines.old_states import Delegate
 from smachpy.machines.state import CBState, State, get_options
-from smachpy.util import CBInterface
+from smachpy.machines.util import CBInterface
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 # Kinds of states that wait for something external, and the detail with their timeout.
 _LIMITS = {
@@ -37,15 +37,18 @@ PREVENTS_RUN = frozenset({"inconsistent", "unmapped-outcome", "wrong-signature"}
 
 
 def find_problems(state: State, path: str) -> Iterator[Problem]:
-    """Yield what keeps a machine from running: inconsistencies and wrong signatures of `execute`.
+    """Yield what keeps a machine from running, and what its containers find in themselves.
 
     `add` refuses most of them; changes that a program made afterwards are found here.
     """
     for text in problems_of(state, path) if isinstance(state, Container) else ():
         if state._smachpy_kind == "plan" and not text.startswith(f"{path}: one state"):
-            continue  # reported by `smachpy.checks.plans`, with its line in the plan's file
+            continue  # reported by the plan itself below, with its line in the plan's file
         rule = "unmapped-outcome" if "outcome has no transition" in text else "inconsistent"
         yield Problem(rule, RULES[rule].severity, text.partition(": ")[0], text)
+    check_itself = getattr(state, "_smachpy_check", None)
+    if check_itself is not None:
+        yield from check_itself(path)
     for text in _signature_problems(state):
         hint = "Try `def execute(self, userdata):`, plain or async, that returns an outcome."
         yield Problem("wrong-signature", "error", path, f"{path}: {text}", hint)
@@ -98,11 +101,14 @@ def collect(machine: State, record: StateRecord) -> Subject:
     # Values may appear from outside if machines share their userdata, or if a state's code uses the
     # userdata of some machine: nothing is certain about unset keys then.
     owners = Counter(id(container.userdata) for container in containers.values())
-    anywhere = any(known.reaches for known in facts.values())
+    files = {known.place.file for known in facts.values() if known.place is not None}
+    kinds = {kind.__name__ for each in containers.values() for kind in type(each).__mro__}
+    asides = [source.keys_written_aside(file, kinds) for file in sorted(files)]
+    anywhere = None in asides or any(known.reaches for known in facts.values())
     for path, container in containers.items():
         if anywhere or owners[id(container.userdata)] > 1:
             facts[path] = replace(facts[path], watched=True)
-    return Subject(record, facts)
+    return Subject(record, facts, frozenset().union(*filter(None, asides)))
 
 
 def _has_own_execute(state: State) -> bool:
@@ -129,6 +135,7 @@ def _of_container(container: Container) -> Facts:
     items = container._smachpy.items if isinstance(container, IteratorState) else None
     return Facts(
         preset=frozenset(container.userdata.keys()),
+        kept=frozenset(container.userdata.keys()) - data.begins_with.keys(),
         outcome_rules=rules,
         any_outcome=getattr(data, "outcome_cb", None) is not None,
         cuts=getattr(data, "child_termination_cb", None) is not None,
@@ -165,11 +172,16 @@ def _of_leaf(state: State, record: StateRecord) -> Facts:
         facts,
         place=code.place if _is_foreign(type(state)) or isinstance(state, CBState) else None,
         returns=None if code.returns is None else frozenset(code.returns),
-        undeclared=tuple((o, place) for o, place in returns.items() if o not in known),
+        undeclared=tuple(
+            (o, place) for o, place in returns.items() if o not in known | code.unsure
+        ),
         reads=code.reads,
+        changes=code.changes,
+        instant=code.is_instant and (options.retry or options.on_enter or options.on_exit) is None,
         reaches=code.reaches,
         waits=waits or code.waits,
         loops=code.loops if type(state).request_preempt is State.request_preempt else (),
+        outside=code.outside if _is_foreign(type(state)) or isinstance(state, CBState) else (),
         is_function=isinstance(state, CBState),
     )
 

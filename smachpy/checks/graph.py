@@ -10,18 +10,18 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from smachpy.checks.model import Facts, Moments, Subject
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 PREEMPTED = "preempted"
-MOST_COMBINATIONS = 5_000  # of child outcomes; a larger concurrence may end with any outcome
-MOST_NODES = 200_000  # a larger machine is refused: its parts can be checked one by one
+MAX_COMBINATIONS = 5_000  # of child outcomes; a larger concurrence may end with any outcome
+MAX_NODES = 200_000  # a larger machine is refused: its parts can be checked one by one
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Node:
 
 
 @dataclass(slots=True)
-class _Part:
+class _GraphPiece:
     """A state in the graph: the node where it begins, and the nodes where it ends, by outcome."""
 
     enter: Node
@@ -94,6 +94,20 @@ class Graph:
         queue = list(seen)
         while queue:
             new = set(self.after(queue.pop(), preempt=preempt)) - seen
+            seen |= new
+            queue += new
+        return seen
+
+    def leading_to(self, goals: Iterable[int], *, preempt: bool = True) -> set[int]:
+        """Return `goals` and all moments that they can follow."""
+        before: dict[int, list[int]] = {}
+        for number in range(len(self.nodes)):
+            for after in self.after(number, preempt=preempt):
+                before.setdefault(after, []).append(number)
+        seen = set(goals)
+        queue = list(seen)
+        while queue:
+            new = {number for number in before.get(queue.pop(), ()) if number not in seen}
             seen |= new
             queue += new
         return seen
@@ -159,9 +173,9 @@ class Graph:
                 continue
             queue, loop, closed = [start], {start}, True
             while queue:
-                found = set(after[queue.pop()])
-                closed = closed and not found & taken
-                found -= taken | loop
+                followers = after[queue.pop()]
+                closed = closed and taken.isdisjoint(followers)
+                found = {one for one in followers if one not in taken and one not in loop}
                 loop |= found
                 queue += found
             taken |= loop
@@ -198,36 +212,65 @@ class _Builder:
         self._subject = subject
         self.graph = Graph()
 
-    def state(self, record: StateRecord) -> _Part:
-        if len(self.graph.nodes) > MOST_NODES:
+    def state(self, record: StateRecord) -> _GraphPiece:
+        if len(self.graph.nodes) > MAX_NODES:
             raise RecursionError(
-                f"{record.path}: the machine has more than {MOST_NODES} moments; expected fewer. "
+                f"{record.path}: the machine has more than {MAX_NODES} moments; expected fewer. "
                 "Try checking its parts."
             )
         enter = self._node(record, None)
         if not record.is_container:
             outcomes = possible(record, self._subject.facts_of(record))
-            part = _Part(enter, {o: self._node(record, o) for o in outcomes})
+            part = _GraphPiece(enter, {o: self._node(record, o) for o in outcomes})
             for outcome, node in part.ends.items():
                 self._edge(enter, node, preempt=outcome == PREEMPTED)
             return part
-        part = _Part(enter, {o: self._node(record, o) for o in record.outcomes})
+        part = _GraphPiece(enter, {o: self._node(record, o) for o in record.outcomes})
+        if record.cleanup:
+            others, at_ends = self._before_cleanup(record, part)
+            self._children(others, at_ends)
+        else:
+            self._children(record, part)
+        return part
+
+    def _before_cleanup(
+        self, record: StateRecord, part: _GraphPiece
+    ) -> tuple[StateRecord, _GraphPiece]:
+        """Lead a copy of the clean-up to each end of a container.
+
+        Returns:
+            The container without its clean-up, and the beginnings of the copies as its ends.
+        """
+        (cleanup,) = (child for child in record.children if child.label == record.cleanup)
+        begins: dict[str, Node] = {}
+        for outcome, end in part.ends.items():
+            copy = self.state(cleanup)
+            begins[outcome] = copy.enter
+            for node in copy.ends.values():
+                self._edge(node, end)
+        return replace(record, children=record.others), _GraphPiece(part.enter, begins)
+
+    def _children(self, record: StateRecord, part: _GraphPiece) -> None:
+        """Add the children of a container."""
         for outcome in self._subject.facts_of(record).made & set(part.ends):
-            self._edge(enter, part.ends[outcome])
+            self._edge(part.enter, part.ends[outcome])
         add = {
             "concurrence": self._concurrence,
             "iterator": self._iterator,
             "plan": self._plan,
         }
         add.get(record.kind, self._machine)(record, part)
-        return part
 
-    def _machine(self, record: StateRecord, part: _Part) -> None:
+    def _machine(self, record: StateRecord, part: _GraphPiece) -> None:
         children = {child.label: self.state(child) for child in record.children}
         for label in record.initial:
             self._edge(part.enter, children[label].enter)
         for edge in record.transitions:
             source = children[edge.source].ends.get(edge.outcome)
+            child = children[edge.source]
+            if edge.outcome not in child.enter.record.outcomes:  # an event, at any moment
+                for node in (child.enter, *child.ends.values()):
+                    self._edge(node, children[edge.target].enter)
             if source is None:
                 continue
             if not edge.target_is_outcome and edge.target in children:
@@ -237,13 +280,13 @@ class _Builder:
         for child in children.values():
             self._preempted(part, child)
 
-    def _preempted(self, part: _Part, child: _Part) -> None:
+    def _preempted(self, part: _GraphPiece, child: _GraphPiece) -> None:
         """Add the ends after a preempt before or after a child, if the container declares them."""
         if PREEMPTED in part.ends:
             for node in (child.enter, *child.ends.values()):
                 self._edge(node, part.ends[PREEMPTED], preempt=True, framework=True)
 
-    def _iterator(self, record: StateRecord, part: _Part) -> None:
+    def _iterator(self, record: StateRecord, part: _GraphPiece) -> None:
         exhausted = [part.ends[r.outcome] for r in record.rules if r.outcome in part.ends]
         facts = self._subject.facts_of(record)
         for child_record in record.children:
@@ -264,7 +307,7 @@ class _Builder:
             for node in exhausted:
                 self._edge(part.enter, node)
 
-    def _plan(self, record: StateRecord, part: _Part) -> None:
+    def _plan(self, record: StateRecord, part: _GraphPiece) -> None:
         """Add the actions of a plan, in any order: the possible orders are checked on its net."""
         for child_record in record.children:
             child = self.state(child_record)
@@ -276,7 +319,7 @@ class _Builder:
             preempt = outcome == PREEMPTED
             self._edge(part.enter, node, preempt=preempt, framework=preempt)
 
-    def _concurrence(self, record: StateRecord, part: _Part) -> None:
+    def _concurrence(self, record: StateRecord, part: _GraphPiece) -> None:
         for child_record in record.children:  # each one alone, before the others have done anything
             alone = self.state(child_record)
             self._edge(part.enter, alone.enter)
@@ -324,14 +367,14 @@ def combinations(record: StateRecord, subject: Subject) -> list[dict[str, str]] 
     """Return all combinations of the outcomes of a concurrence's children; None if too many."""
     choices = [
         possible(child, subject.facts_of(child)) if not child.is_container else child.outcomes
-        for child in record.children
+        for child in record.others
     ]
     count = 1
     for choice in choices:
         count *= max(1, len(choice))
-    if count > MOST_COMBINATIONS:
+    if count > MAX_COMBINATIONS:
         return None
-    labels = [child.label for child in record.children]
+    labels = [child.label for child in record.others]
     return [dict(zip(labels, chosen, strict=True)) for chosen in itertools.product(*choices)]
 
 
@@ -347,7 +390,7 @@ def decide(facts: Facts, outcomes: Mapping[str, str]) -> str | None:
 def outcomes_of(record: StateRecord, subject: Subject) -> dict[str, dict[str, set[str]]]:
     """Return each outcome of a concurrence, with the child outcomes that can go with it."""
     facts = subject.facts_of(record)
-    anything = {child.label: set(child.outcomes) for child in record.children}
+    anything = {child.label: set(child.outcomes) for child in record.others}
     combined = combinations(record, subject)
     if facts.any_outcome or combined is None:
         return {o: {k: set(v) for k, v in anything.items()} for o in record.outcomes}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 Severity: TypeAlias = Literal["error", "warning", "note"]
 Moments: TypeAlias = tuple[tuple[str, str | None], ...]
@@ -40,10 +40,14 @@ RULES: dict[str, Rule] = {
         Rule("unmapped-outcome", "error", "an outcome of a state leads nowhere"),
         Rule("impossible-outcome", "warning", "a declared outcome that nothing can produce"),
         Rule("undeclared-outcome", "error", "code returns an outcome that is not declared"),
+        Rule("dead-case", "warning", "a condition of a transition that decides nothing"),
         Rule("unset-key", "error", "a userdata key is read on some path before it is written"),
         Rule("unread-key", "warning", "a userdata key is written and never read"),
+        Rule("changed-input", "warning", "code changes the value of a key that is only an input"),
+        Rule("kept-value", "warning", "a nested machine begins with what its former visit left"),
         Rule("endless-loop", "error", "a loop of states with no way out"),
         Rule("no-timeout", "warning", "a wait without a timeout", is_on=False),
+        Rule("outside", "note", "code reads what no recording has", is_on=False),
         Rule("deaf-loop", "warning", "`execute` loops without checking for a preempt"),
         Rule("stuck-concurrence", "error", "a concurrence that cannot finish"),
         Rule("ambiguous-map", "warning", "two rules of an outcome map hold with equal conditions"),
@@ -59,6 +63,7 @@ RULES: dict[str, Rule] = {
         Rule("net-dead", "warning", "a transition that never fires, a place that is never marked"),
         Rule("net-race", "warning", "nothing decides which of two ends of an action fires"),
         Rule("net-shared", "warning", "two tokens share one run of an action"),
+        Rule("net-busy", "warning", "a loop of a plan that takes no time"),
     )
 }
 
@@ -109,12 +114,16 @@ class Facts:
         made: Outcomes that the machine gives it: after a timeout, for an exception.
         undeclared: Outcomes that its code returns and that are not declared.
         reads: Keys that its code reads.
+        changes: Keys whose values its code changes in place, with the line.
+        instant: Whether its code certainly takes no time.
         prepared: Whether its `on_enter` may write its output keys before it runs.
         reaches: Whether its code may use the userdata of some machine beyond its own keys.
         waits: Waits without a timeout: what waits, and the line.
         loops: Loops that wait and never check for a preempt: what, and the line.
+        outside: Reads of files, sockets, the environment and so on, and the line.
         is_function: Whether its code is a plain function, without `self`.
         preset: Keys of the container's userdata that have a value before the run.
+        kept: Those of them that no run sets anew: a later run finds what the former one left.
         outcome_rules: A concurrence's rules.
         any_outcome: Whether the concurrence has an outcome callback.
         cuts: Whether the concurrence has a callback that may preempt its children.
@@ -128,12 +137,16 @@ class Facts:
     made: frozenset[str] = frozenset()
     undeclared: tuple[tuple[str, Place], ...] = ()
     reads: Reads | None = None
+    changes: tuple[tuple[str, Place], ...] = ()
+    instant: bool = False
     prepared: bool = False
     reaches: bool = False
     waits: tuple[tuple[str, Place], ...] = ()
     loops: tuple[tuple[str, Place], ...] = ()
+    outside: tuple[tuple[str, Place], ...] = ()
     is_function: bool = False
     preset: frozenset[str] = frozenset()
+    kept: frozenset[str] = frozenset()
     outcome_rules: tuple[OutcomeRule, ...] = ()
     any_outcome: bool = False
     cuts: bool = False
@@ -180,10 +193,18 @@ NOTHING = Facts()
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A machine under check, with the facts about its states by path."""
+    """A machine under check.
+
+    Attributes:
+        root: The machine.
+        facts: The facts about its states, by path.
+        aside: Userdata keys that functions of the states' files write from outside, such as
+            callbacks of topics.
+    """
 
     root: StateRecord
     facts: Mapping[str, Facts]
+    aside: frozenset[str] = frozenset()
 
     def facts_of(self, record: StateRecord) -> Facts:
         """Return the facts about a state."""

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 
 class PropertyError(SmachError):
-    """A property names a state or an outcome that the machine does not have."""
+    """A property names a state or an outcome that the machine does not have.
+
+    Try: use the path of a state (`/M/DRIVE`) and an outcome that the machine has.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +31,7 @@ class Property:
     """A property of every run.
 
     Attributes:
-        kind: "never", "always_reaches", "before" or "after_preempt".
+        kind: "never", "always_reaches", "before", "after_preempt" or "after_any_end".
         names: Paths or labels of states, or outcomes of the machine.
     """
 
@@ -62,7 +65,18 @@ def after_preempt(state: str) -> Property:
     return Property("after_preempt", (state,))
 
 
-_KINDS = {"never": 1, "always_reaches": None, "before": 2, "after_preempt": 1}
+def after_any_end(state: str) -> Property:
+    """A run in which the container of `state` begins passes through `state` before it ends."""
+    return Property("after_any_end", (state,))
+
+
+_KINDS = {
+    "never": 1,
+    "always_reaches": None,
+    "before": 2,
+    "after_preempt": 1,
+    "after_any_end": 1,
+}
 
 
 def parse(text: str) -> Property:
@@ -77,7 +91,8 @@ def parse(text: str) -> Property:
     if kind not in _KINDS or not all(names) or not names or _KINDS[kind] not in {None, len(names)}:
         raise PropertyError(
             f"property: got {text!r}; expected never(STATE), always_reaches(OUTCOME, ...), "
-            f"before(STATE, STATE) or after_preempt(STATE).{did_you_mean(kind, _KINDS)}"
+            f"before(STATE, STATE), after_preempt(STATE) or after_any_end(STATE)."
+            f"{did_you_mean(kind, _KINDS)}"
         )
     return Property(kind, names)
 
@@ -96,6 +111,7 @@ def find(subject: Subject, graph: Graph, wanted: Property) -> Problem | None:
             "never": _never,
             "before": _before,
             "after_preempt": _after_preempt,
+            "after_any_end": _after_any_end,
         }
         found = search[wanted.kind](graph, *paths)
     if found is None:
@@ -134,8 +150,9 @@ def _always_reaches(subject: Subject, graph: Graph, names: tuple[str, ...]) -> B
     if steps is not None:
         return f"this run ends with {steps[-1].outcome!r}", steps
     # Some reachable moment from which no good end can be reached: the run never ends.
+    ends_well = graph.leading_to(good | graph.loose, preempt=False)
     for number in sorted(graph.reachable([graph.start], preempt=False)):
-        if not (good | graph.loose) & graph.reachable([number], preempt=False):
+        if number not in ends_well:
             return "this run never ends", graph.path([graph.start], {number}, preempt=False) or []
     return None
 
@@ -148,14 +165,23 @@ def _before(graph: Graph, first: str, second: str) -> Broken:
 
 
 def _after_preempt(graph: Graph, path: str) -> Broken:
+    ends, begins = set(graph.ends.values()), graph.begins(path)
     for number in sorted(graph.reachable([graph.start])):
         node = graph.nodes[number]
         inside = f"{node.record.path}/".startswith(f"{path}/")
         if node.outcome != PREEMPTED or node.record.is_container or inside:
             continue
-        ends = set(graph.ends.values())
-        end = graph.path([number], ends, avoid=graph.begins(path), framework=False)
+        end = graph.path([number], ends, avoid=begins, framework=False)
         if end is not None:
             run = (graph.path([graph.start], {number}) or []) + end[1:]
             return f"{node.record.path} is preempted and the run ends without {path}", run
     return None
+
+
+def _after_any_end(graph: Graph, path: str) -> Broken:
+    begins, around = graph.begins(path), graph.begins(path.rpartition("/")[0])
+    end = graph.path(around & graph.reachable([graph.start]), {*graph.ends.values()}, avoid=begins)
+    if end is None:
+        return None
+    run = (graph.path([graph.start], {end[0].number}) or []) + end[1:]
+    return f"this run ends without {path}", run

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smachpy.checks.model import RULES
-from smachpy.pictures import draw_moments
+from smachpy.events.pictures import draw_moments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from smachpy.checks.model import Problem
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 _LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
 

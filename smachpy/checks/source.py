@@ -11,6 +11,7 @@ import functools
 import inspect
 import textwrap
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from smachpy.checks.model import Place, Reads
@@ -35,6 +36,48 @@ _WAITS = frozenset(
 # Number of positional arguments before the timeout.
 _BEFORE_TIMEOUT = {"wait_for_service": 1, "wait_for_message": 2}
 _DELAYS = frozenset({"sleep", "join"}) | _WAITS
+# Functions of Python that end at once; `print` may wait for a reader, but no robot does.
+_QUICK = frozenset({"print", "len", "str", "int", "float", "bool", "repr", "min", "max", "abs"})
+# Methods with which lists, dicts, sets and deques change.
+_CHANGERS = frozenset(
+    {
+        "append",
+        "appendleft",
+        "extend",
+        "extendleft",
+        "insert",
+        "remove",
+        "pop",
+        "popleft",
+        "popitem",
+    }
+    | {"clear", "sort", "reverse", "update", "setdefault", "add", "discard"}
+)
+# What differs each time, and is in no recording. `time` and `random` begin as recorded.
+_OUTSIDE = (
+    "os.environ",
+    "os.getenv",
+    "os.urandom",
+    "os.listdir",
+    "os.getpid",
+    "uuid.uuid1",
+    "uuid.uuid4",
+    "secrets",
+    "socket",
+    "subprocess",
+    "urllib.request",
+    "requests",
+    "http.client",
+    "datetime.datetime.now",
+    "datetime.datetime.utcnow",
+    "datetime.datetime.today",
+    "datetime.date.today",
+    "random.Random",
+    "random.SystemRandom",
+    "numpy.random",
+    "shelve",
+    "sqlite3",
+)
 _SHORT_S = 1.0  # [s] a shorter loop need not check for a preempt
 # Context managers that limit awaits within them: of asyncio, async_timeout, anyio and trio.
 _LIMITERS = frozenset({"timeout", "timeout_at", "fail_after", "fail_at", "move_on_after"})
@@ -47,18 +90,26 @@ class Code:
     Attributes:
         place: Its first line.
         returns: The strings it returns, with their lines.
+        unsure: Those of them that it may replace by others before it returns.
         reads: Userdata keys that it uses.
+        changes: Keys whose values it changes in place, with the line.
+        is_instant: Whether it has no loop, no `await` and no call of anything but quick builtins.
         reaches: Whether it uses the userdata of some machine beyond its own keys.
         waits: Waits without a timeout: text and line.
         loops: Loops that wait and never check for a preempt: text and line.
+        outside: What it reads that no recording has: text and line.
     """
 
     place: Place
     returns: dict[str, Place] | None
+    unsure: frozenset[str]
     reads: Reads | None
+    changes: tuple[Found, ...]
+    is_instant: bool
     reaches: bool
     waits: tuple[Found, ...]
     loops: tuple[Found, ...]
+    outside: tuple[Found, ...]
 
 
 def look_at(function: Callable[..., Any], *, userdata: int, owner: type | None) -> Code | None:
@@ -81,10 +132,16 @@ def look_at(function: Callable[..., Any], *, userdata: int, owner: type | None) 
     return Code(
         body.place(tree),
         body.returns(),
+        body.unsure(),
         keys_read(tree, names[userdata]) if len(names) > userdata else None,
+        tuple(
+            (key, Place(file, line)) for key, line in changed_values(tree, *names[userdata:][:1])
+        ),
+        body.is_instant(),
         any(isinstance(n, ast.Attribute) and n.attr == "userdata" for n in ast.walk(tree)),
         tuple(body.waits()),
         tuple(body.loops()),
+        tuple(body.outside()),
     )
 
 
@@ -145,6 +202,41 @@ class _Body:
     def place(self, node: ast.AST) -> Place:
         return Place(self._file, getattr(node, "lineno", self._tree.lineno))
 
+    # -- what no recording has -----------------------------------------------------------------
+
+    def outside(self) -> Iterator[Found]:
+        """Yield reads of files, sockets, the environment and so on, except inside `once`."""
+        kept = {
+            id(inner)
+            for node in self._all
+            if isinstance(node, ast.Call) and _called(node) == "once"
+            for inner in ast.walk(node)
+        }
+        kept |= {id(node.value) for node in self._all if isinstance(node, ast.Attribute)}
+        for node in self._all:
+            if isinstance(node, ast.Name | ast.Attribute) and id(node) not in kept:
+                what = self._outside_name(node)
+                if what:
+                    yield what, self.place(node)
+
+    def _outside_name(self, node: ast.Name | ast.Attribute) -> str:
+        """Return the full name of something outside; "" if it is none."""
+        words: list[str] = []
+        inner: ast.AST = node
+        while isinstance(inner, ast.Attribute):
+            words.insert(0, inner.attr)
+            inner = inner.value
+        if not isinstance(inner, ast.Name):
+            return ""
+        scope = getattr(self._function, "__globals__", {})
+        if inner.id not in scope:
+            return inner.id if (inner.id, words) == ("open", []) else ""
+        thing = scope[inner.id]
+        is_module = inspect.ismodule(thing)
+        first = thing.__name__ if is_module else f"{getattr(thing, '__module__', '')}.{inner.id}"
+        name = ".".join([first, *words])
+        return name if any(name == one or name.startswith(f"{one}.") for one in _OUTSIDE) else ""
+
     # -- outcomes ------------------------------------------------------------------------------
 
     def returns(self) -> dict[str, Place] | None:
@@ -178,7 +270,45 @@ class _Body:
                 found[name] = None if texts is None or known is None else known | texts
         return found
 
+    def unsure(self) -> frozenset[str]:
+        """Return strings that a variable has, but maybe no longer when it is returned.
+
+        It may get another value after this one, or code may depend on the value that it has.
+        """
+        returned = {id(n) for r in self._nodes if isinstance(r, ast.Return) for n in ast.walk(r)}
+        tested = {
+            n.id
+            for node in self._nodes
+            if isinstance(node, _TESTS) and id(node) not in returned
+            for n in ast.walk(node)
+            if isinstance(n, ast.Name)
+        }
+        found: set[str] = set()
+        bound: list[tuple[str, Texts, tuple[tuple[int, int], ...]]] = [
+            (name, None if value is None else _texts(value, {}), way)
+            for node, way in _with_ways(self._tree.body)
+            for name, value in _bindings(node)
+        ]
+        for number, (name, texts, way) in enumerate(bound):
+            later = (other for again, _, other in bound[number + 1 :] if again == name)
+            if name in tested or any(not _excludes(way, other) for other in later):
+                found |= texts or set()
+        return frozenset(found)
+
     # -- waits and loops -----------------------------------------------------------------------
+
+    def is_instant(self) -> bool:
+        """Return whether it certainly takes no time."""
+        code = self._function.__code__
+        known = self._function.__globals__.keys() | {*code.co_varnames, *code.co_cellvars}
+        return not any(
+            isinstance(node, (*_LOOPS, *_WITH, ast.Await))
+            or (
+                isinstance(node, ast.Call)
+                and (not isinstance(node.func, ast.Name) or node.func.id not in _QUICK - known)
+            )
+            for node in self._nodes
+        )
 
     def waits(self) -> Iterator[Found]:
         """Yield calls that wait without a timeout."""
@@ -277,6 +407,51 @@ class _Body:
         return None if self._own is None else _method_of(node, self._own)
 
 
+_TESTS = (ast.Compare, ast.Match, ast.BoolOp, ast.Subscript)
+
+
+def _with_ways(
+    block: list[ast.stmt], way: tuple[tuple[int, int], ...] = ()
+) -> Iterator[tuple[ast.AST, tuple[tuple[int, int], ...]]]:
+    """Yield the nodes of a block in their order, without those of inner functions.
+
+    With each its way: pairs (id of a statement, number of the branch of it), outermost first.
+    """
+    for statement in block:
+        yield statement, way
+        branches = _branches(statement)
+        inside = {id(part) for branch in branches for part in branch}
+        for child in ast.iter_child_nodes(statement):
+            if id(child) not in inside and not isinstance(child, (*_INNER, *_HOLDERS)):
+                yield child, way
+                yield from ((node, way) for node in _own_nodes(child))
+        for number, branch in enumerate(branches):
+            yield from _with_ways(branch, (*way, (id(statement), number)))
+
+
+_HOLDERS = (ast.ExceptHandler, ast.match_case)
+
+
+def _branches(statement: ast.stmt) -> list[list[ast.stmt]]:
+    """Return the blocks of a statement."""
+    if isinstance(statement, _INNER):
+        return []
+    holders: list[Any] = [statement]
+    holders += getattr(statement, "handlers", ())
+    holders += getattr(statement, "cases", ())
+    found = (getattr(each, name, None) for each in holders for name in _BLOCKS)
+    return [block for block in found if block]
+
+
+_BLOCKS = ("body", "orelse", "finalbody")
+
+
+def _excludes(way: tuple[tuple[int, int], ...], other: tuple[tuple[int, int], ...]) -> bool:
+    """Return whether two ways lead through different branches of a statement."""
+    one = dict(way)
+    return any(one.get(statement, branch) != branch for statement, branch in other)
+
+
 def _looks(node: ast.AST) -> bool:
     """Return whether a node names a method that checks; not `sleep`, which others have as well."""
     return isinstance(node, ast.Attribute) and node.attr in _LOOKS
@@ -335,6 +510,63 @@ def _passes(items: ast.expr) -> int:
     return 1
 
 
+def keys_written_aside(file: str, kinds: Collection[str]) -> frozenset[str] | None:
+    """Return the userdata keys that functions of a file write by a machine's attribute `userdata`.
+
+    Such a function may be the callback of a topic, which runs at any time. None: any key.
+
+    Args:
+        file: The file.
+        kinds: Names of the classes of the machines in question, for writes to `self.userdata`.
+    """
+    try:
+        written = _written_aside(file, Path(file).stat().st_mtime_ns)
+    except (OSError, SyntaxError, ValueError):
+        return None
+    keys = {key for kind, key in written if kind is None or kind in kinds}
+    return None if None in keys else frozenset(key for key in keys if key is not None)
+
+
+@functools.lru_cache(maxsize=256)
+def _written_aside(file: str, _changed: int) -> frozenset[tuple[str | None, str | None]]:
+    """Return pairs (class if it is `self.userdata`, key; None: any)."""
+    tree = ast.parse(Path(file).read_bytes())
+    owners = {
+        id(function): kind.name
+        for kind in ast.walk(tree)
+        if isinstance(kind, ast.ClassDef)
+        for function in kind.body
+    }
+    found: set[tuple[str | None, str | None]] = set()
+    for function in ast.walk(tree):
+        # A state's own `execute` is looked at with the state.
+        other = isinstance(function, _FUNCTIONS) and function.name != "execute"
+        nodes = [*_own_nodes(function)] if other else []
+        # Machines that it builds itself.
+        made = {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        for node in nodes:
+            value = getattr(node, "value", None)
+            if isinstance(value, ast.Attribute) and value.attr == "userdata":
+                base = value.value.id if isinstance(value.value, ast.Name) else ""
+                if base not in made:
+                    kind = owners.get(id(function)) if base == "self" else None
+                    found |= {(kind, key) for key in _written_key(node)}
+    return frozenset(found)
+
+
+def _written_key(node: ast.AST) -> set[str | None]:
+    """Return the key that `userdata.key = ...` or the like writes; None: any."""
+    if isinstance(node, ast.Attribute) and node.attr == "update":
+        return {None}
+    if not isinstance(getattr(node, "ctx", None), ast.Store):
+        return set()
+    if isinstance(node, ast.Attribute):
+        return {node.attr}
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+        return {str(node.slice.value)}
+    return {None}
+
+
 # -- userdata keys ---------------------------------------------------------------------------------
 
 
@@ -351,7 +583,7 @@ def keys_read(tree: Function, name: str) -> Reads | None:
     named = sum(isinstance(n, ast.Name) and n.id == name for n in nodes)
     if named > len(uses) + len(asked):
         return None
-    reader = _Reader(uses, asked)
+    reader = _FunctionWalk(uses, asked)
     own = set(_own_nodes(tree))
     reader.write(node for node in nodes if node not in own)  # by an inner function
     reader.visit_all(tree.body, always=True)
@@ -361,7 +593,26 @@ def keys_read(tree: Function, name: str) -> Reads | None:
     )
 
 
-class _Reader:
+def changed_values(tree: Function, name: str | None = None) -> Iterator[tuple[str, int]]:
+    """Yield the keys of the userdata called `name` whose values a function changes, with the line.
+
+    These are changes of the value itself, by a method of lists, dicts and sets or by an assignment
+    to a part of it; not `name.key = value`, which writes the key.
+    """
+    for node in _own_nodes(tree):
+        inner: Any = None
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            inner = node.func.value if node.func.attr in _CHANGERS else None
+        elif isinstance(_context(node), ast.Store | ast.Del):
+            inner = getattr(node, "value", None)
+        while isinstance(inner, ast.Attribute | ast.Subscript) and _key(inner, str(name)) is None:
+            inner = inner.value
+        key = None if inner is None else _key(inner, str(name))
+        if key is not None:
+            yield key, node.lineno  # type: ignore[attr-defined]
+
+
+class _FunctionWalk:
     """Visits a function in the order of execution.
 
     Args:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from actionlib_core.inputs.expression import Expression, ExpressionError
 from smachpy.checks import graph as runs
 from smachpy.checks.graph import PREEMPTED
 from smachpy.checks.model import Problem
-from smachpy.outcome_classes import outcome_class
+from smachpy.events.outcome_classes import outcome_class
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from smachpy.checks.graph import Graph
-    from smachpy.checks.model import Subject
-    from smachpy.introspection import StateRecord
+    from smachpy.checks.model import Severity, Subject
+    from smachpy.events.introspection import StateRecord
 
 
 def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
@@ -33,6 +34,7 @@ def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
                 yield subject.problem("unreachable-state", child, text, hint)
         yield from _outcomes(subject, record, made[record.path])
         yield from _leaf(subject, record)
+        yield from _cases(subject, record)
         if record.kind == "concurrence":
             yield from _concurrence(subject, record)
         if record.is_container and record is not subject.root:  # after the root, nothing can go on
@@ -60,11 +62,52 @@ def _leaf(subject: Subject, record: StateRecord) -> Iterator[Problem]:
         text = f"{record.path} returns {outcome!r}; its outcomes are {list(record.outcomes)}."
         hint = "Declare the outcome, or return another."
         yield subject.problem("undeclared-outcome", record, text, hint, place=place)
+    for key, place in facts.changes:
+        if key in record.input_keys and key not in record.output_keys:
+            text = (
+                f"{record.path} changes the value of userdata key {key!r}, which it may only read."
+            )
+            hint = "Declare the key with io_keys, or change a copy."
+            yield subject.problem("changed-input", record, text, hint, place=place)
+    hint = "Pass it in as userdata or as an argument, or call it by smachpy.once."
+    for what, place in facts.outside:
+        text = f"{record.path} uses {what}, which no recording has: it cannot be reproduced."
+        yield subject.problem("outside", record, text, hint, place=place)
     state = "smachpy.current_state()" if facts.is_function else "self"
     hint = f"Test {state}.preempt_requested() in the loop, or wait with {state}.sleep(...)."
     for what, place in facts.loops:
         text = f"{record.path}: {what} waits without looking at the preempt."
         yield subject.problem("deaf-loop", record, text, hint, place=place)
+
+
+def _cases(subject: Subject, record: StateRecord) -> Iterator[Problem]:
+    """Yield the conditions that never hold, always hold, or come too late to decide anything."""
+    before: dict[tuple[str, str], list[str]] = {}
+    for edge in record.transitions:
+        known = before.setdefault((edge.source, edge.outcome), [])
+        where = f"{record.path}/{edge.source} -{edge.outcome}->"
+        if "" in known:
+            text = f"{where} {edge.target} is never taken, as a condition before it always holds."
+        elif edge.guard and edge.guard in known:
+            text = f"{where} {edge.target} is never taken: {edge.guard!r} is asked before."
+        elif _constant(edge.guard) is False:
+            text = f"{where} {edge.target} is never taken: {edge.guard!r} never holds."
+        else:
+            known.append("" if _constant(edge.guard) else edge.guard)
+            continue
+        (child,) = (child for child in record.children if child.label == edge.source)
+        yield subject.problem("dead-case", child, text, "Correct the condition, or remove it.")
+
+
+def _constant(guard: str) -> bool | None:
+    """Return the value of a condition that asks for nothing; None for any other."""
+    if not guard:
+        return None
+    try:
+        expression = Expression(guard)
+        return None if expression.names else bool(expression({}))
+    except ExpressionError:  # the name of a function
+        return None
 
 
 def _waits(subject: Subject, record: StateRecord, *, limited: bool) -> Iterator[Problem]:
@@ -101,7 +144,8 @@ def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Proble
         parent = paths[0].rpartition("/")[0]
         if paths not in reported and not _is_ended_from_outside(subject, parent):
             reported.add(paths)
-            yield _endless(graph, parent, paths)
+            instant = all(subject.facts_of(r).instant for r in records if not r.is_container)
+            yield _endless(graph, parent, paths, instant=instant)
 
 
 def _is_ended_from_outside(subject: Subject, path: str) -> bool:
@@ -112,15 +156,22 @@ def _is_ended_from_outside(subject: Subject, path: str) -> bool:
     )
 
 
-def _endless(graph: Graph, parent: str, paths: tuple[str, ...]) -> Problem:
-    """Return the problem of a loop; only a note if the mission is meant to run for ever."""
+def _endless(graph: Graph, parent: str, paths: tuple[str, ...], *, instant: bool) -> Problem:
+    """Return the problem of a loop; only a note if the mission is meant to run for ever.
+
+    If none of its states takes time, a processor is busy for ever and virtual time stands still.
+    """
     labels = ", ".join(path.rpartition("/")[2] for path in paths)
-    text = f"{parent}: {labels} lead only to {'each other' if len(paths) > 1 else 'itself'}"
+    many = len(paths) > 1
+    text = f"{parent}: {labels} lead only to {'each other' if many else 'itself'}"
+    text += f" and take{'' if many else 's'} no time" if instant else ""
     begins = {number for path in paths for number in graph.begins(path)}
     steps = runs.moments(graph.path([graph.start], begins) or [])
     if _only_fails(graph):
         text += "; the mission runs until it is preempted."
-        return Problem("endless-loop", "note", parent, text, moments=steps)
+        severity: Severity = "warning" if instant else "note"
+        hint = "Let a state of it wait, for instance with self.sleep(...)." if instant else ""
+        return Problem("endless-loop", severity, parent, text, hint, moments=steps)
     text += "; no outcome ends the loop."
     return Problem(
         "endless-loop", "error", parent, text, "Lead a transition out of it.", moments=steps
@@ -149,10 +200,10 @@ def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
             text = f"{record.path}: with {ends} the rules for {sorted(rivals)} hold equally; the "
             hint = "Make one of them ask for more."
             yield subject.problem("ambiguous-map", record, text + "last one wins.", hint)
-    waiting = [child for child in record.children if _only_preempt_ends(subject, child)]
+    waiting = [child for child in record.others if _only_preempt_ends(subject, child)]
     if (
         facts.cuts
-        or len(waiting) == len(record.children)  # it is meant to run as long as the mission
+        or len(waiting) == len(record.others)  # it is meant to run as long as the mission
         or _is_ended_from_outside(subject, record.path)
     ):
         return
@@ -187,7 +238,9 @@ def _goes_on(subject: Subject, record: StateRecord, outcome: str) -> bool:
         for edge in parent.transitions if record in parent.children else ():
             if (edge.source, edge.outcome) == (record.label, outcome):
                 ends = edge.target_is_outcome and edge.target != PREEMPTED
-                return _goes_on(subject, parent, edge.target) if ends else edge.target != PREEMPTED
+                on = _goes_on(subject, parent, edge.target) if ends else edge.target != PREEMPTED
+                if on:
+                    return True
     return False
 
 
@@ -195,16 +248,17 @@ def _preempt_ends(subject: Subject, record: StateRecord) -> Iterator[tuple[str, 
     """Yield (child, container outcome) for the outcomes that preempted children lead to."""
     if record.kind == "concurrence":
         facts = subject.facts_of(record)
-        if not facts.any_outcome and all(PREEMPTED in c.outcomes for c in record.children):
-            ruled = runs.decide(facts, {child.label: PREEMPTED for child in record.children})
+        if not facts.any_outcome and all(PREEMPTED in c.outcomes for c in record.others):
+            ruled = runs.decide(facts, {child.label: PREEMPTED for child in record.others})
             usual = PREEMPTED if PREEMPTED in record.outcomes else record.default_outcome
             if ruled or usual:
                 yield "all its children", ruled or usual or ""
         return
-    edges = {(e.source, e.outcome): e for e in record.transitions}
     for child in record.children:
-        edge = edges.get((child.label, PREEMPTED))
-        queue = [edge] if edge is not None and PREEMPTED in child.outcomes else []
+        way_out = [
+            e for e in record.transitions if (e.source, e.outcome) == (child.label, PREEMPTED)
+        ]
+        queue = way_out if PREEMPTED in child.outcomes else []
         seen = {child.label}
         ends: set[str] = set()
         while queue:

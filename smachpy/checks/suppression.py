@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actionlib_core.checked_file import REQUIRED, CheckedFile
+from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile
 from smachpy.checks.model import RULES
 from smachpy.exceptions import SmachError, did_you_mean
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from actionlib_core.checked_file import Parsed, Section
-    from actionlib_core.checked_file import Problem as WrongField
+    from actionlib_core.inputs.checked_file import Parsed, Section
+    from actionlib_core.inputs.checked_file import Problem as WrongField
     from smachpy.checks.model import Problem
     from smachpy.machines.state import State
 
@@ -32,7 +32,10 @@ _COMMENT = re.compile(r"#\s*smachpy:\s*ignore\[([^\]]*)\]\s*(.*)")
 
 
 class IgnoreError(SmachError):
-    """A rule is switched off incorrectly."""
+    """A rule is switched off incorrectly.
+
+    Try: write `# smachpy: ignore[rule]` with a rule of `docs/check.md`.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +151,9 @@ def _parse_toml(file: CheckedFile, text: str) -> Parsed:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         file.report("", f"not TOML: {error}.", 0)
+        return None, {}
+    except RecursionError:
+        file.report("", "not TOML that people write: it is nested too deeply.", 0)
         return None, {}
     lines, table, counts = {}, "", Counter[str]()
     for number, line in enumerate(text.splitlines(), 1):

@@ -7,19 +7,21 @@ begins, and its output keys out when it ends. A leaf is assumed to write all its
 from __future__ import annotations
 
 from collections import deque
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from smachpy.checks.graph import moments
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from smachpy.checks.graph import Graph, Node
     from smachpy.checks.model import Problem, Subject
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 Variable: TypeAlias = tuple[str, str]  # path of the container, key
-MOST_STEPS = 50_000  # the most moments in the search for a run that shows a problem
+MAX_SHOWN_RUNS = 100  # problems that are shown with a run, which is as long as the machine
+MAX_SEARCH_STEPS = 50_000  # the most moments in the search for a run that shows a problem
 
 
 def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
@@ -27,6 +29,30 @@ def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
     flow = _Flow(subject, graph)
     yield from flow.unset()
     yield from flow.unread()
+    yield from _kept(subject, graph)
+
+
+def _kept(subject: Subject, graph: Graph) -> Iterator[Problem]:
+    """Yield the keys that a nested machine sets once and that its visits change for the next."""
+    for record in subject.root.walk():
+        kept = subject.facts_of(record).kept
+        if not kept or record is subject.root:
+            continue
+        begins = graph.begins(record.path)
+        ends = {n.number for n in graph.nodes if n.record is record and n.outcome is not None}
+        if not begins & graph.reachable({a for end in ends for a in graph.after(end)}):
+            continue  # no run gets to it twice
+        for child in record.children:
+            names = dict(child.remapping)
+            for key in sorted({names.get(key, key) for key in child.output_keys} & kept):
+                yield subject.problem(
+                    "kept-value",
+                    record,
+                    f"{record.path} sets userdata key {key!r} once, before the run, and "
+                    f"{child.label} writes it: a later visit begins with what the former one left.",
+                    f"Give it a value for each visit: {record.label} = StateMachine(..., "
+                    f"userdata={{{key!r}: ...}}).",
+                )
 
 
 class _Flow:
@@ -106,6 +132,10 @@ class _Flow:
             reader: A leaf that reads it.
             key: Its name there.
         """
+        if variable not in self._ever_written:
+            return False
+        if not reader.output_keys:  # what the others write is all that is written
+            return True
         known = self._subject.facts_of(reader).reads
         others = {
             number
@@ -113,13 +143,21 @@ class _Flow:
             if self._graph.nodes[number].record.path != reader.path
             or (known is not None and key in known.writes)
         }
+        return variable in self._written_by(others)
+
+    @cached_property
+    def _ever_written(self) -> frozenset[Variable]:
+        return self._written_by(self._written)
+
+    def _written_by(self, numbers: Collection[int]) -> frozenset[Variable]:
+        """Return the variables that are written at these moments, whatever their order."""
         ever: frozenset[Variable] = self._preset
         before: frozenset[Variable] | None = None
         while ever != before:
             before = ever
-            for number in others:
+            for number in numbers:
                 ever = self._pass(self._graph.nodes[number], ever)
-        return variable in ever
+        return ever
 
     # -- rules ---------------------------------------------------------------------------------
 
@@ -137,6 +175,7 @@ class _Flow:
                     or (node.record.path, key) in reported
                     or variable in self._pass(node, written)
                     or variable[0] in self._watched  # a callback may have written it
+                    or variable[1] in self._subject.aside
                 ):
                     continue
                 sure = key in reads.always
@@ -145,9 +184,12 @@ class _Flow:
                     key in reads.sometimes and not self._may_be_written(variable, node.record, key)
                 ):
                     reported.add((node.record.path, key))
-                    yield self._unset(node, key, variable, sure=sure)
+                    shows = len(reported) <= MAX_SHOWN_RUNS
+                    yield self._unset(node, key, variable, sure=sure, shows=shows)
 
-    def _unset(self, node: Node, key: str, variable: Variable, *, sure: bool) -> Problem:
+    def _unset(
+        self, node: Node, key: str, variable: Variable, *, sure: bool, shows: bool
+    ) -> Problem:
         path = node.record.path
         alias = "" if variable[1] == key else f" ({key!r} there)"
         beside = self._beside(node.record, variable)
@@ -160,7 +202,7 @@ class _Flow:
             "Write it before, set it in the machine's userdata, or declare it as an input key "
             "of the machine.",
             severity="error" if sure and not beside else "warning",
-            moments=moments(self._witness(node, variable)),
+            moments=moments(self._witness(node, variable)) if shows else (),
         )
 
     def _beside(self, record: StateRecord, variable: Variable) -> str:
@@ -189,7 +231,7 @@ class _Flow:
         came: dict[tuple[int, frozenset[Variable]], tuple[int, frozenset[Variable]] | None]
         came = {first: None}
         queue = deque([first])
-        while queue and len(came) < MOST_STEPS:
+        while queue and len(came) < MAX_SEARCH_STEPS:
             at = queue.popleft()
             if graph.nodes[at[0]].record.path == goal.record.path and variable not in at[1]:
                 steps = [at]

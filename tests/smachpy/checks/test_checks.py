@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import os
 import threading
 import time
 
@@ -20,6 +21,7 @@ from smachpy import (
     StateMachine,
     any_of,
     cb_interface,
+    when,
 )
 from smachpy.checks import (
     RULES,
@@ -130,6 +132,19 @@ def test_a_state_behind_an_impossible_outcome_is_unreachable():
     found = check(sm)
     assert the(found, "unreachable-state").path == "/M/B"
     assert the(found, "impossible-outcome").path == "/M/A"
+
+
+@pytest.mark.parametrize(
+    "cases",
+    [
+        [when("1 > 2", "B"), "done"],
+        [when("True", "B"), "done"],
+        [when("x < 1", "B"), when("x < 1", "A"), "done"],
+    ],
+)
+def test_a_condition_that_decides_nothing(cases):
+    found = check(machine(("A", Leaf(), {"done": cases}), ("B", Leaf(), {})))
+    assert the(found, "dead-case").path == "/M/A"
 
 
 def test_container_outcome_that_nothing_leads_to():
@@ -303,6 +318,87 @@ def test_a_key_that_nobody_reads():
     assert found.ok
 
 
+# -- values that are changed or kept ---------------------------------------------------------------
+
+
+def appends(ud):
+    ud.seen.append(1)
+    return "done"
+
+
+def assigns_a_part(ud):
+    ud["seen"][0].x = 1
+    return "done"
+
+
+def deletes_a_part(ud):
+    del ud.seen[0]
+    return "done"
+
+
+def counts_a_part(ud):
+    ud.seen["n"] += 1
+    return "done"
+
+
+def changes_a_copy(ud):
+    seen = [*ud.seen]
+    seen.append(len(ud.seen))
+    ud.other.append(2)
+    return "done"
+
+
+@pytest.mark.parametrize("code", [appends, assigns_a_part, deletes_a_part, counts_a_part])
+def test_a_change_of_an_input_is_found_with_its_line(code):
+    state = CBState(code, outcomes=["done"], input_keys=["seen"])
+    sm = machine(("A", state, {}))
+    sm.userdata.seen = [0]
+
+    problem = the(check(sm), "changed-input")
+
+    assert problem.path == "/M/A"
+    assert "'seen'" in problem.message
+    assert problem.place.line == code.__code__.co_firstlineno + 1
+
+
+@pytest.mark.parametrize(
+    ("code", "inputs", "outputs"),
+    [(appends, ["seen"], ["seen"]), (changes_a_copy, ["seen", "other"], ["other"])],
+)
+def test_what_may_be_changed_is_no_problem(code, inputs, outputs):
+    sm = machine(
+        ("A", CBState(code, outcomes=["done"], input_keys=inputs, output_keys=outputs), {})
+    )
+    sm.userdata.update({"seen": [0], "other": []})
+
+    assert "changed-input" not in [problem.rule for problem in check(sm)]
+
+
+@pytest.mark.parametrize(
+    ("again", "writes", "fresh", "is_found"),
+    [
+        (True, True, False, True),
+        (False, True, False, False),  # no run gets there twice
+        (True, False, False, False),  # nothing writes it
+        (True, True, True, False),  # each visit begins afresh
+    ],
+)
+def test_a_value_that_a_visit_leaves_to_the_next_is_found(again, writes, fresh, is_found):
+    inner = StateMachine(["done"], userdata={"pose": None} if fresh else None)
+    if not fresh:
+        inner.userdata.pose = None
+    with inner:
+        inner.add("LOOK", Leaf(output_keys=["pose"] if writes else []))
+    sm = machine(
+        ("FIND", inner, {"done": "GRIP"}),
+        ("GRIP", Leaf("done", "again"), {"again": "FIND" if again else "done"}),
+    )
+
+    found = [p for p in check(sm) if p.rule == "kept-value"]
+
+    assert [p.path for p in found] == (["/M/FIND"] if is_found else [])
+
+
 # -- loops, waits, preempts ------------------------------------------------------------------------
 
 
@@ -320,6 +416,45 @@ def test_a_loop_with_no_way_out():
 def test_a_loop_that_only_a_preempt_ends_has_a_way_out():
     sm = machine(("A", Leaf("done", "preempted"), {"done": "A"}), outcomes=["preempted"])
     assert check(sm).ok
+
+
+def at_once(ud):
+    print("again", len("text"))
+    return "done"
+
+
+def calls_a_function(ud):
+    at_once(ud)
+    return "done"
+
+
+def calls_a_builtin_by_name(ud, abs=time.sleep):  # noqa: A002
+    abs(1.0)
+    return "done"
+
+
+@pytest.mark.parametrize(
+    ("code", "severity"),
+    [(at_once, "warning"), (calls_a_function, "note"), (calls_a_builtin_by_name, "note")],
+)
+def test_a_loop_for_ever_is_a_warning_if_no_state_of_it_takes_time(code, severity):
+    sm = machine(
+        ("A", CBState(code, outcomes=["done"]), {"done": "B"}),
+        ("B", CBState(at_once, outcomes=["done"]), {"done": "A"}),
+        outcomes=["preempted"],
+    )
+
+    problem = the(check(sm), "endless-loop")
+
+    assert problem.severity == severity
+    assert ("take no time" in problem.message) == (severity == "warning")
+
+
+def test_a_retry_takes_time():
+    waits = CBState(at_once, outcomes=["done"], retry=smachpy.Retry(3, backoff=5.0, on=["done"]))
+    sm = machine(("A", waits, {"done": "A"}), outcomes=["preempted"])
+
+    assert the(check(sm), "endless-loop").severity == "note"
 
 
 def test_a_loop_inside_a_concurrence_has_its_way_out():
@@ -363,11 +498,20 @@ def test_a_rule_that_is_off_is_looked_for_when_somebody_asks():
     sm = machine(
         ("A", SimpleActionState("move_base", MoveBaseAction), ends), outcomes=["done", "preempted"]
     )
-    assert [rule.name for rule in RULES.values() if not rule.is_on] == ["no-timeout"]
+    assert [rule.name for rule in RULES.values() if not rule.is_on] == ["no-timeout", "outside"]
     assert check(sm).problems == ()
     assert rules(check(sm, enable=["no-timeout"])) == ["no-timeout"]
     with pytest.raises(IgnoreError, match="Did you mean 'no-timeout'"):
         check(sm, enable=["no-timeouts"])
+
+
+def test_what_no_recording_has_is_looked_for_when_somebody_asks():
+    def look(ud):
+        return "done" if os.environ.get("HOME") else "failed"
+
+    sm = machine(("A", CBState(look, outcomes=["done", "failed"]), {"failed": "done"}))
+    found = the(check(sm, enable=["outside"]), "outside")
+    assert "/M/A uses os.environ.get, which no recording has" in found.message
 
 
 def test_a_loop_that_never_looks_at_the_preempt():
@@ -552,6 +696,7 @@ FORK = "init* -> A.exec A.exec~ : A.start\nA.exec A.exec~ -> goal : A.end"
         (RUN + "x -> goal : t", "net-dead"),
         (RUN + "A.exec -> goal : A.end [c]", "net-race"),
         (FORK, "net-shared"),
+        (RUN + "init -> x : t\nx -> init : u", "net-busy"),
     ],
 )
 def test_plans(text, rule):

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import functools
 import os
+import runpy
 import threading
 import time
 
@@ -437,3 +438,118 @@ def test_rules_that_hold_at_once_behind_an_outcome_callback():
 
     assert both() == ["ambiguous-map"]
     assert both(outcome_cb=lambda outcomes: "a") == []
+
+
+# -- values that change, and keys that others write ------------------------------------------------
+
+
+def changed_before_it_is_returned(ud):
+    result = "first"
+    if ud.x:
+        result = "done"
+    return result
+
+
+def changed_when_it_is_tested(ud):
+    result = "first" if ud.x else "other"
+    while result == "first" or result != "done":
+        result = "done"
+    return result
+
+
+def changed_in_a_handler(ud):
+    result = "first"
+    try:
+        result = "done"
+    except ValueError:
+        result = "failed"
+    return result
+
+
+def looked_up_before_it_is_returned(ud):
+    result = "first"
+    table = {"first": "done"}
+    return table[result]
+
+
+def changed_in_a_loop(ud):
+    result = "first"
+    for result in ("done", "failed"):
+        print(result)
+    return result
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        changed_before_it_is_returned,
+        changed_when_it_is_tested,
+        changed_in_a_handler,
+        looked_up_before_it_is_returned,
+        changed_in_a_loop,
+    ],
+)
+def test_a_value_that_may_change_before_the_return_is_not_certain(function):
+    child = CBState(function, outcomes=["done", "failed"], input_keys=["x"])
+    assert "undeclared-outcome" not in rules(child)
+
+
+def last_value(ud):
+    result = "done"
+    if ud.x:
+        result = "finished"
+    return result
+
+
+def value_of_a_branch(ud):
+    if ud.x:
+        result = "done"
+    else:
+        print("late")
+        result = "finished"
+    return result
+
+
+@pytest.mark.parametrize("function", [last_value, value_of_a_branch])
+def test_the_last_value_before_the_return_is_certain(function):
+    child = CBState(function, outcomes=["done", "failed"], input_keys=["x"])
+    assert "undeclared-outcome" in rules(child)
+
+
+ASIDE = """
+import smachpy
+
+work = smachpy.StateMachine(["done"], name="WORK")
+
+
+def heard(message):
+    {write}
+
+
+def obey(ud):
+    print(ud.order)
+    return "done"
+
+
+work.add("OBEY", smachpy.CBState(obey, outcomes=["done"], input_keys=["order"]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("write", "problems"),
+    [
+        ('work.userdata["order"] = message', []),
+        ("work.userdata.order = message", []),
+        ("work.userdata[message.key] = message", []),
+        ("work.userdata.update(order=message)", []),
+        ("work.userdata.other = message", ["unset-key"]),
+        ("sm = smachpy.StateMachine(['done']); sm.userdata.order = 1", ["unset-key"]),
+        ("print(work.userdata.order)", ["unset-key"]),
+    ],
+)
+def test_a_key_that_a_callback_of_the_file_writes_may_be_set(tmp_path, write, problems):
+    file = tmp_path / "aside.py"
+    file.write_text(ASIDE.format(write=write))
+    names = runpy.run_path(str(file))
+    found = [problem.rule for problem in check(names["work"]).problems]
+    assert found == problems

@@ -139,12 +139,18 @@ def hierarchical_state_machine():
     return sm_top
 
 
+class BasWithARest(Bas):
+    def execute(self, userdata):
+        time.sleep(1.0)
+        return "outcome3"
+
+
 @sound
 def hierarchical_state_machine_that_runs_for_ever():
     """The inner pair has another way out, and the outer loop has none: its author wants that."""
     sm_top = smach.StateMachine(outcomes=["preempted"])
     with sm_top:
-        smach.StateMachine.add("BAS", Bas(), transitions={"outcome3": "SUB"})
+        smach.StateMachine.add("BAS", BasWithARest(), transitions={"outcome3": "SUB"})
         sm_sub = smach.StateMachine(outcomes=["outcome4"])
         with sm_sub:
             smach.StateMachine.add(

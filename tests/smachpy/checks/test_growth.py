@@ -1,0 +1,94 @@
+"""Checks and pictures of large machines: steps of the interpreter are counted, not seconds."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import smachpy
+from smachpy import CBState, Concurrence, StateMachine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+SMALL, LARGE = 40, 320
+
+
+def lines_run(function: Callable[[], Any]) -> int:
+    """Return how many lines of Python a call runs; each turn of a loop counts."""
+    count = 0
+
+    def trace(_frame: Any, event: str, _arg: Any) -> Any:
+        nonlocal count
+        count += event == "line"
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        function()
+    finally:
+        sys.settrace(before)
+    return count
+
+
+def slope(make: Callable[[int], Any], run: Callable[[Any], Any]) -> float:
+    """Return the exponent of the growth from `SMALL` to `LARGE`."""
+    run(make(3))  # imports and caches
+    small, large = make(SMALL), make(LARGE)
+    steps = lines_run(lambda: run(small)), lines_run(lambda: run(large))
+    return math.log(steps[1] / steps[0]) / math.log(LARGE / SMALL)
+
+
+def work(userdata: Any) -> str:
+    return "ok"
+
+
+def reads(userdata: Any) -> str:
+    return "ok" if userdata.v else "failed"
+
+
+def chain(size: int, last: str = "done", state: Callable[[int], Any] | None = None) -> StateMachine:
+    machine = StateMachine(["done", "preempted"], name="BIG")
+    with machine:
+        for number in range(size):
+            target = f"S{number + 1}" if number + 1 < size else last
+            made = CBState(work, outcomes=["ok"]) if state is None else state(number)
+            StateMachine.add(
+                f"S{number}", made, {"ok": target, "failed": "done"} if state else {"ok": target}
+            )
+    return machine
+
+
+def ring(size: int) -> StateMachine:
+    return chain(size, last="S0")
+
+
+def unset(size: int) -> StateMachine:
+    return chain(size, state=lambda _: CBState(reads, outcomes=["ok", "failed"], input_keys=["v"]))
+
+
+def wide(size: int) -> Concurrence:
+    both = Concurrence(["done"], "done", name="WIDE")
+    for number in range(size):
+        both.add(f"S{number}", CBState(work, outcomes=["ok"]))
+    return both
+
+
+@pytest.mark.parametrize("make", [chain, ring, unset, wide])
+def test_check_grows_with_the_machine(make: Callable[[int], Any]) -> None:
+    assert slope(make, smachpy.check) < 1.2
+
+
+@pytest.mark.parametrize("what", ["always_reaches(done)", "never(S2)", "after_preempt(S2)"])
+def test_properties_grow_with_the_machine(what: str) -> None:
+    assert slope(chain, lambda machine: smachpy.check(machine, properties=[what])) < 1.2
+    assert slope(ring, lambda machine: smachpy.check(machine, properties=[what])) < 1.2
+
+
+def test_drawing_as_text_grows_with_the_machine(tmp_path: Path) -> None:
+    assert slope(chain, lambda machine: smachpy.render(machine, tmp_path / "m.txt")) < 1.2
