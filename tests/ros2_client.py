@@ -18,7 +18,7 @@ from actionlib_core.wire.ros2.action_messages import (
     unpack_with_id,
 )
 from actionlib_core.wire.ros2.attachment import unpack_attachment
-from actionlib_core.wire.ros2.graph import ActionServers, End, RosNode, RosType
+from actionlib_core.wire.ros2.graph import ActionServers, RosEnd, RosNode, RosType
 from actionlib_core.wire.ros2.names import LATCHED, Kind, action_names
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class Ros2Client:
         topics = (self.parts.feedback, self.parts.status)
         types = [RosType(part.type, part.hash) for part in (*services, *topics)]
         kinds = (Kind.CLIENT,) * 3 + (Kind.SUBSCRIPTION,) * 2
-        self.ends: dict[str, End] = {
+        self.ends: dict[str, RosEnd] = {
             full: self.node.end(kind, full, ros_type)
             for full, kind, ros_type in zip(self.names, kinds, types, strict=True)
         }

@@ -20,7 +20,7 @@ from actionlib_core.wire.ros2.action_messages import (
     unpack_id,
 )
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
-from actionlib_core.wire.ros2.graph import End, RosNode, RosType
+from actionlib_core.wire.ros2.graph import RosEnd, RosNode, RosType
 from actionlib_core.wire.ros2.names import LATCHED, Kind, action_names
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Ros2Server:
         topics = (self.parts.feedback, self.parts.status)
         types = [RosType(part.type, part.hash) for part in (*services, *topics)]
         kinds = (Kind.SERVICE,) * 3 + (Kind.PUBLISHER,) * 2
-        self.ends: list[End] = [
+        self.ends: list[RosEnd] = [
             self.node.end(kind, full, ros_type)
             for full, kind, ros_type in zip(names, kinds, types, strict=True)
         ]

@@ -11,9 +11,9 @@ import pytest
 from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy.sim.config import load_config
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.occupancy import load_map
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import load_map
+from smachpy.places.robot_file import load_config
 from smachpy.sim.server import RobotServer
 from smachpy.sim.world import Robot, World
 

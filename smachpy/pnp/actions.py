@@ -7,11 +7,11 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
+from smachpy.base.problems import Problems
+from smachpy.engine.frame import clock_of_run
+from smachpy.engine.preempt import on_preempt
 from smachpy.exceptions import InvalidStateError, did_you_mean, error_text
-from smachpy.machines.problems import Problems
 from smachpy.machines.state import State
-from smachpy.run.frame import clock_of_run
-from smachpy.run.grace import on_preempt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -119,6 +119,25 @@ class Goal:
     goal: Mapping[str, Any] = field(default_factory=dict)
     cases: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class NotImported:
+    """Stands for what `run: module:name` names in a plan that is only looked at.
+
+    Attributes:
+        name: "module:name".
+    """
+
+    name: str
+
+    def __call__(self, *_: object) -> Any:
+        """Refuse to run.
+
+        Raises:
+            InvalidStateError: always.
+        """
+        raise InvalidStateError(f"{self.name}: it was not imported.")
 
 
 class Unbound(State):
@@ -365,13 +384,16 @@ class Binder:
             return given
         if isinstance(given, Goal):
             return _goal_state(call, given)
+        if isinstance(given, NotImported):
+            return FunctionAction(call, Function(given))
         if isinstance(given, type) and issubclass(given, State):
             if call.variables:
                 raise InvalidStateError(
                     f"{call.name}: got a class of states; expected a function, because "
                     f"{['@' + v for v in call.variables]} are known only when it runs."
                 )
-            return _checked(call, given(*call.parameters))
+            made: Callable[..., State] = given
+            return _checked(call, made(*call.parameters))
         if isinstance(given, Made):
             return _checked(call, given.make(call))
         function = given if isinstance(given, Function) else Function(given)

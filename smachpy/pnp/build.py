@@ -18,10 +18,10 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
+from smachpy.base.problems import Problems
 from smachpy.exceptions import InvalidStateError, did_you_mean
-from smachpy.machines.problems import Problems
 from smachpy.pnp.conditions import ConditionError, parse
-from smachpy.pnp.net import Arc, Net, Place, Transition
+from smachpy.pnp.net import MAX_PARTS, Arc, Net, Place, Transition
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,7 +32,7 @@ LASTS: Final = ("restart_action", "skip_action", "restart_plan", "fail_plan", "g
 ACTION_FAILED: Final = "action_failed"
 # Dots, brackets, ';', '|' and others separate parts of labels or of plans in text form.
 _NAME = re.compile(r"[^\s()\[\].;|<>{}:?!*][^\s()\[\];|<>{}:?!*]*")
-_DEEPEST: Final = 100
+_MAX_PART_NESTING: Final = 100
 
 
 @dataclass(frozen=True)
@@ -309,6 +309,8 @@ class _NetBuilder:
 
     def _place(self, name: str = "", line: int = 0) -> int:
         number = len(self._places)
+        if number + len(self._transitions) >= MAX_PARTS:
+            raise InvalidStateError(f"{self._name}: got more than {MAX_PARTS:,} nodes.")
         self._places.append((name or f"X{number}", line))
         return number
 
@@ -322,8 +324,10 @@ class _NetBuilder:
         """Add a part from the place `entry`; return its last place, None if it ends in a jump."""
         # An error with the plan's name rather than a RecursionError.
         self._depth += 1
-        if self._depth > _DEEPEST:
-            raise InvalidStateError(f"{self._name}: got more than {_DEEPEST} parts in each other.")
+        if self._depth > _MAX_PART_NESTING:
+            raise InvalidStateError(
+                f"{self._name}: got more than {_MAX_PART_NESTING} parts in each other."
+            )
         try:
             return self._add_part(part, entry)
         finally:

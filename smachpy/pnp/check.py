@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import combinations
-from typing import TYPE_CHECKING
+from graphlib import CycleError, TopologicalSorter
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING, TypeVar
 
 from smachpy.pnp.plan import problem_of
 from smachpy.pnp.reach import explore
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Hashable, Iterator, Mapping
 
     from smachpy.pnp.conditions import Condition
     from smachpy.pnp.plan import Plan
     from smachpy.pnp.problems import PlanProblem
     from smachpy.pnp.reach import Reachable
 
-MOST_SHOWN = 20
+T = TypeVar("T", bound="Hashable")
+
+MAX_SHOWN_PROBLEMS = 20
 """Dead transitions, and unmarked places, that are reported one by one; the rest is counted."""
 
 
@@ -48,6 +51,7 @@ def _net_problems(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
         yield from _never(plan, reached)
     yield from _shared(plan, reached)
     yield from _races(plan, reached)
+    yield from _busy(plan, reached)
 
 
 def _unbounded(plan: Plan, reached: Reachable) -> PlanProblem:
@@ -106,14 +110,14 @@ def _never(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
     transitions = [
         t for t in range(len(net.transitions)) if t not in reached.fired and net.inputs[t]
     ]
-    for number in transitions[:MOST_SHOWN]:
+    for number in transitions[:MAX_SHOWN_PROBLEMS]:
         text = "can never fire: no firing sequence fills its places."
         yield problem_of(net, "dead-transition", "warning", text, transition=number)
     places = [p for p in range(len(net.places)) if p not in reached.most]
-    for number in places[:MOST_SHOWN]:
+    for number in places[:MAX_SHOWN_PROBLEMS]:
         text = "is never marked: no firing sequence puts a token there."
         yield problem_of(net, "unmarked-place", "warning", text, place=number)
-    hidden = len(transitions[MOST_SHOWN:]) + len(places[MOST_SHOWN:])
+    hidden = len(transitions[MAX_SHOWN_PROBLEMS:]) + len(places[MAX_SHOWN_PROBLEMS:])
     if hidden:
         text = f"has {hidden} more places and transitions that no firing sequence gets to."
         yield problem_of(net, "dead-transition", "warning", text)
@@ -187,6 +191,49 @@ def _races(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
                     run=reached.run_to(marking),
                     marking=marking,
                 )
+
+
+def _busy(plan: Plan, reached: Reachable) -> Iterator[PlanProblem]:
+    """Yield a loop of firings in which nothing waits: neither a guard nor the end of an action."""
+    net = plan.net
+    free = {t for t in reached.fired if plan.guards[t] is None}
+    # Few nets have a loop of places through such transitions; only their markings are looked at.
+    places = {place: set[int]() for place in range(len(net.places))}
+    for transition in free:
+        for place, _ in net.inputs[transition]:
+            places[place] |= {to for to, _ in net.outputs[transition]}
+    if not _loop(places):
+        return
+    after = {
+        marking: {net.fire(marking, t): t for t in net.enabled(marking) if t in free}
+        for marking in reached.came
+        if not (plan.is_goal(marking) or plan.is_fail(marking))  # there it ends
+    }
+    loop = _loop(after)
+    if loop:
+        fired = [after[one][other] for one, other in pairwise(loop)]
+        names = ", ".join(dict.fromkeys(map(net.transition_name, fired)))
+        words = net.words(loop[0])
+        text = f"fires for ever without taking time: {names} lead from {words} back to it."
+        yield problem_of(
+            net,
+            "busy",
+            "warning",
+            text,
+            transition=fired[0],
+            hint="Put an action or a condition into the loop.",
+            run=reached.run_to(loop[0]),
+            marking=loop[0],
+        )
+
+
+def _loop(after: Mapping[T, Collection[T]]) -> list[T]:
+    """Return a way through a graph (node -> its successors) that ends where it began, or []."""
+    try:
+        TopologicalSorter(after).prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))  # it takes successors for predecessors
+    return []
 
 
 def _may_both_hold(one: Condition | None, other: Condition | None) -> bool:

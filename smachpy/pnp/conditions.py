@@ -21,7 +21,7 @@ Operator: TypeAlias = Literal["atom", "not", "and", "or"]
 # An atom as in PNP's grammar; any other character is an error, except brackets.
 _TOKEN = re.compile(r"\s*(?:(?P<atom>@?[A-Za-z][A-Za-z0-9\-@._#{},<>+^/\"]*)|(?P<other>\S))")
 _KEYWORDS = {"and": "and", "AND": "and", "or": "or", "OR": "or", "not": "not", "NOT": "not"}
-_DEEPEST = 50  # brackets; the reader is recursive
+_MAX_BRACKETS = 50  # brackets; the reader is recursive
 OF_ACTION = ("finished", "failed")
 """States of an action that a condition may test: `goto_kitchen.finished`."""
 
@@ -97,13 +97,13 @@ def parse(text: str) -> Condition:
     Raises:
         ConditionError: the text cannot be read.
     """
-    reader = _Reader(text)
+    reader = _ConditionParser(text)
     found = reader.body(0)
     reader.end()
     return found
 
 
-class _Reader:
+class _ConditionParser:
     def __init__(self, text: str) -> None:
         self._text = text
         self._tokens: list[tuple[str, int]] = []
@@ -140,8 +140,8 @@ class _Reader:
         return ConditionError(self._text, at, f"got {got}; expected {expected}.{hint}")
 
     def body(self, depth: int) -> Condition:
-        if depth > _DEEPEST:
-            raise self._fail(f"at most {_DEEPEST} brackets in each other")
+        if depth > _MAX_BRACKETS:
+            raise self._fail(f"at most {_MAX_BRACKETS} brackets in each other")
         if self._next() == "(":
             return self._bracket(depth)
         operator = _KEYWORDS.get(self._next())

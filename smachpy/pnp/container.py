@@ -7,33 +7,34 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from smachpy.base.problems import Problems
+from smachpy.engine.described import ContainerData
+from smachpy.engine.step import make_step
+from smachpy.events.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.exceptions import InvalidStateError, did_you_mean
-from smachpy.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.machines.container import Container, below
-from smachpy.machines.problems import Problems
 from smachpy.machines.state import DataOf, Shown
-from smachpy.pnp.actions import Binder, Order, SetVariable, Unbound, Wait, WaitFor
+from smachpy.pnp.actions import Binder, NotImported, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
 from smachpy.pnp.firing import Table
-from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge, is_built_in
+from smachpy.pnp.knowledge import EVENT_LIFE_S, Knowledge, Polled, is_built_in
 from smachpy.pnp.net import Net
 from smachpy.pnp.plan import Plan, problem_of, understand
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
 from smachpy.pnp.reading import find_plan, read_net
-from smachpy.run.child import ContainerData
-from smachpy.run.step import make_step
-from smachpy.run.visit import End
 from smachpy.userdata.user_data import CheckedDict, data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from typing import Unpack
 
-    from smachpy.introspection import Kind
+    from smachpy.base.names import Names
+    from smachpy.checks.model import Problem
+    from smachpy.engine.frame import Frame
+    from smachpy.events.introspection import Kind
     from smachpy.machines.state import StateOptions
     from smachpy.pnp.knowledge import Events
     from smachpy.pnp.server import PNPServer
-    from smachpy.run.frame import Frame
     from smachpy.userdata.user_data import Fields, UserData
 
 __all__ = ["PetriNetPlan", "load"]
@@ -48,20 +49,20 @@ class PlanData(ContainerData):
         net_plan: The plan itself.
         names: Label of a child -> the plan's name for it.
         knowledge: The conditions and events that its guards ask for.
-        has_actions: Whether actions were registered.
+        registered: The actions that were registered.
         unbound: Label -> the problem of an action for which nothing is registered.
         execution: The current run, or None.
     """
 
-    __slots__ = ("execution", "has_actions", "knowledge", "names", "net_plan", "unbound")
-    _kept = ("has_actions", "knowledge", "names", "net_plan", "unbound")
+    __slots__ = ("execution", "knowledge", "names", "net_plan", "registered", "unbound")
+    _kept = ("knowledge", "names", "net_plan", "registered", "unbound")
 
     def __init__(self) -> None:
         super().__init__()
         self.net_plan: Any = None
         self.names: dict[str, str] = {}
         self.knowledge: Any = None
-        self.has_actions = False
+        self.registered: dict[str, Any] = {}
         self.unbound: dict[str, PlanProblem] = {}
         self.execution: Execution | None = None
 
@@ -82,7 +83,7 @@ class _Compiled:
         self.steps = {label: make_step(machine, label) for label in data.children}
         for step in self.steps.values():
             # A child's outcome leads nowhere by itself: the net decides what follows.
-            step.next = {outcome: End(outcome) for outcome in step.state._smachpy.outcomes}
+            step.end_always()
         self.table = Table(
             data.net_plan,
             data.labels(),
@@ -138,9 +139,9 @@ class PetriNetPlan(Container):
     Each child is an action of the plan, and its label is the plan's name for it ('/' is replaced by
     ':'). A transition `A.start` starts A; `A.end` and `A.interrupt` ask A to stop if it is still
     running. The token moves on at once, but the end of the plan waits for all actions. A has failed
-    if its outcome is a failure or a preempt (`smachpy.outcome_classes`), otherwise it has finished;
-    `A.end` without a condition waits until it has finished, `A.fail` until it has failed. An
-    outcome of A is a condition for the transitions behind A, true once A has ended with it.
+    if its outcome is a failure or a preempt (`smachpy.events.outcome_classes`), otherwise it has
+    finished; `A.end` without a condition waits until it has finished, `A.fail` until it has failed.
+    An outcome of A is a condition for the transitions behind A, true once A has ended with it.
 
     The plan ends with 'goal' when all goal places hold exactly their tokens, and with 'fail' when
     all fail places do, or when nothing can fire any more, which is logged.
@@ -162,6 +163,7 @@ class PetriNetPlan(Container):
         output_keys: Keys copied to the parent's userdata when it ends.
         name: Name when it is the root; default: the net's.
         userdata_type: As for any container.
+        userdata: Likewise.
         **options: See `StateOptions`.
 
     Raises:
@@ -192,10 +194,11 @@ class PetriNetPlan(Container):
         event_life: float = EVENT_LIFE_S,
         sub_plans: Mapping[str, PetriNetPlan] | None = None,
         server: PNPServer | None = None,
-        input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (),
+        input_keys: Names = (),
+        output_keys: Names = (),
         name: str | None = None,
         userdata_type: type | None = None,
+        userdata: Mapping[str, Any] | None = None,
         **options: Unpack[StateOptions],
     ) -> None:
         if isinstance(plan, Net):
@@ -209,6 +212,7 @@ class PetriNetPlan(Container):
             output_keys,
             name=(plan.net.name or "plan") if name is None else name,
             userdata_type=userdata_type,
+            userdata=userdata,
             **options,
         )
         data = self._smachpy
@@ -229,7 +233,7 @@ class PetriNetPlan(Container):
         subs = problems.mapping("sub_plans", sub_plans, "name -> plan")
         given = problems.mapping("actions", actions, "name -> state or function")
         problems.raise_all()
-        data.has_actions = bool(given)
+        data.registered = given
         self.__bind(Binder({**subs, **given}, self.__built_in(), server))
 
     def __built_in(self) -> dict[str, Any]:
@@ -322,7 +326,7 @@ class PetriNetPlan(Container):
             if isinstance(state := data.children[label], Unbound)
         ]
         unknown = [state.call for state, _ in missing if state.is_unknown]
-        if data.has_actions or len(unknown) <= most:
+        if data.registered or len(unknown) <= most:
             return [problem for _, problem in missing]
         names = sorted({call.action or call.name for call in unknown})
         text = f"has no actions registered; expected one for each of {', '.join(names)}."
@@ -331,10 +335,28 @@ class PetriNetPlan(Container):
         wrong = [replace(p, severity="note") for state, p in missing if not state.is_unknown]
         return [*wrong, problem_of(data.net_plan.net, "unbound", "note", text, hint=hint)]
 
+    def __not_imported(self) -> list[PlanProblem]:
+        """Return a note about the code that was not looked at."""
+        data = self._smachpy
+        given = [*data.registered.values(), *data.knowledge.sources.values()]
+        things = [one.function if isinstance(one, Polled) else one for one in given]
+        names = sorted({one.name for one in things if isinstance(one, NotImported)})
+        if not names:
+            return []
+        text = f"names {', '.join(names)}, which were not imported, as that runs code."
+        hint = "Try --import to look at their outcomes and userdata keys, too."
+        return [problem_of(data.net_plan.net, "unbound", "note", text, hint=hint)]
+
+    def _smachpy_check(self, path: str) -> Iterator[Problem]:
+        """Yield the problems of the plan for `smachpy.check`."""
+        from smachpy.pnp.checked import find_problems  # programs that only run need none of it
+
+        return find_problems(self, path)
+
     def binding_problems(self) -> tuple[PlanProblem, ...]:
         """Return the problems of actions and conditions for which nothing is registered."""
         plan, knowledge = self._smachpy.net_plan, self._smachpy.knowledge
-        found = self.__unbound(most=0)
+        found = [*self.__unbound(most=0), *self.__not_imported()]
         table = _Compiled(self).table
         # Name -> its first transition: in reverse, so that earlier transitions replace later ones.
         asked = {
@@ -383,7 +405,8 @@ class PetriNetPlan(Container):
         details = (
             (("strict", "an end waits for its action"),) if self._smachpy.net_plan.strict else ()
         )
-        return Structure(children, net=self.__net_record(), details=details)
+        success = self._smachpy.options.success
+        return Structure(children, net=self.__net_record(), details=details, success=success)
 
     def __net_record(self) -> NetRecord:
         plan: Plan = self._smachpy.net_plan
@@ -449,7 +472,7 @@ class PetriNetPlan(Container):
 
         Threads: any; does not wait.
         """
-        frame = self._smachpy.frame
+        frame = self._smachpy.live.frame
         self._smachpy.knowledge.post(event, None if frame is None else frame.run.clock)
         for child in self._states.values():
             if isinstance(child, PetriNetPlan):
@@ -537,7 +560,7 @@ def load(
     return plan
 
 
-_DEEPEST = 20  # sub-plans in each other
+_MAX_SUBPLAN_DEPTH = 20  # sub-plans in each other
 
 
 def read_plan(
@@ -569,7 +592,7 @@ def read_plan(
         part = None if "/" in name else find_plan(file.parent, name)
         if name in parameters.actions or part is None:
             continue
-        if part.resolve() in stack or len(stack) > _DEEPEST:
+        if part.resolve() in stack or len(stack) > _MAX_SUBPLAN_DEPTH:
             line = net.places[known.places[0]].line if known.places else 0
             text = f"{name!r} is the plan {str(part)!r}, which contains itself; expected another."
             found.append(PlanProblem("recursion", "error", text, "", net.file, line))

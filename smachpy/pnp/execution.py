@@ -5,27 +5,26 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from smachpy import log
+from smachpy.base import log
+from smachpy.engine.callback import call_bounded
+from smachpy.engine.child import run_child
+from smachpy.engine.interrupt import Interruption
+from smachpy.engine.preempt import ask_child, asking, on_preempt
+from smachpy.engine.threads import ChildBranch, Group
+from smachpy.engine.visit import Why
 from smachpy.events import Fired, HeldBack, Preempted
-from smachpy.exceptions import SmachError
 from smachpy.pnp.actions import Order, parse_name
 from smachpy.pnp.firing import called
-from smachpy.run.callback import call_bounded
-from smachpy.run.grace import ask_child, asking, end_visit, on_preempt, unknown_outcome
-from smachpy.run.interrupt import Interruption
-from smachpy.run.step import run_watched, user_error
-from smachpy.run.threads import ChildBranch, Group
-from smachpy.run.visit import Why
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from smachpy.engine.frame import Frame
+    from smachpy.engine.step import Step
     from smachpy.pnp.conditions import Condition
     from smachpy.pnp.container import PetriNetPlan
     from smachpy.pnp.firing import Firing, Moment, Table
     from smachpy.pnp.knowledge import Knowledge
-    from smachpy.run.frame import Frame
-    from smachpy.run.step import Step
 
 _TIMEOUT = "timeout_"
 
@@ -174,8 +173,7 @@ class Execution:
 
     def _resume(self) -> None:
         """Resume the position of an earlier process, if the journal has one."""
-        journal = self._frame.run.journal
-        resumed = None if journal is None else journal.resumed_plan(self._frame)
+        resumed = self._frame.run.journal.resumed_plan(self._frame)
         if resumed is None:
             return
         marking, children = resumed
@@ -279,8 +277,7 @@ class Execution:
         if running:
             ends, begins = called(firing.calls, running)
         if run.watched:
-            if run.journal is not None:
-                self._write_firing(firing.fired, moment, ends, begins)
+            self._write_firing(firing.fired, moment, ends, begins)
             self._report_fired(firing)
         # First the ends: an action in both lists is restarted.
         for label in ends:
@@ -299,7 +296,6 @@ class Execution:
     ) -> None:
         """Write a firing to the journal, before its actions begin or are asked to stop."""
         net, journal = self._net, self._frame.run.journal
-        assert journal is not None
         transitions = [net.transitions[number].id for number in fired]
         marking = [net.places[place].id for place in moment.marking]
         journal.fired(self._frame, transitions, marking, ends, begins)
@@ -336,58 +332,15 @@ class Execution:
         """Run a child in this thread; nothing can fire before it ends."""
         frame, machine = self._frame, self._machine
         outcome: str | None = None
-        while outcome is None:
-            # First set `frame.step`, then read the flag. A requester does it the other way round
-            # (see `smachpy.run.grace.ask`), so one of the two sees the other.
-            frame.step = step
-            if machine._preempt_requested:
-                frame.step = None
-                return
-            try:
-                if frame.run.watched or frame.run.control is not None:
-                    outcome = self._once(frame, step)
-                else:
-                    outcome = step.execute(step.userdata)
-                outcome = self._followed(frame, step, outcome)
-            except Interruption:
-                if frame.dead:
-                    raise
-                outcome = self._followed(frame, step, "preempted")
-            except SmachError:
-                raise
-            except Exception as error:
-                raise user_error(step.path_in(frame), step.state, error) from error
+        while outcome is None and not machine._preempt_requested:
+            decision = run_child(frame, step)
+            if decision.why is not Why.JUMPED:  # a plan has no next child: this one runs again
+                outcome = decision.outcome
         frame.step = None
-        self._ended[step.label] = outcome
+        if outcome is not None:
+            self._ended[step.label] = outcome
         if frame.run.pending:
             frame.run.flush()
-
-    def _followed(self, frame: Frame, step: Step, outcome: Any) -> str | None:
-        """Return the outcome of the child in this thread; None if it must run again."""
-        if (
-            self._machine._preempt_requested
-            or frame.visit is not None
-            or step.state._preempt_requested
-        ):
-            decision = end_visit(frame, outcome)
-            if decision.why is Why.JUMPED:  # a plan has no next child: this one runs again
-                return None
-            found: str = decision.target.outcome
-            return found
-        if not (isinstance(outcome, str) and outcome in step.next):
-            outcomes = step.state._smachpy.outcomes
-            raise unknown_outcome(step.path_in(frame), outcomes, outcome)
-        return outcome
-
-    @staticmethod
-    def _once(frame: Frame, step: Step) -> Any:
-        run = frame.run
-        if run.control is not None:
-            run.control.pass_gate(frame, step)
-            visit = frame.visit
-            if frame.container._preempt_requested or (visit is not None and visit.is_asked()):
-                return "preempted"
-        return run_watched(frame, step) if run.watched else step.execute(step.userdata)
 
     def _take_reports(self) -> bool:
         """Take the reports of children that have ended; return whether one raised."""
@@ -421,9 +374,7 @@ class Execution:
 
         Blocks: until then.
         """
-        journal = self._frame.run.journal
-        if journal is not None:
-            journal.note_conditions(self._frame)
+        self._frame.run.journal.note_conditions(self._frame)
         self._report_waiting(moment)
         if not self.branches.reports:
             self.branches.wait_for_change(self._longest_wait(moment))
@@ -565,8 +516,7 @@ class Execution:
             self._stop_all("the plan starts again")
             self._ended.clear()
             self.moment = self._table.moment(self._net.initial)
-            if self._frame.run.journal is not None:
-                self._write_firing((), self.moment, list(self._steps), ())
+            self._write_firing((), self.moment, list(self._steps), ())
             return None
         # Checked only now: the marking may have changed since the order was given.
         number = self._net.transition_numbers[which]

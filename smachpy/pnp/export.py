@@ -7,13 +7,13 @@ import math
 import re
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from smachpy.introspection import describe
+from smachpy.base.problems import Problems
+from smachpy.events.introspection import describe
+from smachpy.events.outcome_classes import is_good
 from smachpy.machines.concurrence import Concurrence
 from smachpy.machines.container import Container
-from smachpy.machines.problems import Problems
 from smachpy.machines.rules import decide
 from smachpy.machines.state_machine import StateMachine
-from smachpy.outcome_classes import is_good
 from smachpy.pnp.conditions import ConditionError, parse
 from smachpy.pnp.container import PetriNetPlan
 from smachpy.pnp.net import Arc, Net, Place, Transition
@@ -22,15 +22,15 @@ from smachpy.pnp.reach import explore
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
     from smachpy.machines.state import State
 
 PREEMPTED: Final = "preempted"
-MOST_COMBINATIONS: Final = 1000
+MAX_COMBINATIONS: Final = 1000
 """Most combinations of outcomes of a concurrence's children; each becomes a transition or more."""
 
 
-class Stop(NamedTuple):
+class StopPlaces(NamedTuple):
     """The places by which a child of a concurrence is preempted; one of the two has a token.
 
     Attributes:
@@ -61,8 +61,8 @@ def export_net(machine: Container) -> Exported:
 
     State machines and concurrences are opened at any depth. Any other state, including an iterator,
     is an action, named by the labels of its path joined with '_'; its outcomes are conditions at
-    its ends. Failures and preempts among the machine's outcomes (`smachpy.outcome_classes`) lead to
-    the failed plan, the others to the goal. A net has no userdata, remappings or options.
+    its ends. Failures and preempts among the machine's outcomes (`smachpy.events.outcome_classes`)
+    lead to the failed plan, the others to the goal. A net has no userdata, remappings or options.
 
     The callbacks with which a concurrence decides are called once for each combination of outcomes
     that can occur, and the net gets their answers. If a callback depends on more than its argument,
@@ -76,12 +76,12 @@ def export_net(machine: Container) -> Exported:
         return Exported(machine._smachpy.net_plan.net, {})
     machine.check_consistency()
     record = describe(machine)
-    writer = _Writer(record)
+    writer = _NetWriter(record)
     writer.write(machine, record)
     return writer.exported()
 
 
-class _Writer:
+class _NetWriter:
     def __init__(self, record: StateRecord) -> None:
         self._name = record.label
         self._root = record.path
@@ -136,7 +136,7 @@ class _Writer:
         return identity
 
     def _state(
-        self, state: State, record: StateRecord, begin: str, stop: Stop | None = None
+        self, state: State, record: StateRecord, begin: str, stop: StopPlaces | None = None
     ) -> dict[str, str]:
         """Add a state that begins at a place; return outcome -> place of this end."""
         # A subclass that overrides `execute` may do anything: it is an action, not opened.
@@ -153,7 +153,7 @@ class _Writer:
         return self._action(state, record, begin, stop)
 
     def _action(
-        self, state: State, record: StateRecord, begin: str, stop: Stop | None
+        self, state: State, record: StateRecord, begin: str, stop: StopPlaces | None
     ) -> dict[str, str]:
         path = record.path.removeprefix(self._root).strip("/") or record.label
         # Characters that labels do not allow become '_'; then two names may be the same.
@@ -183,7 +183,7 @@ class _Writer:
         return ends
 
     def _machine(
-        self, machine: StateMachine, record: StateRecord, begin: str, stop: Stop | None
+        self, machine: StateMachine, record: StateRecord, begin: str, stop: StopPlaces | None
     ) -> dict[str, str]:
         words = record.path.removeprefix(self._root).strip("/").replace("/", " ")
         entries = {c.label: self._place(_plain(f"{words} {c.label}")) for c in record.children}
@@ -223,7 +223,7 @@ class _Writer:
         preempts = data.child_termination_cb is not None
         begins = [self._place(_plain(f"{c.label} begins")) for c in record.children]
         asks: dict[str, tuple[str, str]] = {}
-        stops: list[Stop | None] = [None] * len(begins)
+        stops: list[StopPlaces | None] = [None] * len(begins)
         if preempts:
             asks = {
                 c.label: (
@@ -232,7 +232,7 @@ class _Writer:
                 )
                 for c in record.children
             }
-            stops = [Stop(stop, runs_on) for runs_on, stop in asks.values()]
+            stops = [StopPlaces(stop, runs_on) for runs_on, stop in asks.values()]
         self._fire("fork", [begin], [*begins, *(runs_on for runs_on, _ in asks.values())])
         ends = {
             child.label: self._state(children[child.label], child, place, stop)
@@ -240,10 +240,10 @@ class _Writer:
         }
         # With preempts a child may also run on, or be asked to stop, when another one has ended.
         count = math.prod(2 + len(each) if preempts else len(each) for each in ends.values())
-        if count > MOST_COMBINATIONS:
+        if count > MAX_COMBINATIONS:
             self._problems.add(
                 f"{record.path}: concurrence: got {count} combinations of outcomes; expected at "
-                f"most {MOST_COMBINATIONS}."
+                f"most {MAX_COMBINATIONS}."
             )
             return {}
         try:

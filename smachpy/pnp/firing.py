@@ -11,7 +11,7 @@ from functools import partial
 from operator import eq
 from typing import TYPE_CHECKING, NamedTuple
 
-from smachpy.outcome_classes import is_good
+from smachpy.events.outcome_classes import is_good
 from smachpy.pnp.conditions import Condition
 from smachpy.pnp.labels import BEGINS
 

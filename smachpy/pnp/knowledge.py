@@ -8,29 +8,30 @@ PNPActionServer of PetriNetPlans 1.4.
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import math
-import operator
 import threading
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 from actionlib_core.clock import current_clock
-from smachpy import log
+from actionlib_core.inputs.expression import Expression as _Expression
+from actionlib_core.inputs.expression import MissingNameError
+from smachpy.base import log
+from smachpy.base.problems import Problems
 from smachpy.exceptions import InvalidUserCodeError, error_text
-from smachpy.machines.problems import Problems
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator
 
     from actionlib_core.clock import Clock
     from smachpy.pnp.server import PNPServer
 
 EVENT_LIFE_S: Final = 2.0  # an unread event is dropped then
 Events: TypeAlias = Literal["once", "lasting"]
-_MOST_EVENTS: Final = 1000  # unread; a topic may post faster than the plan reads
+_MAX_EVENTS: Final = 1000  # unread; a topic may post faster than the plan reads
 
 
 def is_built_in(name: str) -> bool:
@@ -66,88 +67,49 @@ class Polled:
     every: float
 
 
-class Expression:
-    """A condition on the userdata, as text: "battery < 20 and not charging".
+class Expression(_Expression):
+    """A condition on the userdata or a message: "battery.percentage < 0.2 and not charging".
 
-    It may contain numbers, texts, comparisons, `and`, `or`, `not`, `in`, `+ - * / %` and keys of
-    the userdata, but no calls. It is false while a key has no value.
+    See `actionlib_core.inputs.expression` for what it may contain. It is false while a key or field
+    that it names is not there.
 
     Args:
         text: The expression.
 
     Raises:
-        ValueError: the text cannot be read, or contains something else.
+        ExpressionError: it is none, or contains something that is not allowed; a `ValueError`.
     """
 
-    def __init__(self, text: str) -> None:
-        self.text = text
-        try:
-            self._tree = ast.parse(text, mode="eval").body
-        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-            raise ValueError(f"got {text!r}; expected an expression on userdata keys.") from error
-        for node in ast.walk(self._tree):
-            if not isinstance(node, _ALLOWED):
-                raise ValueError(  # noqa: TRY004  the text is wrong, not its type
-                    f"got {text!r} with {type(node).__name__} in it; expected numbers, texts, "
-                    "comparisons, and, or, not, in, + - * / % and userdata keys."
-                )
+    def __call__(self, values: Any) -> bool:
+        """Return whether it is true for userdata or a message.
 
-    def __call__(self, userdata: Any) -> bool:
-        """Return whether it is true."""
+        Raises:
+            ExpressionError: an operation does not fit its values.
+        """
+        is_message = hasattr(values, "_slot_types")
         try:
-            return bool(_value(self._tree, userdata))
-        except KeyError:
+            return bool(super().__call__(values if is_message else _Keys(values)))
+        except MissingNameError:
             return False
 
-    def __repr__(self) -> str:
-        return f"Expression({self.text!r})"
 
+class _Keys(Mapping[str, Any]):
+    """Userdata as a mapping."""
 
-_OPERATORS: Final[dict[type[ast.AST], Callable[..., Any]]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Mod: operator.mod,
-    ast.Eq: operator.eq,
-    ast.NotEq: operator.ne,
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-    ast.In: lambda one, other: one in other,
-    ast.NotIn: lambda one, other: one not in other,
-    ast.Not: operator.not_,
-    ast.USub: operator.neg,
-}
-# Expressions come from files: they are interpreted here, node by node, and never given to `eval`.
-_ALLOWED = (
-    ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Compare, ast.Constant, ast.Name, ast.Load, ast.Tuple,
-    ast.List, ast.And, ast.Or, *_OPERATORS,
-)  # fmt: skip
+    def __init__(self, values: Any) -> None:
+        self._values = values
 
+    def __getitem__(self, key: str) -> Any:
+        return self._values[key]
 
-def _value(node: ast.expr, userdata: Any) -> Any:  # noqa: PLR0911  one for each kind of node
-    match node:
-        case ast.Constant(value=value):
-            return value
-        case ast.Name(id=name):
-            return userdata[name]
-        case ast.Tuple(elts=parts) | ast.List(elts=parts):
-            return [_value(part, userdata) for part in parts]
-        case ast.BoolOp(op=ast.And(), values=parts):
-            return all(_value(part, userdata) for part in parts)
-        case ast.BoolOp(values=parts):
-            return any(_value(part, userdata) for part in parts)
-        case ast.UnaryOp(op=op, operand=part):
-            return _OPERATORS[type(op)](_value(part, userdata))
-        case ast.BinOp(left=left, op=op, right=right):
-            return _OPERATORS[type(op)](_value(left, userdata), _value(right, userdata))
-        case ast.Compare(left=left, ops=ops, comparators=rest):
-            values = [_value(part, userdata) for part in (left, *rest)]
-            pairs = zip(ops, values, values[1:], strict=False)  # a < b < c
-            return all(_OPERATORS[type(op)](one, other) for op, one, other in pairs)
-    raise ValueError(f"got {ast.dump(node)}")  # cannot happen: `__init__` refuses other nodes
+    def __contains__(self, key: object) -> bool:
+        return key in self._values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values.keys())
+
+    def __len__(self) -> int:
+        return len(self._values.keys())
 
 
 class Knowledge:
@@ -205,7 +167,7 @@ class Knowledge:
         self.dropped = self.changes = 0
         self._lock = threading.Lock()
         # Unread events: name, and the time [s] from which its life counts, None if not yet known.
-        self._posted: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
+        self._posted: deque[tuple[str, float | None]] = deque(maxlen=_MAX_EVENTS)
         self._set: dict[str, bool] = {}
         self._newest: dict[str, Any] = {}  # name of a topic's condition -> its newest message
         # Replaced, never changed: `changed` iterates over it without the lock.
@@ -236,7 +198,7 @@ class Knowledge:
             self.set(name, value=True)
             return
         with self._lock:
-            full = len(self._posted) == _MOST_EVENTS  # then `append` drops the oldest
+            full = len(self._posted) == _MAX_EVENTS  # then `append` drops the oldest
             oldest = self._posted[0][0] if full else ""
             self.dropped += full
             first = full and self.dropped == 1
@@ -244,7 +206,7 @@ class Knowledge:
             self.changes += 1
         if first:  # logged once; `dropped` has the count
             log.logwarn(
-                f"event {name!r}: {_MOST_EVENTS} events wait for a guard: the oldest are dropped, "
+                f"event {name!r}: {_MAX_EVENTS} events wait for a guard: the oldest are dropped, "
                 f"{oldest!r} first. Try events='lasting', or post what guards ask for."
             )
         self.changed()
@@ -263,7 +225,7 @@ class Knowledge:
         with self._lock:
             # Unread events of this name are older than this value.
             self._posted = deque(
-                (pair for pair in self._posted if pair[0] != name), maxlen=_MOST_EVENTS
+                (pair for pair in self._posted if pair[0] != name), maxlen=_MAX_EVENTS
             )
             if value is None:
                 self._set.pop(name, None)
@@ -413,7 +375,7 @@ class Knowledge:
     def _happened(self, name: str, now: float) -> bool:
         """Use up an event of this name, if there is one, and drop those whose life is over."""
         with self._lock:
-            kept: deque[tuple[str, float | None]] = deque(maxlen=_MOST_EVENTS)
+            kept: deque[tuple[str, float | None]] = deque(maxlen=_MAX_EVENTS)
             hit = False
             # From the newest on: the newest event of the name is used up. Events without a time
             # were posted before the run, and their life begins now.

@@ -16,6 +16,8 @@ conditions:
 strict: false
 events: once
 server: true      # or {action: ..., conditions: ..., robot: ...}: see `PNPServer`
+
+`run:` imports a module, which runs code: whoever only looks at a plan reads the file without it.
 """
 
 from __future__ import annotations
@@ -27,10 +29,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits
+from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Limits
+from actionlib_core.inputs.expression import WHOLE, ExpressionError
+from smachpy.base.problems import unknown_name
 from smachpy.exceptions import InvalidStateError
 from smachpy.machines.state import State
-from smachpy.pnp.actions import Function, Goal, Made
+from smachpy.pnp.actions import Function, Goal, Made, NotImported
 from smachpy.pnp.knowledge import Events, Expression, Polled, TopicCondition
 from smachpy.pnp.problems import PlanError, PlanProblem
 from smachpy.pnp.server import PNPServer
@@ -38,7 +42,7 @@ from smachpy.pnp.server import PNPServer
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from actionlib_core.checked_file import Problem, Section
+    from actionlib_core.inputs.checked_file import Problem, Section
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,12 @@ class Registered:
     actions: dict[str, Any] = field(default_factory=dict)
     conditions: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=dict)
+
+    def named(self) -> list[str]:
+        """Return what `run:` names, "module:name", if the file was read without imports."""
+        conditions = [getattr(one, "function", one) for one in self.conditions.values()]
+        found = [*self.actions.values(), *conditions]
+        return [one.name for one in found if isinstance(one, NotImported)]
 
 
 _SERVER: Final = ("action", "conditions", "events", "robot", "every", "timeout")
@@ -62,14 +72,18 @@ def mapping_beside(plan: Path) -> Path | None:
     return next((plan.parent / n for n in names if (plan.parent / n).is_file()), None)
 
 
-def read_mapping(file: Path | str) -> Registered:
+def read_mapping(file: Path | str, *, imports: bool = True) -> Registered:
     """Read the file.
+
+    Args:
+        file: The file.
+        imports: False to import no module: `NotImported` stands for what `run:` names.
 
     Raises:
         PlanError: it cannot be read, or is wrong; all problems at once, with their lines.
     """
     source = CheckedFile(Path(file), _error, may_be_empty=True)
-    found = _registered(source.top)
+    found = _registered(source.top, imports)
     source.check()
     return found
 
@@ -80,11 +94,11 @@ def _error(problems: Sequence[Problem]) -> PlanError:
     )
 
 
-def _registered(top: Section) -> Registered:
+def _registered(top: Section, imports: bool) -> Registered:
     actions, conditions = top.section("actions"), top.section("conditions")
     found = Registered(
-        {name: _action(actions.section(name)) for name in actions},
-        {name: _condition(conditions, name) for name in conditions},
+        {name: _action(actions.section(name), imports) for name in actions},
+        {name: _condition(conditions, name, imports) for name in conditions},
     )
     top.allow("strict", "events", "event_life")
     if "strict" in top:
@@ -113,9 +127,9 @@ def _server(top: Section) -> PNPServer | None:
         return None
 
 
-def _action(section: Section) -> Any:
+def _action(section: Section, imports: bool) -> Any:
     if "run" in section:
-        thing = _thing(section)
+        thing = _thing(section, imports)
         section.close()
         if not (thing is None or callable(thing) or isinstance(thing, _ACTIONS)):
             got = f"got {section.value('run')!r}, which is {thing!r}"
@@ -148,7 +162,7 @@ def _fields(section: Section) -> dict[str, Any]:
     return {name: section.value(name) for name in section}
 
 
-def _condition(conditions: Section, name: str) -> Any:
+def _condition(conditions: Section, name: str, imports: bool) -> Any:
     if isinstance(conditions.value(name), bool):
         return conditions.value(name)
     section = conditions.section(name)
@@ -157,16 +171,19 @@ def _condition(conditions: Section, name: str) -> Any:
     if "userdata" in section:
         return _expression(section, "userdata")
     if "run" in section:
-        function = _thing(section)
+        function = _thing(section, imports)
         if "every" not in section:
             return function
         return Polled(function, section.number("every", REQUIRED, _POSITIVE, "s"))
     if "topic" in section:
-        when = _expression(section, "when")
+        when, kind = _expression(section, "when"), _interface(section, "msg")
+        known = [] if kind is None else list(kind.__slots__)
+        for field in sorted(() if when is None or kind is None else when.names - {*known, WHOLE}):
+            section.report("when", unknown_name("field", field, known))
         return TopicCondition(
             section.text("topic", REQUIRED),
-            _interface(section, "msg"),
-            lambda message: when is not None and when(_Message(message)),
+            kind,
+            lambda message: when is not None and when(message),
         )
     if section.is_good("topic", "userdata", "run"):
         text = "got none of topic, userdata and run; expected true, false, or one of these."
@@ -182,10 +199,11 @@ def _seconds(section: Section, key: str) -> float | None:
 
 
 def _expression(section: Section, key: str) -> Expression | None:
+    text = str(section.value(key, ""))
     try:
-        return Expression(str(section.value(key, "")))
-    except ValueError as error:
-        section.report(key, str(error))
+        return Expression(text)
+    except ExpressionError as error:
+        section.report(key, f"got {text!r}: {error.problem}")
         return None
 
 
@@ -201,13 +219,15 @@ def _interface(section: Section, kind: str) -> Any:
     return None
 
 
-def _thing(section: Section) -> Any:
+def _thing(section: Section, imports: bool) -> Any:
     """Return what `run: module:name` names; modules beside the file are found, too."""
     text = section.text("run", REQUIRED)
     module, colon, name = text.partition(":")
     if not (module and colon and name):
         section.problem("run", "'module:name'")
         return None
+    if not imports:
+        return NotImported(text)
     folder = str(section.file.folder.resolve())
     sys.path.insert(0, folder)
     try:
@@ -220,13 +240,3 @@ def _thing(section: Section) -> Any:
     finally:
         sys.path.remove(folder)
     return thing
-
-
-class _Message:
-    """The fields of a message, by key, as an expression asks for them."""
-
-    def __init__(self, message: Any) -> None:
-        self._message = message
-
-    def __getitem__(self, key: str) -> Any:
-        return getattr(self._message, key)

@@ -11,12 +11,16 @@ from bisect import insort
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 Marking: TypeAlias = tuple[int, ...]
+
+
+MAX_PARTS: Final = 20_000
+"""Places, transitions and arcs of a net; its checks take minutes for more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,8 @@ class Net:
     file: str = ""
 
     def __post_init__(self) -> None:
+        if len(self.places) + len(self.transitions) + len(self.arcs) > MAX_PARTS:
+            raise ValueError(f"net {self.name!r}: got more than {MAX_PARTS:,} nodes and arcs.")
         nodes: tuple[Place | Transition, ...] = (*self.places, *self.transitions)
         count = Counter(node.id for node in nodes)
         twice = sorted(name for name, number in count.items() if number > 1)

@@ -11,7 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
+from actionlib_core.inputs.checked_file import read_limited
 from smachpy.exceptions import InvalidStateError
+from smachpy.pnp.foreign import excess, is_place_transition_net, priorities, tokens
+from smachpy.pnp.foreign import local as _tag
 from smachpy.pnp.net import Arc, Net, Place, Transition
 from smachpy.pnp.problems import PlanProblem, raise_errors
 
@@ -24,7 +27,10 @@ Dialect: TypeAlias = Literal["pnp", "2009"]
 
 NAMESPACE: Final = "http://www.pnml.org/version-2009/grammar/pnml"
 PT_NET: Final = "http://www.pnml.org/version-2009/grammar/ptnet"
-MOST_TOKENS: Final = 1000
+MAX_TOKENS: Final = 1000
+LARGEST_FILE: Final = 2_000_000
+"""Largest file of a plan in any form [bytes]."""
+
 """Tokens of one place or arc: more is a mistake or an attack, as markings list each token."""
 
 _LINE: Final = "{smachpy}line"  # in a namespace, as the file may have an attribute "line"
@@ -45,6 +51,7 @@ class _Found:
     arcs: list[tuple[Arc, Element]] = field(default_factory=list)
     references: dict[str, str] = field(default_factory=dict)
     problems: list[PlanProblem] = field(default_factory=list)
+    excess: set[tuple[str, str]] = field(default_factory=set)
 
     def problem(
         self,
@@ -70,7 +77,7 @@ def read_pnml(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
     """
     path = Path(file)
     try:
-        data = path.read_bytes()
+        data = read_limited(path, LARGEST_FILE)
     except OSError as error:
         why = error.strerror or type(error).__name__
         raise_errors([PlanProblem("file", "error", f"{why}; expected a plan.", "", str(file))])
@@ -142,22 +149,26 @@ def _read_root(root: Element, found: _Found) -> None:
     if _namespace(root) == NAMESPACE or any(_tag(child) == "page" for child in nets[0]):
         found.dialect = "2009"
     kind = nets[0].get("type", "")
-    if kind not in {"", "PTNet", PT_NET} and "ptnet" not in kind.lower():
+    if not is_place_transition_net(kind):
         text = f"type: got {kind!r}; expected a place/transition net, {PT_NET!r}."
         found.problem("error", "xml", nets[0], text)
     if found.dialect == "2009":
         own = _text_below(nets[0], "name", found)
         found.name = own.strip() or found.name
     _read_nodes(nets[0], found, 0)
+    for element in priorities([e for e in nets[0].iter() if _tag(e) == "transition"])[:1]:
+        text = "priority: differs from that of others, and is ignored: the first in the file fires."
+        found.problem("warning", "xml", element, text)
 
 
-_DEEPEST_PAGE: Final = 50  # pages may contain pages; the reader is recursive
+_MAX_PAGE_DEPTH: Final = 50  # pages may contain pages; the reader is recursive
 
 
 def _read_nodes(parent: Element, found: _Found, depth: int) -> None:
-    if depth > _DEEPEST_PAGE:
-        found.problem("error", "xml", parent, f"got more than {_DEEPEST_PAGE} pages deep.")
+    if depth > _MAX_PAGE_DEPTH:
+        found.problem("error", "xml", parent, f"got more than {_MAX_PAGE_DEPTH} pages deep.")
         return
+    _report_excess(parent, found)
     for element in parent:
         tag = _tag(element)
         if tag in {"place", "transition", "arc", "referencePlace", "referenceTransition"}:
@@ -170,7 +181,22 @@ def _read_nodes(parent: Element, found: _Found, depth: int) -> None:
                 found.name = text.removeprefix(_PLAN_NAME).strip() or found.name
 
 
+def _report_excess(element: Element, found: _Found) -> None:
+    """Report what a plan cannot mean: errors at each element, warnings at the first of a kind."""
+    for severity, message, hint in excess(element):
+        if severity == "error":
+            found.problem(
+                "error", "arc" if _tag(element) == "arc" else "xml", element, message, hint
+            )
+        elif (_tag(element), message) not in found.excess:
+            found.excess.add((_tag(element), message))
+            found.problem(
+                severity, "arc" if _tag(element) == "arc" else "xml", element, message, hint
+            )
+
+
 def _read_node(element: Element, tag: str, found: _Found) -> None:
+    _report_excess(element, found)
     identity = element.get("id")
     line = int(element.get(_LINE, "0"))
     if not identity and tag != "arc":
@@ -186,12 +212,10 @@ def _read_node(element: Element, tag: str, found: _Found) -> None:
     if tag.startswith("reference"):
         found.references[identity] = element.get("ref", "")
     elif tag == "place":
-        tokens = _number(element, "initialMarking", 0, found)
-        found.places[identity] = Place(identity, _text_below(element, "name", found), tokens, line)
+        marked = _number(element, ("initialMarking",), 0, found)
+        found.places[identity] = Place(identity, _label(element, found), marked, line)
     else:
-        found.transitions[identity] = Transition(
-            identity, _text_below(element, "name", found), line
-        )
+        found.transitions[identity] = Transition(identity, _label(element, found), line)
 
 
 def _read_arc(element: Element, found: _Found) -> None:
@@ -200,17 +224,12 @@ def _read_arc(element: Element, found: _Found) -> None:
         text = f"got source {source!r}, target {target!r}; expected the ids of two nodes."
         found.problem("error", "arc", element, text)
         return
-    # Inhibitor and reset arcs would be read as ordinary ones with another meaning: an error.
-    kinds = [child for child in element if _tag(child) in {"type", "arctype"}]
-    kind = "" if not kinds else (kinds[0].get("value") or "".join(kinds[0].itertext())).strip()
-    if kind not in {"", "normal"}:
-        found.problem("error", "arc", element, f"got type {kind!r}; expected an ordinary arc.")
     # PNP ignores an arc that stands above one of its nodes; `_checked_arcs` reports it.
     late = source not in found.places and source not in found.transitions
     late = late or (target not in found.places and target not in found.transitions)
     if late and found.dialect == "pnp":
         element.set("late", "1")
-    weight = _number(element, "inscription", 1, found)
+    weight = _number(element, ("inscription", "weight", "multiplicity"), 1, found)
     if weight == 0:
         text = "inscription: got 0; expected at least 1. It moves no token, and is left out."
         found.problem("warning", "number", element, text)
@@ -259,17 +278,30 @@ def _resolved(name: str, found: _Found) -> str:
     return name
 
 
-def _number(element: Element, tag: str, default: int, found: _Found) -> int:
-    """Return the number in the child `tag`, or `default`; in "Colour,N" it is the last part."""
-    if not any(_tag(child) == tag for child in element):
-        return default
-    text = _text_below(element, tag, found).strip().rpartition(",")[2].strip()
-    if re.fullmatch(r"[0-9]{1,9}", text) and int(text) <= MOST_TOKENS:
-        return int(text)
-    least = 1 if tag == "inscription" else 0
-    expected = f"a whole number from {least} to {MOST_TOKENS}"
-    found.problem("error", "number", element, f"{tag}: got {text!r}; expected {expected}.")
+def _number(element: Element, names: tuple[str, ...], default: int, found: _Found) -> int:
+    """Return the number in the first child or attribute of these names, or `default`."""
+    name = names[0]
+    if any(_tag(child) == name for child in element):
+        text = _text_below(element, name, found).strip()
+    else:
+        given = [(name, element.get(name, "")) for name in names if element.get(name)]
+        # TAPAAL's arcs have an interval of time there, of which only the free one may be left out.
+        name, text = next((pair for pair in given if not pair[1].startswith("[")), ("", ""))
+        if not name:
+            return default
+    number = tokens(text)
+    if number is not None and number <= MAX_TOKENS:
+        return number
+    least = 0 if name == "initialMarking" else 1
+    expected = f"a whole number from {least} to {MAX_TOKENS}"
+    if name == "initialMarking" and "," in text:
+        expected += ", of one colour"
+    found.problem("error", "number", element, f"{name}: got {text!r}; expected {expected}.")
     return default
+
+
+def _label(element: Element, found: _Found) -> str:
+    return _text_below(element, "name", found) or element.get("name", "")
 
 
 def _text_below(element: Element, tag: str | None, found: _Found) -> str:
@@ -290,10 +322,6 @@ def _text_below(element: Element, tag: str | None, found: _Found) -> str:
                 )
             return text
     return ""
-
-
-def _tag(element: Element) -> str:
-    return str(element.tag).rpartition("}")[2]
 
 
 def _namespace(element: Element) -> str:

@@ -15,10 +15,10 @@ import threading
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 from actionlib_core.clock import current_clock
+from smachpy.base.problems import Problems
 from smachpy.events import Left
+from smachpy.events.outcome_classes import outcome_class
 from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_you_mean
-from smachpy.machines.problems import Problems
-from smachpy.outcome_classes import outcome_class
 from smachpy.pnp.build import Action, action
 from smachpy.pnp.container import PetriNetPlan, load
 from smachpy.pnp.files import load_plan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from smachpy.exceptions import InvalidStateError
 
@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from smachpy.pnp.labels import Severity
+
+
+MAX_TOLD_PROBLEMS: Final = 100
+"""Errors in the text of a `PlanError`; its attributes have all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,8 @@ class PlanProblem:
 class PlanError(InvalidStateError):
     """A plan cannot be loaded or run.
 
+    Try: correct each problem that is listed; `smachpy check PLAN` shows them with lines.
+
     Attributes:
         found: All its problems, the errors first.
         problems: Their texts.
@@ -64,7 +70,10 @@ class PlanError(InvalidStateError):
         order = ("error", "warning", "note")
         self.found = tuple(sorted(found, key=lambda problem: order.index(problem.severity)))
         errors = [str(problem) for problem in self.found if problem.severity == "error"]
-        super().__init__("\n".join(errors), errors)
+        told = errors[:MAX_TOLD_PROBLEMS]
+        if len(errors) > MAX_TOLD_PROBLEMS:
+            told.append(f"and {len(errors) - MAX_TOLD_PROBLEMS} more.")
+        super().__init__("\n".join(told), errors)
 
 
 def raise_errors(found: Iterable[PlanProblem]) -> None:

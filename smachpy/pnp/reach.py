@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from smachpy.pnp.net import Marking, Net
 
-MOST_MARKINGS: Final = 20_000
+MAX_MARKINGS: Final = 20_000
 """Limit of the search; the largest public plan has 3,555."""
 _TOKENS_EACH: Final = 20
 """Average tokens of a marking; with more, the search ends earlier, as each marking takes longer."""
@@ -49,7 +49,7 @@ class Reachable:
         return tuple(reversed(run))
 
 
-def explore(net: Net, *, limit: int = MOST_MARKINGS) -> Reachable:
+def explore(net: Net, *, limit: int = MAX_MARKINGS) -> Reachable:
     """Find the reachable markings of `net`, breadth first.
 
     Args:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from actionlib_core.inputs.checked_file import read_limited
 from smachpy.exceptions import did_you_mean
-from smachpy.pnp.pnml import read_pnml
+from smachpy.pnp.pnml import LARGEST_FILE, read_pnml
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
 from smachpy.pnp.text import parse_pddl, parse_plan, parse_rules
 
@@ -74,7 +75,7 @@ def plan_file(folder: Path | str, name: str) -> Path:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_limited(path, LARGEST_FILE).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "is not UTF-8"
         raise_errors([PlanProblem("file", "error", f"{why}; expected a plan.", "", str(path))])

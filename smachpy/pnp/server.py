@@ -14,12 +14,12 @@ import itertools
 import secrets
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from smachpy import log
 from smachpy.actions.simple_action_state import SimpleActionState
+from smachpy.base import log
+from smachpy.base.problems import Problems
+from smachpy.engine.frame import clock_of_run
+from smachpy.events.outcome_classes import is_good
 from smachpy.exceptions import InvalidStateError
-from smachpy.machines.problems import Problems
-from smachpy.outcome_classes import is_good
-from smachpy.run.frame import clock_of_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

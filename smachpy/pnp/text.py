@@ -34,7 +34,7 @@ _RULE = re.compile(r"\s*\*(\w+)\*\s*(.*?)\s*\*(\w+)\*\s*(.*?)\s*", re.DOTALL)
 _ER = re.compile(
     r"\s*\*(\w+)\*\s*(.*?)\s*\*(\w+)\*\s*(\S+)\s*\*(\w+)\*\s*(.*?)\s*(?:\*x\*\s*(\d+)\s*)?"
 )
-_DEEPEST: Final = 50  # brackets; the reader is recursive
+_MAX_BRACKETS: Final = 50  # brackets; the reader is recursive
 
 
 class ExecutionRule(NamedTuple):
@@ -73,7 +73,7 @@ def parse_plan(
     Raises:
         PlanError: it cannot be read; with the line.
     """
-    reader = _Reader(text, rules, file)
+    reader = _PlanParser(text, rules, file)
     part = reader.plan(0)
     reader.end()
     try:
@@ -163,7 +163,7 @@ def _act(step: str, file: str, line: int) -> Action:
     return replace(made, line=line, seconds=seconds.strip() or None)
 
 
-class _Reader:
+class _PlanParser:
     def __init__(self, text: str, rules: tuple[ExecutionRule, ...], file: str) -> None:
         self._file = file
         self._rules = rules
@@ -173,15 +173,15 @@ class _Reader:
     def _scan(self, text: str) -> list[_Token]:
         # Comments go, line ends stay: the line of a token is counted from them.
         lines = [line.partition("#")[0] for line in text.splitlines()]
-        joined, found, at = "\n".join(lines), [], 0
+        joined, found, at, line = "\n".join(lines), [], 0, 1
         while at < len(joined):
             match = _TOKEN.match(joined, at)
-            line = joined.count("\n", 0, at) + 1
             if match is None:
                 raise _error(self._file, line, f"got {joined[at]!r}; expected an action.")
             if match.lastgroup is not None:
                 found.append(_Token(match.lastgroup, match[0], line))
             at = match.end()
+            line += match[0].count("\n")
         return found
 
     def _next(self) -> _Token:
@@ -199,8 +199,8 @@ class _Reader:
         return token
 
     def plan(self, depth: int) -> Part:
-        if depth > _DEEPEST:
-            raise _error(self._file, self._next().line, f"got more than {_DEEPEST} levels.")
+        if depth > _MAX_BRACKETS:
+            raise _error(self._file, self._next().line, f"got more than {_MAX_BRACKETS} levels.")
         parts: list[Part] = []
         while True:
             token = self._next()

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 class MissingExtraError(ActionlibError, ImportError):
     """A package of the extra `ros1` is not installed.
 
+    Try: pip install 'smachpy[ros1]'.
+
     Attributes:
         name: The package.
     """

@@ -14,7 +14,7 @@ import re
 import sys
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.util import find_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -22,13 +22,16 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.interfaces import add_definition, add_path
 from smachpy.compat import MODULES as SMACH_MODULES
 from smachpy.ros1 import python2
+from smachpy.ros1.border import Border
 from smachpy.ros1.generated import config_file, config_module, define_generated
+from smachpy.ros1.imports import OWN, lies_in, settle_imports
 from smachpy.ros1.project import KINDS, is_package
 from smachpy.ros1.session import session
 from smachpy.ros1.stubs import OldSection, StubModule, StubSection
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    import ast
+    from collections.abc import Iterable, Sequence
     from types import CodeType, FrameType, ModuleType
 
     from smachpy.ros1.project import Project
@@ -50,23 +53,39 @@ ALIASES: Final = {
     for old in ("smach", "smach_ros")
     for name, home in SMACH_MODULES.items()
 } | {
+    "actionlib.exceptions": "actionlib_core.exceptions",
     "actionlib.goal_id_generator": "actionlib_core.action.goal_id_generator",
     "actionlib.handle_tracker_deleter": "actionlib_core.action.compat",
     "actionlib.server_goal_handle": "actionlib_core.action.server",
     "actionlib.status_tracker": "actionlib_core.action.compat",
+    "genpy.message": "smachpy.ros1.names.genpy",
+    "genpy.rostime": "smachpy.ros1.names.rospy.rostime",
     "roslib.rostime": "smachpy.ros1.names.rospy.rostime",
+    **dict.fromkeys(
+        ("rosgraph.masterapi", "rosgraph.names", "rosgraph.rosenv"), "smachpy.ros1.names.rosgraph"
+    ),
     "sensor_msgs.point_cloud2": "smachpy.ros1.names.point_cloud2",
     "smach.exceptions": "smachpy.exceptions",
-    "smach.log": "smachpy.log",
-    "smach.util": "smachpy.util",
+    "smach.log": "smachpy.base.log",
+    "smach.util": "smachpy.machines.util",
     "smach_ros.introspection": "smachpy.network.server",
-    "smach_ros.util": "smachpy.util",
+    "smach_ros.util": "smachpy.machines.util",
     "tf2_geometry_msgs.tf2_geometry_msgs": "smachpy.ros1.names.tf2_geometry_msgs",
-    "tf2_ros.buffer": "smachpy.ros1.names.tf2_ros",
-    "tf2_ros.buffer_interface": "smachpy.ros1.names.tf2_ros",
-    "tf2_ros.static_transform_broadcaster": "smachpy.ros1.names.tf2_ros",
-    "tf2_ros.transform_broadcaster": "smachpy.ros1.names.tf2_ros",
-    "tf2_ros.transform_listener": "smachpy.ros1.names.tf2_ros",
+    **dict.fromkeys(
+        [f"rospkg.{part}" for part in ("common", "manifest", "rospack", "stack")],
+        "smachpy.ros1.names.rospkg",
+    ),
+    **dict.fromkeys(("tf.broadcaster", "tf.listener"), "smachpy.ros1.names.tf"),
+    **dict.fromkeys(
+        [
+            f"tf2_ros.{part}"
+            for part in (
+                *("buffer", "buffer_client", "buffer_interface", "transform_broadcaster"),
+                *("static_transform_broadcaster", "transform_listener"),
+            )
+        ],
+        "smachpy.ros1.names.tf2_ros",
+    ),
 }
 """Module names of ROS 1 that have another name here -> the module here."""
 
@@ -104,8 +123,9 @@ class MissingPackageError(ModuleNotFoundError):
 class _Alias(Loader):
     """Imports a module under another name."""
 
-    def __init__(self, home: str) -> None:
+    def __init__(self, home: str, border: Border) -> None:
         self._home = home
+        self._border = border
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Leave it to Python."""
@@ -113,7 +133,14 @@ class _Alias(Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Replace the new empty module by the real one."""
         # One module object under both names, so that `isinstance` and module state agree.
-        sys.modules[module.__name__] = import_module(self._home)
+        name = module.__name__
+        sys.modules[name] = real = import_module(self._home)
+        if name in OLD_NAMES:  # in ROS 1 a package has imported these submodules of its own
+            for old, home in ALIASES.items():
+                package, _, part = old.partition(".")
+                if package == name and not hasattr(real, part):
+                    setattr(real, part, import_module(home))
+        self._border.add(real)
 
 
 class _Stub(Loader):
@@ -169,10 +196,15 @@ class _Config(Loader):
 class OldSourceLoader(SourceFileLoader):
     """Loads a module of the project, converted from Python 2 if necessary; writes no bytecode."""
 
+    def __init__(self, finder: OldNames, fullname: str, path: str) -> None:
+        super().__init__(fullname, path)
+        self._finder = finder
+
     def get_code(self, fullname: str) -> CodeType:
         """Compile the source."""
         path = self.get_filename(fullname)
-        return python2.to_code(self.get_data(path), path)
+        in_package = "." in fullname or path.endswith("__init__.py")
+        return self._finder.to_code(self.get_data(path), path, in_package=in_package)
 
 
 class OldNames(MetaPathFinder):
@@ -188,6 +220,42 @@ class OldNames(MetaPathFinder):
         self._stub_missing = stub_missing
         self._known: set[str] = set()  # packages of the project whose interfaces are registered
         self._busy: set[str] = set()  # names that are looked up in the other finders just now
+        self._border = Border(stand_ins=stub_missing)
+
+    def open(self) -> None:
+        """Begin; modules of ROS's names that are imported already are changed as well."""
+        self._border.open()
+        for name, module in list(sys.modules.items()):
+            if self._home_of(name) is not None:
+                self._border.add(module)
+
+    def close(self) -> None:
+        """Give this package's classes back as they are."""
+        self._border.close()
+
+    def to_code(self, source: bytes, path: str, *, in_package: bool = False) -> CodeType:
+        """Compile a file of the project.
+
+        Args:
+            source: Its content.
+            path: The file.
+            in_package: It belongs to a package.
+
+        Raises:
+            SyntaxError, MissingExtraError: as `python2.to_code`.
+        """
+        # In Python 2 a module of the same package came first, in Python 3 it is found last.
+        old = in_package and python2.is_python2(source, path)
+
+        def is_relative(name: str) -> bool:
+            if not in_package or self.claims(name) or not lies_in(Path(path).parent, name):
+                return False
+            return old or not (self._in_project(name, None) or self._is_elsewhere(name))
+
+        def settle(tree: ast.Module) -> None:
+            settle_imports(tree, is_relative=is_relative, is_own=self._is_hidden)
+
+        return python2.to_code(source, path, settle)
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -197,15 +265,25 @@ class OldNames(MetaPathFinder):
         # 1. Names of ROS 1 that are provided here.
         home = self._home_of(fullname)
         if home is not None:
-            return _alias(fullname, home)
+            return self._alias(fullname, home)
         top, _, below = fullname.partition(".")
-        if top in {"smachpy", "actionlib_core", "viz", "missions"} or fullname in self._busy:
+        if (
+            top in {"smachpy", "actionlib_core", "smachpy_viz", "smachpy_missions"}
+            or fullname in self._busy
+        ):
             return None
         # 2. Interfaces: the project's definitions have to be registered before they are looked up.
         if below.partition("._")[0] in _SECTIONS and "._" in below:
             return ModuleSpec(fullname, _Generated())
         if below and isinstance(sys.modules.get(top), StubModule):
             return self._missing(fullname, path)
+        return self._of_project(fullname, path)
+
+    def _of_project(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
+        if path is None and self._is_hidden(fullname):
+            # The script's own module of this name has another one; see `settle_imports`.
+            return PathFinder.find_spec(fullname, self._other_places())
+        top, _, below = fullname.partition(".")
         self._register_interfaces(top)
         has_interfaces = find_spec(f"{INTERFACES}.{top}") is not None
         # 3. Modules of the project. A package may have both modules and interfaces; its `msg` and
@@ -217,7 +295,7 @@ class OldNames(MetaPathFinder):
             if below:
                 loader = _Stub(known=True, complete=not self._stub_missing)
                 return ModuleSpec(fullname, loader, is_package=True)
-            found = _alias(fullname, f"{INTERFACES}.{fullname}")
+            found = self._alias(fullname, f"{INTERFACES}.{fullname}")
         return found or self._config(fullname) or self._missing(fullname, path)
 
     def _config(self, fullname: str) -> ModuleSpec | None:
@@ -280,34 +358,40 @@ class OldNames(MetaPathFinder):
                     add_definition(kind, f"{package}/{file.stem}", text, str(file))
         define_generated(folder, package, [file for files in found.values() for file in files])
 
+    def _is_hidden(self, name: str) -> bool:
+        """Return whether a module beside the script would hide one of Python or an installed one.
+
+        In Python it does, but this package imports some of its own modules late.
+        """
+        if not lies_in(self.project.folder, name) or self.claims(name):
+            return False
+        return name in sys.stdlib_module_names or bool(
+            PathFinder.find_spec(name, self._other_places())
+        )
+
+    def _other_places(self) -> list[str]:
+        return [place for place in sys.path if not self.project.holds(place or ".")]
+
     def _in_project(self, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
         name = fullname.rpartition(".")[2]
         if path is not None:
             places = [Path(place) for place in path if self.project.holds(place)]
-        # A module in the script's own folder hides one of the standard library, as in Python; one
-        # elsewhere in the project does not.
-        elif name in sys.stdlib_module_names and not _lies_in(self.project.folder, name):
-            return None
-        else:
-            added = [Path(place) for place in sys.path if place and self.project.holds(place)]
-            places = [*self.project.source_roots(), *_folder_of_importer(self.project), *added]
-        for place in places:
-            for file in (place / name / "__init__.py", place / f"{name}.py"):
-                if file.is_file():
-                    return spec_from_file_location(
-                        fullname,
-                        file,
-                        loader=OldSourceLoader(fullname, str(file)),
-                        submodule_search_locations=(
-                            [str(file.parent)] if file.name == "__init__.py" else None
-                        ),
-                    )
-        return self._namespace(fullname, [place / name for place in places], path)
+            return _module(self, fullname, name, places) or self._namespace(fullname, places, path)
+        if name.startswith(OWN):
+            return _module(self, fullname, name.removeprefix(OWN), [self.project.folder])
+        added = [Path(place) for place in sys.path if place and self.project.holds(place)]
+        places = [*self.project.source_roots(), *_folder_of_importer(self.project), *added]
+        found = _module(self, fullname, name, places) or self._namespace(fullname, places, path)
+        if found is None and not self._is_elsewhere(fullname):
+            last = list(self.project.other_roots())
+            found = _module(self, fullname, name, last) or self._namespace(fullname, last, path)
+        return found
 
     def _namespace(
-        self, fullname: str, folders: list[Path], path: Sequence[str] | None
+        self, fullname: str, places: list[Path], path: Sequence[str] | None
     ) -> ModuleSpec | None:
         """Find a package without `__init__.py`: folders with modules, if no other finder has it."""
+        folders = [place / fullname.rpartition(".")[2] for place in places]
         found = [
             str(folder)
             for folder in folders
@@ -342,6 +426,9 @@ class OldNames(MetaPathFinder):
         file, line = importer
         raise MissingPackageError(fullname, file, line)
 
+    def _alias(self, fullname: str, home: str) -> ModuleSpec:
+        return ModuleSpec(fullname, _Alias(home, self._border), is_package=True)
+
     def _is_elsewhere(self, fullname: str) -> bool:
         """Return whether the finders after this one have a module."""
         self._busy.add(fullname)  # `find_spec` asks this finder too, which then declines
@@ -353,12 +440,19 @@ class OldNames(MetaPathFinder):
             self._busy.discard(fullname)
 
 
-def _alias(fullname: str, home: str) -> ModuleSpec:
-    return ModuleSpec(fullname, _Alias(home), is_package=True)
-
-
-def _lies_in(folder: Path, name: str) -> bool:
-    return (folder / f"{name}.py").is_file() or (folder / name / "__init__.py").is_file()
+def _module(
+    finder: OldNames, fullname: str, name: str, places: Iterable[Path]
+) -> ModuleSpec | None:
+    """Find a module or package in the first of some folders that has it."""
+    for place in places:
+        for file in (place / name / "__init__.py", place / f"{name}.py"):
+            if file.is_file():
+                folders = [str(file.parent)] if file.name == "__init__.py" else None
+                loader = OldSourceLoader(finder, fullname, str(file))
+                return spec_from_file_location(
+                    fullname, file, loader=loader, submodule_search_locations=folders
+                )
+    return None
 
 
 def _importer() -> tuple[str, int] | None:

@@ -8,7 +8,8 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from smachpy import log, slips, util
+from smachpy.base import log, slips
+from smachpy.engine import shutdown_check
 from smachpy.ros1 import session
 from smachpy.ros1.hook import OldNames
 from smachpy.ros1.project import Project
@@ -55,17 +56,22 @@ def install(script: str | Path | None = None, *, stub_missing: bool = False) -> 
         if _installed:
             made = _installed[0]
             sys.meta_path[sys.meta_path.index(made.finder)] = finder
+            made.finder.close()
             made.finder = finder
+            finder.open()
             return
         made = _Installed(finder)
+        tops = {name.partition(".")[0] for name in sys.modules}
+        claimed = {top for top in tops if finder.claims(top)}
         for name in list(sys.modules):
-            if finder.claims(name):
+            if name.partition(".")[0] in claimed:
                 made.hidden[name] = sys.modules.pop(name)
         _installed.append(made)
+        finder.open()
         sys.meta_path.insert(0, finder)  # first, before packages that are installed under the names
         slips.set_accepting(True)
         # In ROS `import smach_ros` did this; some programs import only `smach`.
-        util.set_shutdown_check(_is_shutdown)
+        shutdown_check.set_shutdown_check(_is_shutdown)
 
 
 def _is_shutdown() -> bool:
@@ -81,19 +87,25 @@ def uninstall() -> None:
             return
         made = _installed.pop()
         sys.meta_path.remove(made.finder)
+        made.finder.close()
         for name, module in list(sys.modules.items()):
             if name not in made.before and made.finder.made(name, module):
                 del sys.modules[name]
         sys.modules.update(made.hidden)
         log.set_loggers(*made.loggers)
-        util.reset_shutdown_check()
+        shutdown_check.reset_shutdown_check()
         session.forget_loaded()
         slips.set_accepting(False)
 
 
+def current_finder(script: Path | None = None) -> OldNames:
+    """Return the finder that is installed; if none is, one for a script that uses no ROS names."""
+    return _installed[0].finder if _installed else OldNames(Project(script))
+
+
 def current_project() -> Project:
     """Return the project of the program."""
-    return _installed[0].finder.project if _installed else Project()
+    return current_finder().project
 
 
 @contextlib.contextmanager

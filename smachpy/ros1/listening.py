@@ -9,8 +9,9 @@ from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.shutdown import on_shutdown
-from smachpy.ros1.frames import FrameError, Frames, Transform
 from smachpy.ros1.session import session
+from smachpy.states.frames import FrameError, Frames
+from smachpy.states.localising import add_transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from actionlib_core.interfaces.geometry_msgs.msg import TransformStamped
 
 
-class Listener:
+class FrameListener:
     """Keeps frames up to date with the transforms on the network.
 
     Threads: messages arrive in the subscribers' threads; every method may be called from any.
@@ -41,7 +42,7 @@ class Listener:
     def _take(self, message: TFMessage, *, static: bool) -> None:
         for stamped in message.transforms:
             try:
-                add(self.frames, stamped, static=static)
+                add_transform(self.frames, stamped, static=static)
             except FrameError as error:
                 from smachpy.ros1.names.rospy.core import logwarn_throttle
 
@@ -73,14 +74,6 @@ class Listener:
         finally:
             forget()
             self._changed.remove(event)
-
-
-def add(frames: Frames, stamped: TransformStamped, *, static: bool) -> None:
-    """Add the transform of a message."""
-    move, turn = stamped.transform.translation, stamped.transform.rotation
-    transform = Transform(move.x, move.y, move.z, turn.x, turn.y, turn.z, turn.w)
-    parent, child = stamped.header.frame_id, stamped.child_frame_id
-    frames.add(parent, child, stamped.header.stamp.to_nsec(), transform, static=static)
 
 
 class Broadcaster:

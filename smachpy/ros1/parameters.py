@@ -11,19 +11,21 @@ import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.checked_file import CheckedFile
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.suggest import did_you_mean
+from actionlib_core.inputs.checked_file import CheckedFile
+from actionlib_core.inputs.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from actionlib_core.checked_file import Problem
-    from actionlib_core.wire.ros1.bridge import Ros1Bridge
+    from actionlib_core.inputs.checked_file import Problem
+    from actionlib_core.ros1.bridging import Ros1Bridge
 
 
 class ParameterFileError(ActionlibError):
     """A file of parameters cannot be read.
+
+    Try: correct the YAML at the line that is shown.
 
     Attributes:
         path: The file.

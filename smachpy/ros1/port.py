@@ -16,14 +16,11 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from smachpy.ros1 import python2
 from smachpy.ros1.extra import import_extra
 from smachpy.ros1.hook import OLD_NAMES
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _LOG: Final = {
     "logdebug": "debug",
@@ -59,6 +56,7 @@ _HINTS: Final = {
     "sleep": "outside of a state: actionlib_core.clock.current_clock().sleep(seconds)",
     "spin": "nothing is needed: `smachpy run` ends with the machine",
 }
+_SHOWN: Final = "shown by `smachpy run --log-level info`, or with logging.basicConfig in the script"
 _WANTS_FUNCTION: Final = (
     "`smachpy run FILE` wants a function `mission()` that returns the machine in place of one that "
     "executes it"
@@ -108,9 +106,12 @@ def port(source: bytes, filename: str) -> Ported:
     notes += main.notes if main is not None else []
     module = wrapper.visit(transformer)
     code = str(module.code)
-    # `import rospy` stays as long as a use of it is left.
+    # `import rospy` stays as long as a use of it is left, and then so does the node of rospy.
     if not any(isinstance(n, ast.Name) and n.id == "rospy" for n in ast.walk(ast.parse(code))):
         code = str(module.visit(_forget(cst, "rospy")).code)
+    elif transformer.initialises:
+        transformer = _transformer(cst, metadata)(_packages(text), main, keeps_node=True)
+        code = str(wrapper.visit(transformer).code)
     left = _old_names(code)
     if left:
         used = f"{', '.join(left)} {'is' if len(left) == 1 else 'are'} still used"
@@ -130,11 +131,6 @@ def _old_names(code: str) -> list[str]:
         elif isinstance(node, ast.ImportFrom) and not node.level:
             found.add((node.module or "").partition(".")[0])
     return sorted(found & OLD_NAMES)
-
-
-def port_file(path: Path) -> Ported:
-    """Rewrite a file; see `port`."""
-    return port(path.read_bytes(), str(path))
 
 
 @dataclass(slots=True)
@@ -347,9 +343,13 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
     class Rewrite(cst.CSTTransformer):  # type: ignore[misc]
         METADATA_DEPENDENCIES = (metadata.PositionProvider,)
 
-        def __init__(self, packages: set[str], main: _Main | None) -> None:
+        def __init__(
+            self, packages: set[str], main: _Main | None, *, keeps_node: bool = False
+        ) -> None:
             super().__init__()
             self.packages = packages
+            self.keeps_node = keeps_node
+            self.initialises = False
             self.main = main
             self.needs: set[str] = set()
             self.logs = False
@@ -508,17 +508,21 @@ def _transformer(cst: Any, metadata: Any) -> Any:  # noqa: C901  a class that ne
             name = text_of(original_node.func)
             package, _, rest = name.partition(".")
             if package == "rospy" and rest in _LOG:
+                if not self.logs and rest in {"loginfo", "logdebug"}:
+                    self.note(original_node, f"{name}: {_SHOWN}")
                 self.logs = True
                 return updated_node.with_changes(func=dotted(f"logger.{_LOG[rest]}"))
             if name == "rospy.sleep" and self._in_state():
                 return updated_node.with_changes(func=dotted("self.sleep"))
-            if name == "rospy.init_node" and len(updated_node.args) == 1:
+            begins = name == "rospy.init_node" and not self.keeps_node
+            if begins and len(updated_node.args) == 1:
+                self.initialises = True
                 self.needs.add("actionlib_core")
                 return updated_node.with_changes(func=dotted("actionlib_core.init"))
             made = self._super_call(name, updated_node)
             if made is not None:
                 return made
-            if name == "rospy.init_node":
+            if begins:
                 self.note(original_node, "rospy.init_node: actionlib_core.init(name) takes a name")
             words = tuple(name.split(".")[-2:])
             opened = self._opened[-1] if self._opened else ""

@@ -15,21 +15,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import Deadlock, RealClock, VirtualClock, current_clock, use_clock
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces import InterfaceError
 from actionlib_core.node import Node, get_node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
-from actionlib_core.suggest import did_you_mean
 from actionlib_core.transport.memory import MemoryNetwork
+from smachpy.engine.threads import OBSERVERS
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container, below
-from smachpy.ros1 import python2, session
+from smachpy.ros1 import session
+from smachpy.ros1.border import StandInMachine
 from smachpy.ros1.dry import nothing_done
 from smachpy.ros1.hook import INTERFACES, MissingPackageError
-from smachpy.ros1.install import install
+from smachpy.ros1.install import current_finder, install
 from smachpy.ros1.project import Project
-from smachpy.ros1.session import Session, Stop
-from smachpy.ros1.stubs import Anything
-from smachpy.run.threads import OBSERVERS
+from smachpy.ros1.session import DryRunOver, Session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -44,6 +44,8 @@ LOAD_S = 10.0
 
 class LoadError(SmachError):
     """A script did not build a machine.
+
+    Try: do what the text says; docs/ros1.md shows which scripts can be loaded.
 
     Attributes:
         script: The script.
@@ -76,13 +78,15 @@ def run_script(script: Path, argv: Sequence[str] = (), *, call: str = "") -> Any
     """
     path = script.resolve()
     try:
-        code = python2.to_code(path.read_bytes(), str(path))
+        code = current_finder(path).to_code(path.read_bytes(), str(path))
     except OSError as error:
-        raise LoadError(script, f"got {error}; expected a file of Python.") from error
+        raise LoadError(
+            script, f"got nothing to read ({error.strerror or error}); expected a file of Python."
+        ) from error
     except SyntaxError as error:
         raise LoadError(
             script,
-            f"line {error.lineno}: got {error.msg}; expected Python, 2 or 3.",
+            f"line {error.lineno}: got a syntax error ({error.msg}); expected Python, 2 or 3.",
         ) from error
     main = types.ModuleType(path.stem if call else "__main__")
     main.__file__ = str(path)
@@ -174,15 +178,29 @@ def load(
         machine = _outermost(known)
     if machine is None or (problem and stopped is None):
         in_vain = f"it built no machine in {timeout:g} s. Try --timeout SECONDS."
-        raise LoadError(path, problem or (in_vain if late else _NOTHING))
-    assert isinstance(machine, Container)
+        raise LoadError(
+            path, problem or (in_vain if late else _nothing(made, served=stopped is not None))
+        )
+    if isinstance(machine, StandInMachine) or not isinstance(machine, Container):
+        name = getattr(machine, "origin", machine)
+        raise LoadError(
+            path,
+            f"got {str(name)!r} as its machine, which is a stand-in for what is missing; expected "
+            f"a machine that the script builds. Try giving it what is missing: "
+            f"{', '.join(made.stubbed)}.",
+        )
     return machine
 
 
-_NOTHING = (
-    "it ended without a machine: got no call of execute(), run_server() or spin(); expected one. "
-    "Try `path.py:function` if a function of the file returns its machine."
-)
+def _nothing(made: Session, *, served: bool) -> str:
+    """Return why a script that has ended without a problem has no machine, and what to try."""
+    got = "a call of spin()" if served else "no call of execute(), run_server() or spin()"
+    text = f"it ended without a machine: got {got}; expected a machine."
+    if made.stubbed:
+        return f"{text} It may be in what is missing: {', '.join(made.stubbed)}."
+    if served:
+        return f"{text} It only serves others."
+    return f"{text} Try `path.py:function` if a function of the file returns its machine."
 
 
 def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
@@ -190,16 +208,16 @@ def _build(path: Path, argv: Sequence[str], call: str, made: Session) -> str:
     try:
         returned = run_script(path, argv, call=call)
         if isinstance(returned, Container):
-            made.stopped = Stop(returned)
+            made.stopped = DryRunOver(returned)
         made.settle()
     except LoadError as error:
         return error.problem
-    except Stop:
+    except DryRunOver:
         return ""
     except SystemExit as error:
         return f"it ended by sys.exit({error.code!r}) before its machine ran."
     except Deadlock:  # it waits for something that nothing can bring: it would wait for ever
-        made.stopped = made.stopped or Stop()
+        made.stopped = made.stopped or DryRunOver()
         return ""
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) and made.stopped is None:  # the user's Ctrl-C
@@ -240,14 +258,6 @@ def _node_in_force(_name: str) -> Node:
     return get_node()
 
 
-class ScriptNode(Node):
-    """The node of a script in virtual time; stand-ins may be names, as of missing parameters."""
-
-    def resolve(self, name: str, kind: str = "name") -> str:
-        """Return the full name, remapped; see `Node.resolve`."""
-        return super().resolve(str(name) if isinstance(name, Anything) else name, kind)
-
-
 def _go_virtual(stack: contextlib.ExitStack) -> None:
     """Enter a virtual clock and a network in memory, unless the caller already has such a clock."""
     clock = current_clock()
@@ -258,9 +268,7 @@ def _go_virtual(stack: contextlib.ExitStack) -> None:
     stack.enter_context(use_clock(made))
     stack.enter_context(use_shutdown(Shutdown()))
     stack.enter_context(made.patched())
-    node = stack.enter_context(
-        ScriptNode("script", transport=MemoryNetwork(made).session(), clock=made)
-    )
+    node = stack.enter_context(Node("script", transport=MemoryNetwork(made).session(), clock=made))
     stack.enter_context(use_node(node))
 
 
@@ -281,7 +289,7 @@ def _deadline(made: Session, seconds: float) -> Iterator[list[bool]]:
     def end(_number: int, _frame: FrameType | None) -> None:
         if not over:
             late.append(True)
-            made.stopped = made.stopped or Stop()
+            made.stopped = made.stopped or DryRunOver()
             raise made.stopped
 
     main = threading.main_thread().ident
@@ -303,6 +311,7 @@ def _outermost(known: Sequence[Container]) -> Container | None:
         thing
         for thing in gc.get_objects()
         if isinstance(thing, Container) and id(thing) not in before and "_smachpy" in vars(thing)
+        if not isinstance(thing, StandInMachine)
     ]
     inner = {
         id(child)
@@ -315,4 +324,4 @@ def _outermost(known: Sequence[Container]) -> Container | None:
     return outer[-max(sizes)[1]] if sizes else None
 
 
-__all__ = ["LOAD_S", "LoadError", "ScriptNode", "load", "run_script", "where_raised"]
+__all__ = ["LOAD_S", "LoadError", "load", "run_script", "where_raised"]

@@ -12,10 +12,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 from xml.etree import ElementTree as ET
 
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from actionlib_core.inputs.checked_file import read_limited
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-MOST_FOLDERS: Final = 5000
+LARGEST_FILE: Final = 1_000_000
+"""Largest manifest or setup.py that is read [bytes]."""
+
+MAX_FOLDERS: Final = 5000
 """Limit of the search around a script: a folder such as a home directory may hold many more."""
 
 KINDS: Final[tuple[Literal["msg", "srv", "action"], ...]] = ("msg", "srv", "action")
@@ -72,8 +80,8 @@ class Project:
         for file in (self.packages()[package] / name for name in _MANIFESTS):
             text = _read(file)
             try:
-                root = ET.fromstring(text or "<package/>")  # noqa: S314  beside code that is run
-            except ET.ParseError as error:
+                root = fromstring(text or "<package/>")
+            except (ET.ParseError, DefusedXmlException) as error:
                 raise ValueError(f"{file}: {error}") from error
             values = (one.get(attribute) for one in root.iterfind(f"export/{tag}"))
             found += [value for value in values if value is not None]
@@ -88,22 +96,35 @@ class Project:
         return {kind: files for kind, files in found.items() if files}
 
     def source_roots(self) -> Iterator[Path]:
-        """Yield the folders whose modules the script may import.
+        """Yield the folders whose modules ROS finds for the script.
 
         First its own folder, then those of its package, then those of other packages.
         """
         yield self.folder
-        own = [folder for folder in self.packages().values() if self.folder.is_relative_to(folder)]
-        others = [folder for folder in self.packages().values() if folder not in own]
-        for folder in (*own, *others):
-            for below in ("src", *_package_dirs(folder), "scripts", "nodes"):
+        for folder in self._by_nearness():
+            for below in ("src", *_package_dirs(folder)):
                 if (folder / below).is_dir():
                     yield folder / below
-        # Last, for imports of a package by its folder's name.
-        for folder in own:
-            yield folder
-            yield folder.parent
+
+    def other_roots(self) -> Iterator[Path]:
+        """Yield folders that ROS never searches, for modules that nobody else has.
+
+        Some repositories are run with a path of their own, or import a package by its folder.
+        """
+        for folder in self._by_nearness():
+            for below in ("scripts", "nodes"):
+                if (folder / below).is_dir():
+                    yield folder / below
+        for folder in self.packages().values():
+            if self.folder.is_relative_to(folder):
+                yield folder
+                yield folder.parent
         yield self.root
+
+    def _by_nearness(self) -> list[Path]:
+        """Return the packages' folders, first those that contain the script."""
+        folders = self.packages().values()
+        return sorted(folders, key=lambda folder: not self.folder.is_relative_to(folder))
 
     def holds(self, file: str) -> bool:
         """Return whether a file belongs to the project."""
@@ -138,7 +159,7 @@ def _walk(root: Path) -> Iterator[Path]:
             name for name in below if not name.startswith(".") and name not in _SKIPPED
         )
         yield Path(folder)
-        if seen >= MOST_FOLDERS:
+        if seen >= MAX_FOLDERS:
             return
 
 
@@ -166,6 +187,6 @@ def _package_dirs(folder: Path) -> list[str]:
 def _read(file: Path) -> str:
     """Return the text of a file; "" if it cannot be read."""
     try:
-        return file.read_text(encoding="utf-8", errors="replace")
+        return read_limited(file, LARGEST_FILE).decode("utf-8", "replace")
     except OSError:
         return ""

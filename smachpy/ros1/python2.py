@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 from actionlib_core.exceptions import ActionlibError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import CodeType
 
 # Fixers that are not used: for style only, done better by `_GoneNames`, and for implicit relative
@@ -57,6 +58,8 @@ _CODING: Final = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")
 class Python2Error(ActionlibError, SyntaxError):
     """A source is neither Python 3 nor Python 2.
 
+    Try: correct the line that is shown.
+
     Attributes:
         filename: The file.
         lineno: The line with the error by Python 2's grammar.
@@ -67,14 +70,23 @@ class Python2Error(ActionlibError, SyntaxError):
         self.filename, self.lineno, self.msg = filename, lineno, problem
 
 
-def to_code(source: bytes, filename: str) -> CodeType:
+def to_code(
+    source: bytes, filename: str, change: Callable[[ast.Module], None] | None = None
+) -> CodeType:
     """Compile a source, converted from Python 2 if necessary; it keeps the file's line numbers.
+
+    Args:
+        source: The source.
+        filename: Its file.
+        change: Changes the syntax tree before.
 
     Raises:
         SyntaxError: it is neither Python 3 nor Python 2; the error is of the likelier version.
         MissingExtraError: it is Python 2, and fissix is not installed.
     """
     tree = to_tree(source, filename)
+    if change is not None:
+        change(tree)
     try:
         code: CodeType = compile(tree, filename, "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -102,6 +114,15 @@ class _GlobalsFirst(ast.NodeTransformer):
     def visit_Global(self, node: ast.Global) -> ast.AST:
         self._names += node.names
         return ast.copy_location(ast.Pass(), node)
+
+
+def is_python2(source: bytes, filename: str) -> bool:
+    """Return whether Python 3 cannot parse a source."""
+    try:
+        ast.parse(straight(read(source)), filename)
+    except SyntaxError:
+        return True
+    return False
 
 
 def to_tree(source: bytes, filename: str) -> ast.Module:

@@ -7,7 +7,6 @@ or started, and the first call that would run the machine ends the program.
 from __future__ import annotations
 
 import contextlib
-import signal
 import sys
 import threading
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -31,7 +30,7 @@ SETTLE_S = 1.0
 """Virtual time that a dry program's threads get when its main thread waits or has ended [s]."""
 
 
-class Stop(SystemExit):
+class DryRunOver(SystemExit):
     """Ends a dry program where it would run its machine.
 
     It is a `SystemExit`, which ends a thread silently and passes `except Exception` in the program.
@@ -60,10 +59,11 @@ class Session:
         named_node: Its node has that name, or the one that the command line gives it.
         stubbed: Names of what was replaced by stand-ins.
         stopped: How a dry program has ended; None before.
+        executed: A dry program has ended by executing a machine.
         shows_transitions: The command shows transitions, so SMACH's log need not.
         loaded: Its machine was built by `load`, and may be run by other code.
         rosout: Publishes the program's log; None before it has a node.
-        on_action: Called with the name of each action for which the program makes a client.
+        on_action: Called with name and type of each action for which the program makes a client.
     """
 
     def __init__(
@@ -80,13 +80,14 @@ class Session:
         self.parameters = Parameters()
         self.name = ""
         self.stubbed: list[str] = []
-        self.stopped: Stop | None = None
+        self.stopped: DryRunOver | None = None
+        self.executed = False
         self.hooks: list[Callable[[str], object]] = []
         self.named_node = False
         self.shows_transitions = False
         self.loaded = False
         self.rosout: Any = None
-        self.on_action: Callable[[str], object] = lambda _name: None
+        self.on_action: Callable[[str, str], object] = lambda _name, _type: None
         self._make_node = make_node or make_default
         self._handling = contextlib.ExitStack()
 
@@ -106,7 +107,7 @@ class Session:
         if self.dry:
             # Several threads may get here; a machine counts more than an endless wait.
             if self.stopped is None or (machine is not None and self.stopped.machine is None):
-                self.stopped = Stop(machine)
+                self.stopped = DryRunOver(machine)
             raise self.stopped
 
     def settle(self) -> None:
@@ -129,6 +130,7 @@ class Session:
 
     def be_live(self) -> None:
         """End the dry mode: the states of the machine run later, and then are to have effects."""
+        self.executed = self.stopped is not None and self.stopped.machine is not None
         self.dry, self.stopped, self.loaded = False, None, True
         self.hooks.clear()
 
@@ -139,11 +141,10 @@ class Session:
         self.hooks.append(hook)
 
     def handle_signals(self) -> None:
-        """Let Ctrl-C and SIGTERM ask the program to end, unless they already have handlers."""
+        """Let signals ask the program to end, unless they already have handlers."""
         real = isinstance(current_clock(), RealClock)
         if real and threading.current_thread() is threading.main_thread():
-            defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-            ours = tuple(n for n, default in defaults.items() if signal.getsignal(n) is default)
+            ours = shutdown.default_signals()
             if ours:
                 self._handling.enter_context(shutdown.handle_signals(ours))
                 shutdown.current_shutdown().at_exit(self._handling.close)

@@ -11,7 +11,9 @@ import builtins
 import re
 import sys
 import types
+from dataclasses import dataclass
 from dis import opname
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,7 +98,7 @@ class Anything:
         return f"<stand-in {self._stub_name}>"
 
     def __str__(self) -> str:
-        return re.sub(r"\W+", "", self._stub_name.rpartition(".")[2].rpartition("/")[2])
+        return word_of(self)
 
     def __float__(self) -> float:
         return 0.0
@@ -121,34 +123,94 @@ class Anything:
         return (Anything,)
 
 
-def _importing(frame: FrameType | None) -> tuple[ast.AST | None, dict[str, Any]]:
-    """Return the syntax tree of the importing file, None if it cannot be read, and its globals."""
+def is_stand_in(value: object) -> bool:
+    """Return whether a value is a stand-in, or a class that was made as one."""
+    if isinstance(value, type):
+        return isinstance(value, _AnyClass) and value.__module__ == __name__
+    return isinstance(value, Anything)
+
+
+def word_of(stand_in: Any) -> str:
+    """Return a word for a stand-in: the last name by which the program asked for it."""
+    if isinstance(stand_in, type):
+        return stand_in.__name__
+    words = re.findall(r"[A-Za-z]\w*", stand_in.__dict__["_stub_name"])
+    return words[-1] if words else "stub"
+
+
+def interface_for(stand_in: Any, kind: str) -> Any:
+    """Return an interface in the place of a stand-in for its class.
+
+    Args:
+        stand_in: The stand-in.
+        kind: "msg", "srv" or "action".
+    """
+    if isinstance(stand_in, type) and issubclass(stand_in, _Loose):
+        return stand_in
+    word = word_of(stand_in)
+    if kind == "action":
+        return _action_part(_PACKAGE, word.removesuffix("Action") or word, "Action")
+    return (_service if kind == "srv" else _message)(_PACKAGE, word)
+
+
+def takes_any_message(interface: Any) -> bool:
+    """Return whether an action's goal or a service's request is a stand-in."""
+    request = getattr(interface, "_request_class", None)
+    if request is None:
+        request = type(getattr(getattr(interface(), "action_goal", None), "goal", None))
+    return is_stand_in(request)
+
+
+_PACKAGE = "stand_in"  # the package of interfaces that are known by a stand-in only
+
+
+@dataclass(frozen=True, slots=True)
+class _StarNames:
+    """What an importing file leaves to its star imports.
+
+    Attributes:
+        unbound: Names that it reads and does not bind.
+        services: Those of them that it uses as classes of services.
+    """
+
+    unbound: tuple[str, ...] = ()
+    services: frozenset[str] = frozenset()
+
+
+def _importing(frame: FrameType | None) -> tuple[_StarNames, dict[str, Any]]:
+    """Return the names that the importing file needs, if it can be read, and its globals."""
     while frame is not None and ("importlib" in frame.f_code.co_filename or _is_here(frame)):
         frame = frame.f_back
     if frame is None:
-        return None, {}
-    file = frame.f_code.co_filename
+        return _StarNames(), {}
+    file = Path(frame.f_code.co_filename)
     try:
-        return to_tree(Path(file).read_bytes(), file), frame.f_globals
+        return _names_in(file, file.stat().st_mtime_ns), frame.f_globals
     except (OSError, SyntaxError):
-        return None, {}
+        return _StarNames(), {}
+
+
+@lru_cache(maxsize=64)  # a file may have dozens of star imports
+def _names_in(file: Path, _changed: int) -> _StarNames:
+    nodes = list(ast.walk(to_tree(file.read_bytes(), str(file))))
+    unbound = _unbound(nodes)
+    services = set()
+    for call in nodes:
+        if isinstance(call, ast.Call) and len(call.args) > 1:
+            called = call.func.attr if isinstance(call.func, ast.Attribute) else ""
+            called = call.func.id if isinstance(call.func, ast.Name) else called
+            if called in _SERVICE_CALLS and isinstance(call.args[1], ast.Name):
+                services.add(call.args[1].id)
+    return _StarNames(tuple(unbound), frozenset(services.intersection(unbound)))
 
 
 def _is_here(frame: FrameType) -> bool:
     return frame.f_code.co_filename == __file__
 
 
-def service_names(frame: FrameType | None) -> set[str]:
+def service_names(frame: FrameType | None) -> frozenset[str]:
     """Return the unbound names that the importing file uses as classes of services."""
-    tree, _ = _importing(frame)
-    calls = [] if tree is None else [n for n in ast.walk(tree) if isinstance(n, ast.Call)]
-    names = set()
-    for call in calls:
-        called = call.func.attr if isinstance(call.func, ast.Attribute) else ""
-        called = call.func.id if isinstance(call.func, ast.Name) else called
-        if called in _SERVICE_CALLS and len(call.args) > 1 and isinstance(call.args[1], ast.Name):
-            names.add(call.args[1].id)
-    return names & set(_unbound(tree)) if tree is not None else set()
+    return _importing(frame)[0].services
 
 
 _SERVICE_CALLS = frozenset({"Service", "ServiceProxy", "ServiceState"})
@@ -159,13 +221,13 @@ def unbound_names(frame: FrameType | None) -> list[str]:
 
     For a star import from a stand-in: these are the names that it has to provide.
     """
-    tree, there = _importing(frame)
-    return [] if tree is None else [name for name in _unbound(tree) if name not in there]
+    names, there = _importing(frame)
+    return [name for name in names.unbound if name not in there]
 
 
-def _unbound(tree: ast.AST) -> list[str]:
-    read = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
-    for node in ast.walk(tree):
+def _unbound(nodes: list[ast.AST]) -> list[str]:
+    read = {n.id for n in nodes if isinstance(n, ast.Name)}
+    for node in nodes:
         if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
             read.discard(node.id)
         elif isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -226,12 +288,24 @@ class StubModule(types.ModuleType):
 
 
 class _AnyClass(type):
-    """Makes a class have every attribute: a constant of a message, or a name if it is a module."""
+    """Makes a class have every attribute: a constant of a message, or a name if it is a module.
+
+    It can be read like an enumeration, too.
+    """
 
     def __getattr__(cls, name: str) -> Any:
         if name.startswith("_") or name in _MARKS:
             raise AttributeError(name)
         return _stand_in(name)
+
+    def __getitem__(cls, key: Any) -> Any:
+        return Anything(f"{cls.__name__}[{key}]")
+
+    def __iter__(cls) -> Iterator[Any]:
+        return iter(Anything(cls.__name__))
+
+    def __len__(cls) -> int:
+        return 0
 
 
 def _stand_in(name: str) -> Any:
@@ -240,11 +314,15 @@ def _stand_in(name: str) -> Any:
 
 
 def stand_in_class(name: str) -> type:
-    """Return a class whose instances are stand-ins."""
+    """Return a class whose instances are stand-ins; by its name it may be one of exceptions."""
+    raised = name.endswith(("Error", "Exception"))
     return _AnyClass(
         name,
-        (Anything,),
-        {"__init__": lambda self, *_args, **_kwargs: Anything.__init__(self, name)},
+        (Anything, Exception) if raised else (Anything,),
+        {
+            "__init__": lambda self, *_args, **_kwargs: Anything.__init__(self, name),
+            "__module__": __name__,
+        },
     )
 
 
@@ -406,7 +484,7 @@ def permissive(kind: type) -> Any:
         return kind
     if kind not in _loose:
         made: Any = _AnyClass(kind.__name__, (_Loose, kind), {})
-        made.__slots__ = _EveryName()
+        made.__slots__ = EVERY_NAME
         _loose[kind] = made
     return _loose[kind]
 
@@ -418,6 +496,9 @@ class _EveryName(tuple[str, ...]):
 
     def __contains__(self, name: object) -> bool:
         return True
+
+
+EVERY_NAME = _EveryName()
 
 
 class _Loose:

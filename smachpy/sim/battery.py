@@ -7,7 +7,7 @@ import threading
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from smachpy.sim.config import BatteryConfig
+    from smachpy.places.robot_file import BatteryConfig
 
 _SECONDS_PER_HOUR = 3600.0
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from smachpy.sim.geometry import wrap_angle
+from smachpy.places.pose import wrap_angle
 from smachpy.sim.navigation import brake
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _SHARE: Final = 0.8  # fraction of the braking power that is counted on
 _SLOWEST_TURN: Final = 0.05  # [rad/s]
-_KEPT_AWAY: Final = 0.1  # [m] distance to things behind
+_DISTANCE_BEHIND: Final = 0.1  # [m] distance to things behind
 
 
 def spin(robot: Robot, angle: float) -> Generator[Command, None, str]:
@@ -44,8 +44,8 @@ def back_up(robot: Robot, distance: float, speed: float) -> Generator[Command, N
     x, y = body.x, body.y
     trouble = ""
     while math.hypot(body.x - x, body.y - y) + body.braking_distance() < distance:
-        room = robot.room((-speed, 0.0), _KEPT_AWAY)
-        if robot.bumped or room < body.braking_distance() + _KEPT_AWAY:
+        room = robot.room((-speed, 0.0), _DISTANCE_BEHIND)
+        if robot.bumped or room < body.braking_distance() + _DISTANCE_BEHIND:
             driven = math.hypot(body.x - x, body.y - y)
             trouble = f"something is in the way {room:.2f} m behind, after {driven:.2f} m"
             break

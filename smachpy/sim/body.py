@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.places.pose import Pose2D, wrap_angle
 
 if TYPE_CHECKING:
-    from smachpy.sim.config import RobotConfig
+    from smachpy.places.robot_file import RobotConfig
 
 _STILL = 1e-9  # [m/s, rad/s] below this it counts as standing
 

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from smachpy.sim.floor import Floor
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.occupancy import OccupancyMap
+from smachpy.places.floor import Floor
+from smachpy.places.occupancy import OccupancyMap
+from smachpy.places.pose import Pose2D
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from smachpy.sim.config import PlannerConfig
-    from smachpy.sim.floor import Sighting, Thing
+    from smachpy.places.floor import Sighting, Thing
+    from smachpy.places.robot_file import PlannerConfig
 
 _WIDE_BERTH = 0.02  # [m] added to the margin around moving things
 _SHY = 0.4  # [m] beyond that, passing a moving thing costs more

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from smachpy.sim.floor import Bar
+from smachpy.places.floor import Bar
 
 if TYPE_CHECKING:
     from smachpy.sim.world import World

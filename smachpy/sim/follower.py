@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from smachpy.sim.geometry import wrap_angle
+from smachpy.places.pose import wrap_angle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from smachpy.places.pose import Pose2D
+    from smachpy.places.robot_file import ControlConfig, RobotConfig
     from smachpy.sim.body import Body
-    from smachpy.sim.config import ControlConfig, RobotConfig
-    from smachpy.sim.geometry import Pose2D
 
     Floats = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces import ros2
 from actionlib_core.node import get_node
 from actionlib_core.wire.ros2.network import choose_network
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.pose import ORIGIN, wrap_angle
 from smachpy.sim.battery import Battery
 from smachpy.sim.behaviors import back_up, spin
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import ORIGIN, wrap_angle
 from smachpy.sim.nav2_topics import NS, Nav2Topics, fill_pose, set_time
 from smachpy.sim.navigation import STOP
 from smachpy.sim.pilot import Pilot

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.interfaces import ros2
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher, Subscriber
-from smachpy.sim.geometry import ORIGIN, Pose2D, quaternion_of
+from actionlib_core.pubsub.topic import Publisher, WatchingSubscriber
+from smachpy.places.pose import ORIGIN, Pose2D, quaternion_of
 from smachpy.sim.scanner import Scanner
 from smachpy.sim.server import BASE_FRAME, MAP_FRAME, ODOM_FRAME
 from smachpy.sim.stepper import JUST_PAST
@@ -72,7 +72,7 @@ class Nav2Topics:
         grid = message("nav_msgs/OccupancyGrid")
         self._map = Publisher("map", grid, latch=True, node=node)
         self._publish_map(grid())
-        self._speeds = Subscriber(
+        self._speeds = WatchingSubscriber(
             "cmd_vel",
             message("geometry_msgs/Twist"),
             lambda heard: on_speed((heard.linear.x, heard.angular.z)),

@@ -10,9 +10,9 @@ import math
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Final
 
-from smachpy.sim.exceptions import NavigationError
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.pose import Pose2D, wrap_angle
 from smachpy.sim.follower import Follower, Stage
-from smachpy.sim.geometry import Pose2D, wrap_angle
 from smachpy.sim.planner import keep_right
 
 if TYPE_CHECKING:
@@ -30,17 +30,18 @@ _LATE_FACTOR: Final = 20.0  # a drive may take this many times its shortest time
 _LATE_SECONDS: Final = 60.0  # [s] and this much more
 _SEARCH_RATE: Final = 0.7  # fraction of the turn rate used to look around
 _HEED: Final = 1.5  # [m] beyond the braking distance: within this, others on the way matter
-_KEPT_AWAY: Final = 0.1  # [m] distance at which it stops in front of others
+_STOPPING_DISTANCE: Final = 0.1  # [m] distance at which it stops in front of others
 _NO_CREEPING: Final = 0.03  # [m] with less space than this beyond that distance it stays
 _SHARE: Final = 0.8  # fraction of the braking power that is counted on
 _RETHINK: Final = 0.5  # [s] between two searches for a way around others
 _HOLD: Final = 1.0  # [s] it waits in front of others before it tries something else
 _CLOSER: Final = 1e-3  # [m] a point is a meeting only if it is closer than now: see `_gap`
 _PROGRESS: Final = 1.0  # [m] after this way, being held up counts as new
+_APPROACHES: Final = 5  # to one goal, before the robot recovers and tries again
 _YIELD_WAIT: Final = 6.0  # [s] it waits at most where it has made space
 
 
-class End(Enum):
+class DriveEnd(Enum):
     """The end of following a way."""
 
     ARRIVED = auto()
@@ -96,12 +97,12 @@ def _try(robot: Robot, goal: Pose2D, patience: _Patience) -> Generator[Command, 
     if len(robot.world.robots) > 1:
         way = keep_right(robot.planner.costmap, way)
     end = yield from _follow(robot, way, goal)
-    if end is End.ARRIVED:
-        return ""
-    if end is End.BUMPED:
+    if end is DriveEnd.ARRIVED:
+        return patience.approached(goal)
+    if end is DriveEnd.BUMPED:
         return f"bumped into something at ({robot.body.x:.2f}, {robot.body.y:.2f})"
-    trouble = patience.trouble() if end is End.HELD else ""
-    if end is End.HELD and not trouble:
+    trouble = patience.trouble() if end is DriveEnd.HELD else ""
+    if end is DriveEnd.HELD and not trouble:
         yield from _give_way(robot)
     return trouble or None
 
@@ -113,12 +114,27 @@ def brake(robot: Robot) -> Generator[Command]:
 
 
 class _Patience:
-    """Decides when a robot has waited long enough for others in its way."""
+    """Decides when a robot has waited long enough for others, and approached its goal enough."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._approaches = 0
         self._since = 0.0
         self._odometer = -math.inf
+
+    def approached(self, goal: Pose2D) -> str | None:
+        """Return "" if the robot stands at the goal, None to approach it again, else the error.
+
+        A robot that is told in full speed to stop where it is brakes behind the goal.
+        """
+        self._approaches += 1
+        beside = self._robot.body.pose.distance(goal)
+        if beside <= self._robot.config.control.xy_tolerance:
+            return ""
+        if self._approaches < _APPROACHES:
+            return None
+        self._approaches = 0
+        return f"stopped {beside:.2f} m beside the goal"
 
     def trouble(self) -> str:
         """Return what has been in the way for too long; else ""."""
@@ -135,7 +151,7 @@ class _Patience:
 
 def _follow(
     robot: Robot, way: list[Point], goal: Pose2D, *, asked: bool = False
-) -> Generator[Command, None, End]:
+) -> Generator[Command, None, DriveEnd]:
     """Follow a way, and drive around others on it if there is space.
 
     Args:
@@ -151,7 +167,7 @@ def _follow(
         robot.follower = follower
         speed, turn_rate = follower.command(robot.body)
         if follower.stage is Stage.DONE:
-            return End.ARRIVED
+            return DriveEnd.ARRIVED
         if robot.traffic or gap < math.inf:
             # Measured at every second step and estimated in between, to save time.
             gap = _gap(robot, follower) if count % 2 == 0 else gap - abs(robot.body.speed) * dt
@@ -167,15 +183,15 @@ def _follow(
             speed = min(speed, _safe_speed(robot, gap))
             held = held + dt if speed == 0.0 and gap < math.inf else 0.0
             if held > _HOLD or (held and not asked and robot.asked_by() is not None):
-                return End.HELD
+                return DriveEnd.HELD
         yield speed, turn_rate
         if robot.bumped:
-            return End.BUMPED if robot.held_by is None else End.HELD
+            return DriveEnd.BUMPED if robot.held_by is None else DriveEnd.HELD
         count += 1
         if count % _LOOK_EVERY == 0 and robot.look():
             costmap = robot.planner.costmap
             if not _is_clear(costmap, list(follower.rest())):
-                return End.CHANGED
+                return DriveEnd.CHANGED
     raise NavigationError(f"no progress: {longest * _dt(robot):.0f} s were not enough for this way")
 
 
@@ -216,9 +232,9 @@ def _safe_speed(robot: Robot, gap: float) -> float:
     """Return the speed from which it can stop within a gap [m] (v^2 = 2 a s)."""
     if math.isinf(gap):
         return gap
-    if gap < _KEPT_AWAY + _NO_CREEPING:
+    if gap < _STOPPING_DISTANCE + _NO_CREEPING:
         return 0.0
-    return math.sqrt(2.0 * _SHARE * robot.config.robot.braking * (gap - _KEPT_AWAY))
+    return math.sqrt(2.0 * _SHARE * robot.config.robot.braking * (gap - _STOPPING_DISTANCE))
 
 
 def _give_way(robot: Robot) -> Generator[Command]:
@@ -236,7 +252,7 @@ def _give_way(robot: Robot) -> Generator[Command]:
 def _make_room(robot: Robot, other: Robot) -> Generator[Command]:
     """Leave another robot's way and wait until it has passed."""
     here = (robot.body.x, robot.body.y)
-    clearance = other.body.radius + robot.planner.costmap.radius + _KEPT_AWAY
+    clearance = other.body.radius + robot.planner.costmap.radius + _STOPPING_DISTANCE
     robot.look()
     way = robot.planner.refuge(here, other.ahead(), clearance, robot.traffic.values())
     if way is not None:

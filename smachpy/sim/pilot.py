@@ -6,13 +6,13 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from smachpy.sim.exceptions import NavigationError
+from smachpy.places.exceptions import NavigationError
 from smachpy.sim.navigation import STOP, brake, drive_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    from smachpy.sim.geometry import Pose2D
+    from smachpy.places.pose import Pose2D
     from smachpy.sim.navigation import Command
     from smachpy.sim.world import Robot
 

@@ -13,22 +13,22 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from smachpy.sim.exceptions import NavigationError
+from smachpy.places.exceptions import NavigationError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
+    from smachpy.places.floor import Sighting
     from smachpy.sim.costmap import Costmap
-    from smachpy.sim.floor import Sighting
 
 Point = tuple[float, float]  # (x, y) [m], map frame
 Cell = tuple[int, int]  # (row, column)
 
 _NEIGHBOURS: Final = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
-_KEPT_FIELDS: Final = 64  # trees that are kept, one per goal cell: 0.7 MB each for the office
-_KEPT_WAYS: Final = 256  # finished ways that are kept, one per start cell and goal
+_MAX_CACHED_FIELDS: Final = 64  # trees that are kept, one per goal cell: 0.7 MB each for the office
+_MAX_CACHED_WAYS: Final = 256  # finished ways that are kept, one per start cell and goal
 _SPACING: Final = 0.05  # [m] between the points of a finished way
 _ROUNDS: Final = 3  # of corner cutting
 _SLACK: Final = 1.02  # a straight line may cost this much more than the bends it replaces
@@ -73,7 +73,7 @@ class Planner:
             if way is None:
                 way = self._make_way(source, target, start, goal)
                 self._ways[source, goal] = way
-                if len(self._ways) > _KEPT_WAYS:
+                if len(self._ways) > _MAX_CACHED_WAYS:
                     self._ways.popitem(last=False)
         return [start, *way[1:]]
 
@@ -184,7 +184,7 @@ class Planner:
             root = target[0] * self.costmap.map.width + target[1]
             _, tree = dijkstra(self._graph, indices=root, return_predecessors=True)
             self._trees[target] = tree
-            if len(self._trees) > _KEPT_FIELDS:
+            if len(self._trees) > _MAX_CACHED_FIELDS:
                 self._trees.popitem(last=False)
         else:
             self._trees.move_to_end(target)

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from smachpy.sim.floor import SOLID_FROM, Bar, Obstacle
+from smachpy.places.floor import SOLID_FROM, Bar, Obstacle
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from smachpy.sim.floor import Thing
-    from smachpy.sim.occupancy import OccupancyMap
+    from smachpy.places.floor import Thing
+    from smachpy.places.occupancy import OccupancyMap
 
     Floats = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smachpy.sim.floor import Obstacle
+from smachpy.places.floor import Obstacle
 from smachpy.sim.raycast import cast_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from smachpy.sim.floor import Thing
+    from smachpy.places.floor import Thing
     from smachpy.sim.world import Robot
 
 

@@ -14,6 +14,7 @@ from actionlib_core.interfaces.geometry_msgs.msg import (
     PoseStamped,
     PoseWithCovariance,
     Quaternion,
+    TransformStamped,
     Twist,
     TwistWithCovariance,
     Vector3,
@@ -23,12 +24,13 @@ from actionlib_core.interfaces.nav_msgs.msg import MapMetaData, OccupancyGrid, O
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.interfaces.std_srvs.srv import Empty, EmptyResponse
+from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import Publisher, WatchingSubscriber
 from actionlib_core.time import Time
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import Pose2D, quaternion_of, yaw_of
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.pose import Pose2D, quaternion_of, yaw_of
 from smachpy.sim.interfaces import ChargeAction, ChargeFeedback, ChargeResult
 from smachpy.sim.navigation import STOP
 from smachpy.sim.pilot import Pilot
@@ -42,8 +44,8 @@ if TYPE_CHECKING:
     from actionlib_core.exceptions import ServerConflictError
     from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
     from actionlib_core.node import Node
+    from smachpy.places.occupancy import OccupancyMap
     from smachpy.sim.interfaces import ChargeGoal
-    from smachpy.sim.occupancy import OccupancyMap
     from smachpy.sim.world import Robot
 
 logger = logging.getLogger(__name__)
@@ -87,8 +89,9 @@ class RobotServer:
         self._closing = self._clock.event("the robot closes")
         self._wake = self._clock.event("the end of the drive")
         self._charge_wake = self._clock.event("the charge")
-        self._parts: list[Publisher | Subscriber[Twist] | Service] = []
+        self._parts: list[Publisher | WatchingSubscriber[Twist] | Service] = []
         self._odom = Publisher("odom", Odometry, latch=True, node=self._node)
+        self._frames = Publisher("tf_static", TFMessage, latch=True, node=self._node)
         self._battery = Publisher("battery", BatteryState, latch=True, node=self._node)
         self._scan = Publisher("scan", LaserScan, node=self._node)
         self._plan = Publisher("plan", Path, latch=True, node=self._node)
@@ -117,13 +120,18 @@ class RobotServer:
         self._charge.start()
         self._parts = [
             self._odom,
+            self._frames,
             self._battery,
             self._scan,
             self._plan,
             *([map_publisher(self._robot.world.map, self._node)] if self._owns_stepper else ()),
-            Subscriber("cmd_vel", Twist, self._on_cmd_vel, queue_size=1, node=self._node),
+            WatchingSubscriber("cmd_vel", Twist, self._on_cmd_vel, queue_size=1, node=self._node),
             Service("move_base/clear_costmaps", Empty, self._on_clear, node=self._node),
         ]
+        # Where the odometry began is known, as if by a localisation that is never wrong.
+        known = TransformStamped(self._header(MAP_FRAME), ODOM_FRAME)
+        known.transform.rotation.w = 1.0
+        self._frames.publish([known])
         self._publish_odometry()
         self._publish_battery()
         self._stepper.add(self)
@@ -157,7 +165,7 @@ class RobotServer:
         if self._owns_stepper:
             self._stepper.close()
         for part in self._parts:
-            part.unregister() if isinstance(part, (Publisher, Subscriber)) else part.close()
+            part.unregister() if isinstance(part, (Publisher, WatchingSubscriber)) else part.close()
 
     # -- steps: in the stepper's thread --------------------------------------------------------
 

@@ -12,9 +12,9 @@ from actionlib_core.node import Node, get_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
 from smachpy.exceptions import MissionError
-from smachpy.sim.config import ControlConfig, load_config
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.occupancy import load_map
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import load_map
+from smachpy.places.robot_file import ControlConfig, load_config
 from smachpy.sim.server import RobotServer, map_publisher
 from smachpy.sim.stepper import Stepper
 from smachpy.sim.world_file import WorldSpec, load_world, place_robots

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from smachpy.sim.occupancy import OCCUPIED, UNKNOWN
+from smachpy.places.occupancy import OCCUPIED, UNKNOWN
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from smachpy.sim.geometry import Pose2D
-    from smachpy.sim.occupancy import OccupancyMap
+    from smachpy.places.occupancy import OccupancyMap
+    from smachpy.places.pose import Pose2D
 
 Colour = tuple[int, int, int]
 

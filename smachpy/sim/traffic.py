@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from smachpy.sim.world import World
 
 _ACCELERATION: Final = 1.0  # [m/s^2] of moving obstacles
-_KEPT_AWAY: Final = 0.15  # [m] distance at which they stop in front of a robot
+_STOPPING_DISTANCE: Final = 0.15  # [m] distance at which they stop in front of a robot
 
 
 class Disc(Protocol):
@@ -84,12 +84,12 @@ class Mover:
     def _room(self) -> float:
         """Return how far it can walk straight on before it meets a robot [m]."""
         ux, uy = math.cos(self._heading), math.sin(self._heading)
-        far = self._top * self._top / (2.0 * _ACCELERATION) + _KEPT_AWAY
+        far = self._top * self._top / (2.0 * _ACCELERATION) + _STOPPING_DISTANCE
         room = far
         for robot in self._world.robots:
             other = robot.body
             dx, dy = other.x - self.x, other.y - self.y
-            reach = other.radius + self.radius + _KEPT_AWAY
+            reach = other.radius + self.radius + _STOPPING_DISTANCE
             along = dx * ux + dy * uy
             if along <= 0.0 or along > far + reach:
                 continue

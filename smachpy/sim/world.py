@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.floor import Bar, Obstacle, Sighting
 from smachpy.sim.battery import Battery
 from smachpy.sim.body import Body
 from smachpy.sim.costmap import Costmap
 from smachpy.sim.doors import Door
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.floor import Bar, Obstacle, Sighting
 from smachpy.sim.planner import Planner
 from smachpy.sim.raycast import Raycaster
 from smachpy.sim.traffic import Mover
@@ -23,15 +23,15 @@ from smachpy.sim.traffic import Mover
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from smachpy.sim.config import PlannerConfig, SimConfig
-    from smachpy.sim.floor import Thing
+    from smachpy.places.floor import Thing
+    from smachpy.places.occupancy import OccupancyMap
+    from smachpy.places.pose import Pose2D
+    from smachpy.places.robot_file import PlannerConfig, SimConfig
     from smachpy.sim.follower import Follower
-    from smachpy.sim.geometry import Pose2D
-    from smachpy.sim.occupancy import OccupancyMap
     from smachpy.sim.traffic import Disc
 
 AT_DOCK: Final = 0.2  # [m] reach of the charger
-_KEPT_PLANNERS: Final = 8  # sets of obstacles whose planner is kept; making one takes long
+_MAX_CACHED_PLANNERS: Final = 8  # sets of obstacles whose planner is kept; making one takes long
 _REMEMBERED: Final = 2.0  # times the robot's sight: farther moving things are forgotten
 _TOLD: Final = 4.0  # [m] of its way that a robot shares with others
 _ASKED: Final = 3.0  # [s] after which a request for space expires
@@ -197,7 +197,7 @@ class World:
             if planner is None:
                 planner = Planner(Costmap(self.map, body_radius, config, obstacles))
                 self._planners[key] = planner
-                if len(self._planners) > _KEPT_PLANNERS:
+                if len(self._planners) > _MAX_CACHED_PLANNERS:
                     self._planners.popitem(last=False)
             else:
                 self._planners.move_to_end(key)

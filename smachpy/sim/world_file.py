@@ -6,23 +6,24 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from actionlib_core.checked_file import REQUIRED, CheckedFile, Limits
 from actionlib_core.exceptions import InvalidNameError
+from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Limits
 from actionlib_core.names import check_base_name
-from smachpy.sim.config import SimConfig, load_config, read_file
-from smachpy.sim.exceptions import InputFileError, NavigationError
-from smachpy.sim.floor import Floor, Obstacle
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.occupancy import load_map
+from smachpy.places.exceptions import InputFileError, NavigationError
+from smachpy.places.floor import Floor, Obstacle
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import load_map
+from smachpy.places.pose import Pose2D
+from smachpy.places.robot_file import SimConfig, load_config, read_file
 from smachpy.sim.world import Dock, Robot, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from actionlib_core.checked_file import Section
-    from smachpy.sim.occupancy import OccupancyMap
+    from actionlib_core.inputs.checked_file import Section
+    from smachpy.places.occupancy import OccupancyMap
+    from smachpy.places.robot_file import PlannerConfig
 
 T = TypeVar("T")
 
@@ -30,6 +31,9 @@ _SPEED: Final = Limits(above=0, high=10)
 _RADIUS: Final = Limits(above=0, high=5)
 _SECONDS: Final = Limits(low=0, high=600)
 _CHARGE: Final = Limits(low=0, high=1)
+MAX_THINGS: Final = 500
+"""Robots, moving obstacles, doors and docks of a world, each."""
+
 _SHORTEST_DOOR: Final = 0.1  # [m]
 _APART: Final = 0.5  # [m] between the bodies of robots that are placed automatically
 
@@ -123,7 +127,7 @@ def load_world(path: Path) -> WorldSpec:
     Raises:
         InputFileError: a file has problems; each is listed with its line and field.
     """
-    reader = _Reader(CheckedFile(path, InputFileError))
+    reader = _WorldReader(CheckedFile(path, InputFileError))
     robots = reader.read_each("robots", reader.robot, "robot_{}")
     movers = reader.read_each("moving", reader.mover, "obstacle_{}")
     doors = reader.read_each("doors", reader.door, "door_{}")
@@ -177,7 +181,7 @@ def _spiral(middle: Pose2D, step: float, reach: float) -> Iterator[Pose2D]:
                     yield Pose2D(middle.x + i * step, middle.y + j * step, middle.yaw)
 
 
-class _Reader:
+class _WorldReader:
     """Reads the parts of a world; without a map or parameters of a robot, as far as possible."""
 
     def __init__(self, file: CheckedFile) -> None:
@@ -185,6 +189,7 @@ class _Reader:
         self.grid = read_file(file.top, "map", load_map, OFFICE_MAP)
         self._config = read_file(file.top, "robot", load_config, OFFICE_ROBOT)
         self._names: dict[tuple[str, str], int] = {}  # kind and name -> line
+        self._floors: dict[tuple[float, PlannerConfig], Floor] = {}
         self._stands: list[tuple[float, float, float, str]] = []  # x, y, radius, name of robots
 
     def read_each(
@@ -193,6 +198,9 @@ class _Reader:
         top = self.file.top
         top.allow(key)
         rows = top.rows(key) if key in top else ()
+        if len(rows) > MAX_THINGS:
+            top.report(key, f"got {len(rows)}; expected at most {MAX_THINGS}.")
+            return ()
         return tuple(read(row, default_name.format(i)) for i, row in enumerate(rows))
 
     def robot(self, row: Section, default: str) -> RobotSpec:
@@ -260,8 +268,11 @@ class _Reader:
         y = row.number("y", REQUIRED, unit="m")
         yaw = row.number("yaw", 0.0, unit="rad")
         if row.is_good("x", "y") and self.grid is not None and config is not None:
+            size = config.robot.radius, config.planner
+            if size not in self._floors:  # making one takes long on a large map
+                self._floors[size] = Floor(self.grid, *size)
             try:
-                Floor(self.grid, config.robot.radius, config.planner).check_place(x, y)
+                self._floors[size].check_place(x, y)
             except NavigationError as error:
                 reason = str(error).removeprefix("goal ")
                 row.problem("x", "a place where the robot can stand", f"{reason}.")

@@ -42,6 +42,11 @@ def test_nothing_wrong():
         ("init -> goal : t", ["no-token"]),
         ("-> goal : t\ninit* -> goal : u", ["no-input"]),
         ("init* -> A.exec : A.start\nA.exec -> Goal : A.end", ["comment", "no-goal"]),
+        ("init* -> x : t\nx -> init : u", ["no-goal", "busy"]),
+        ("init* -> x : t\nx -> init : u [c]", ["no-goal"]),
+        ("init* -> A.exec : A.start\nA.exec -> init : A.interrupt\nA.exec -> goal : A.end", ["busy"]),
+        ("init* -> A.exec : A.start\nA.exec -> init : A.end\nA.exec -> goal : A.end [c]", ["race"]),
+        ("init* -> goal : t\ngoal -> init : u", []),
     ],
 )  # fmt: skip
 def test_rules(text, expected):
@@ -59,6 +64,19 @@ def test_a_deadlock_comes_with_the_run_to_it():
     assert problem.rule == "deadlock"
     assert problem.run == ("left",)
     assert problem.marking == "{a}"
+
+
+def test_a_loop_without_time_comes_with_the_firings_of_it():
+    net = net_of("init* -> x : t\nx -> y : there\ny -> x : back\nx -> goal : on [c]")
+
+    (problem,) = check_plan(understand(net))
+
+    assert problem.rule == "busy"
+    assert (
+        "there, back lead from {x} back to it" in problem.message
+        or "back, there lead from {y}" in problem.message
+    )
+    assert problem.run[0] == "t"
 
 
 def test_an_unbounded_net_names_the_place_that_grows():

@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actionlib_core.clock import VirtualClock, current_clock, use_clock
-from missions.lesson_2_patrol import patrol as shipped_patrol
 from smachpy import CBState, Concurrence, InvalidStateError, State, StateMachine
 from smachpy.command import main
-from smachpy.outcome_classes import is_good
+from smachpy.events.outcome_classes import is_good
 from smachpy.pnp import (
     PetriNetPlan,
     check_plan,
@@ -20,6 +19,7 @@ from smachpy.pnp import (
     pnml_text,
     understand,
 )
+from smachpy_missions.patrol import patrol as shipped_patrol
 
 OUTCOMES = ("succeeded", "aborted", "again")
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import viz
+from smachpy import viz
 from smachpy.checks import check
 from smachpy.exceptions import InvalidStateError
 from smachpy.pnp import (
@@ -129,6 +129,120 @@ def test_what_is_wrong_is_told_with_its_line(old, new, rule, line):
     first = caught.value.found[0]
     assert (first.rule, first.severity, first.line) == (rule, "error", line)
     assert str(first).startswith(f"x.pnml:{line}: ")
+
+
+NODES = """<?xml version="1.0"?>
+<pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml"><net id="n" type="{kind}"><page id="pg">
+<place id="p1"><name><text>start</text></name><initialMarking><text>1</text></initialMarking></place>
+<place id="p2"{attributes}><name><text>goal</text></name>{place}</place>
+<transition id="t1"{transition}</transition><transition id="t2"/>
+<arc id="a1" source="p1" target="t1"/><arc id="a2" source="t1" target="p2"/>
+{arc}
+</page></net></pnml>
+"""
+PARTS = {
+    "kind": "http://www.pnml.org/version-2009/grammar/ptnet",
+    "attributes": "",
+    "place": "",
+    "transition": ">",
+    "arc": "",
+}
+ARC = '<arc id="i" source="p2" target="t1"'
+
+
+def of_another_tool(**parts):
+    return parse_pnml(NODES.format(**PARTS | parts), file="x.pnml")
+
+
+@pytest.mark.parametrize(
+    ("part", "text"),
+    [
+        ("arc", f'{ARC}><type value="inhibitor"/></arc>'),
+        ("arc", f"{ARC}><arctype><text>reset</text></arctype></arc>"),
+        ("arc", f'{ARC} type="inhibitor"/>'),
+        ("arc", f'{ARC} type="tapnInhibitor" inscription="[0,inf)" weight="1"/>'),
+        ("arc", f'{ARC} type="transport" inscription="[0,inf):1"/>'),
+        ("arc", f'{ARC} type="timed" inscription="[2,5]"/>'),
+        ("arc", f'{ARC} kind="read"/>'),
+        ("arc", '<inhibitorArc id="i" source="p2" target="t1"/>'),
+        ("arc", '<resetArc id="i" source="p2" target="t1"/>'),
+        ("arc", f'{ARC}><toolspecific tool="x"><inhibitor/></toolspecific></arc>'),
+        ("arc", f'{ARC}><toolspecific tool="x"><arc type="test"/></toolspecific></arc>'),
+        ("arc", f'{ARC}><toolspecific tool="x"><type>inhibitorArc</type></toolspecific></arc>'),
+        ("arc", f'{ARC} weight="many"/>'),
+        ("arc", f"{ARC}><inscription><text>x+1</text></inscription></arc>"),
+        ("place", "<capacity><text>1</text></capacity>"),
+        ("place", "<capacity><value>Default,3</value></capacity>"),
+        ("attributes", ' capacity="2"'),
+        ("attributes", ' invariant="&lt;= 5"'),
+        ("place", "<initialMarking><text>red,1,blue,1</text></initialMarking>"),
+        ("kind", "http://www.pnml.org/version-2009/grammar/symmetricnet"),
+        ("kind", "http://www.pnml.org/version-2009/grammar/pt-hlpng"),
+    ],
+)
+def test_what_a_plan_cannot_mean_is_refused_however_a_tool_writes_it(part, text):
+    with pytest.raises(PlanError, match=r"x\.pnml:\d: .*expected"):
+        of_another_tool(**{part: text})
+
+
+@pytest.mark.parametrize(
+    ("part", "text", "said"),
+    [
+        ("transition", "><timed><value>true</value></timed>", "timed"),
+        ("transition", "><priority><value>2</value></priority>", "priority"),
+        ("transition", "><guard><text>x &gt; 1</text></guard>", "<guard>"),
+        ("place", "<type><text>INT</text></type>", "<type>"),
+        ("arc", f"{ARC}><name><text>3</text></name></arc>", "no weight"),
+        ("arc", "<colours/>", "<colours>"),
+    ],
+)
+def test_what_is_not_read_is_told(part, text, said):
+    _, problems = of_another_tool(**{part: text})
+    assert [problem.severity for problem in problems] == ["warning"]
+    assert said in problems[0].message
+
+
+@pytest.mark.parametrize(
+    ("text", "weight"),
+    [
+        (f'{ARC} weight="3"/>', 3),
+        (f'{ARC} multiplicity="2"/>', 2),
+        (f'{ARC} inscription="4"/>', 4),
+        (f'{ARC} type="timed" inscription="[0,inf)" weight="2"/>', 2),
+        (f"{ARC}><inscription><value>Default,2</value></inscription></arc>", 2),
+        (
+            f'{ARC}><type value="normal"/><arcpath id="0"/><tagged><value>false</value></tagged></arc>',
+            1,
+        ),
+    ],
+)
+def test_a_weight_is_read_wherever_a_tool_writes_it(text, weight):
+    net, problems = of_another_tool(arc=text)
+    assert net.arcs[-1].weight == weight
+    assert problems == ()
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "",
+        "P/T net",
+        "PTNet",
+        PARTS["kind"].replace("ptnet", "pnmlcoremodel"),
+        "http://www.yasper.org/specs/epnml-1.1/ptNet",
+    ],
+)
+def test_plain_nets_of_other_tools_load(kind):
+    attributes = ' initialMarking="0" name="other" capacity="0" invariant="&lt; inf"'
+    net, problems = of_another_tool(kind=kind, attributes=attributes)
+    assert [(place.name, place.tokens) for place in net.places] == [("start", 1), ("goal", 0)]
+    assert problems == ()
+
+
+def test_one_kind_of_element_that_is_not_read_is_told_once():
+    arcs = "".join(f'<arc id="i{n}" source="p2" target="t2"><odd/></arc>' for n in range(5))
+    _, problems = of_another_tool(arc=arcs)
+    assert len(problems) == 1
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00\xff", b"<a/>", b"<pnml/>",

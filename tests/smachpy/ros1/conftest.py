@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import shutil
-from pathlib import Path
 
 import pytest
 
-SCRIPTS = Path(__file__).parents[2] / "ros1_scripts"
+from tests.places import ROOT
+
+SCRIPTS = ROOT / "tests" / "ros1_scripts"
 
 
 @pytest.fixture(scope="session")

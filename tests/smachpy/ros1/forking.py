@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 PRELOADED = (
-    "smachpy.checks.cli",
+    "smachpy.command.check",
     "smachpy.command.ros1",
     "smachpy.command.run",
     "smachpy.command.robot",
@@ -20,10 +20,10 @@ PRELOADED = (
     "smachpy.ros1.names.actionlib",
     "smachpy.ros1.names.tf",
     "smachpy.sim.server",
-    "viz.cli",
-    "viz.model.extract",
-    "viz.pictures.drawing",
-    "viz.terminal",
+    "smachpy_viz.cli",
+    "smachpy_viz.model.extract",
+    "smachpy_viz.pictures.drawing",
+    "smachpy_viz.terminal",
     "actionlib_core.clock._virtual",
     "fissix.refactor",
 )

@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from smachpy import ros1, slips
+from smachpy import ros1
+from smachpy.base import slips
 
 
 @pytest.fixture

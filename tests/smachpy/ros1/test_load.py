@@ -6,6 +6,7 @@ import pytest
 
 import smachpy
 from smachpy import ros1
+from smachpy.base import slips
 from smachpy.checks import check
 from smachpy.testing import MissionKit
 
@@ -345,3 +346,28 @@ machine().execute()
 """)
     assert machine is not None
     assert has_node() == before
+
+
+@pytest.mark.parametrize(
+    "text", ["actionlib.SimpleActionServer('a', MoveBaseAction, len, False)", ""]
+)
+def test_a_script_that_only_serves_is_said_to_spin(load, text):
+    with pytest.raises(ros1.LoadError) as caught:
+        load(f"rospy.init_node('x')\n{text}\nrospy.spin()\n")
+    assert caught.value.problem == (
+        "it ended without a machine: got a call of spin(); expected a machine. It only serves others."
+    )
+
+
+def test_a_state_whose_base_was_not_initialised_is_drawn_with_a_warning(load):
+    machine = load("""
+class Watch(smach_ros.MonitorState):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['valid', 'invalid', 'preempted'])
+sm = smach.StateMachine(outcomes=['done'])
+with sm:
+    sm.add('W', Watch(), {'valid': 'done', 'invalid': 'done', 'preempted': 'done'})
+sm.execute()
+""")
+    with pytest.warns(slips.SlipWarning, match=r"did not call MonitorState\.__init__"):
+        assert smachpy.describe(machine).children[0].outcomes == ("valid", "invalid", "preempted")

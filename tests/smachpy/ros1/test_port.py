@@ -5,14 +5,14 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from smachpy.command.targets import load_target
 from smachpy.ros1.port import port
+from tests.places import ROOT
 
-SCRIPTS = Path(__file__).parents[2] / "ros1_scripts"
+SCRIPTS = ROOT / "tests" / "ros1_scripts"
 OLD = b"""#!/usr/bin/env python
 # a comment that stays
 import roslib; roslib.load_manifest('x')
@@ -175,6 +175,14 @@ print >>sys.stdout, 'done', isinstance(lambda: 0, FunctionType)
     script.write_text(ported.text)
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
     assert done.stdout == "done True\n"
+
+
+def test_a_script_that_still_uses_rospy_keeps_its_node():
+    rest = "import rospy\nrospy.init_node('x')\n"
+    for use in ("rospy.spin()\n", "rate = rospy.Rate(10)\n"):
+        assert "rospy.init_node('x')" in port((rest + use).encode(), "old.py").text
+    ported = port((rest + "rospy.loginfo('hello')\n").encode(), "old.py")
+    assert "actionlib_core.init('x')" in ported.text
 
 
 def test_what_is_python_3_is_not_touched():

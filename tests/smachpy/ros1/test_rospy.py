@@ -97,3 +97,75 @@ def test_published_headers_are_numbered(rospy):
         sm.execute()
     rospy.sleep(0.1)
     assert heard == [1, 2]
+
+
+def raised(function, *args):
+    """Return the exception of a call."""
+    with pytest.raises(Exception) as caught:
+        function(*args)
+    return caught.value
+
+
+def test_texts_begin_as_rospys_because_programs_look_for_them(rospy):
+    from std_msgs.msg import Empty
+    from std_srvs.srv import SetBool, Trigger
+
+    def refuse(_request):
+        raise ValueError("no power")
+
+    rospy.init_node("texts")
+    late = raised(rospy.wait_for_message, "start", Empty, 0.5)
+    assert isinstance(late, rospy.ROSException)
+    assert str(late).startswith("timeout exceeded while waiting for message on topic start")
+    late = raised(rospy.wait_for_message, "start", rospy.AnyMsg, 0.5)
+    assert str(late).startswith("timeout exceeded while waiting for message on topic start")
+    late = raised(rospy.wait_for_service, "grip", 0.5)
+    assert str(late).startswith("timeout exceeded while waiting for service /grip")
+    absent = raised(rospy.ServiceProxy("grip", SetBool), True)
+    assert isinstance(absent, rospy.ServiceException)
+    assert str(absent).startswith("service [/grip] unavailable")
+    rospy.Service("open", Trigger, refuse)
+    failed = raised(rospy.ServiceProxy("open", Trigger))
+    begin = "service [/open] responded with an error: error processing request: "
+    assert str(failed) == f"{begin}no power"
+    again = raised(rospy.init_node, "other")
+    assert str(again).startswith("rospy.init_node() has already been called with different arg")
+
+
+def test_texts_of_tf_name_the_argument_as_tf2s(rospy):
+    import tf2_ros
+
+    rospy.init_node("texts")
+    buffer = tf2_ros.Buffer()
+    unknown = raised(buffer.lookup_transform, "map", "base", rospy.Time(0))
+    assert str(unknown) == '"map" passed to lookupTransform argument target_frame does not exist.'
+
+
+def test_private_names_of_smach_are_live(tmp_path):
+    import smachpy
+
+    class Pair(smachpy.Container):
+        def __init__(self):
+            super().__init__(["ok"], ["a", "lost"], ["b"])
+
+        def execute(self, parent_ud):
+            self._copy_input_keys(parent_ud, self.userdata)
+            self.userdata.b = self.userdata.a
+            self._copy_output_keys(self.userdata, parent_ud)
+            return "ok"
+
+    with ros1.installed(tmp_path / "script.py"):
+        state = smachpy.CBState(print, outcomes=["a", "b"], input_keys=["in"])
+        state._outcomes.add("c")
+        state._outcomes.discard("a")
+        state._outcomes |= {"d"}
+        state._input_keys = ["x", "y"]
+        assert state.get_registered_outcomes() == ("b", "c", "d")
+        assert state._outcomes == {"b", "c", "d"}
+        assert state.get_registered_input_keys() == ("x", "y")
+        ud = smachpy.UserData()
+        ud.a = 3
+        assert Pair().execute(ud) == "ok"
+        assert ud.b == 3
+    assert not hasattr(Pair, "_copy_input_keys")
+    assert state._outcomes == {"b", "c", "d"}

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-SCRIPTS = Path(__file__).parents[2] / "ros1_scripts"
+from tests.places import ROOT
+
+SCRIPTS = ROOT / "tests" / "ros1_scripts"
 NAMES = sorted(f"{path.stem}.py" for path in SCRIPTS.glob("*.py*") if path.is_file())
 EXIT_CODES = {"serves_for_ever.py": 1}  # its end is a preempt
 
@@ -189,3 +191,36 @@ def test_runs_renders_and_checks(name, scripts, smachpy, tmp_path):
     code, output = smachpy("check", "--ros1", script, "--format", "json")
     assert code in {0, 1}, output
     assert '"severity": "error"' not in output, output
+
+
+def test_a_machine_that_is_filled_later_is_ignored_with_the_reason(smachpy, tmp_path):
+    script = tmp_path / "later.py"
+    script.write_text(
+        "import rospy, smach\n"
+        "sm = smach.StateMachine(outcomes=['done'])\n"
+        "rospy.init_node('later')\n"
+        "rospy.spin()\n"
+    )
+    code, output = smachpy("check", "--ros1", script)
+    assert code == 0, output
+    assert "ignored: /later: inconsistent: it had no states when the script began to" in output
+    script.write_text(script.read_text().replace("rospy.spin()", "sm.execute()"))
+    code, output = smachpy("check", "--ros1", script)
+    assert code == 1, output
+
+
+def test_in_virtual_time_no_robot_serves_a_move_base_of_another_type(smachpy, tmp_path):
+    (tmp_path / ".catkin_workspace").touch()
+    (tmp_path / "other_msgs" / "action").mkdir(parents=True)
+    (tmp_path / "other_msgs" / "action" / "MoveBase.action").write_text("int8 a\n---\n---\n")
+    script = tmp_path / "other.py"
+    script.write_text(
+        "import actionlib, rospy, smach\n"
+        "from other_msgs.msg import MoveBaseAction\n"
+        "rospy.init_node('other')\n"
+        "client = actionlib.SimpleActionClient('flex/move_base', MoveBaseAction)\n"
+        "print('server:', client.wait_for_server(rospy.Duration(5)))\n"
+    )
+    code, output = smachpy("run", "--ros1", script, "--time", "virtual")
+    assert code == 0, output
+    assert "server: False" in output

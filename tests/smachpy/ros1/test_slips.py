@@ -7,7 +7,8 @@ import warnings
 import pytest
 
 import smachpy
-from smachpy import InvalidStateError, ReadOnlyError, UserDataKeyError, ros1, slips
+from smachpy import InvalidStateError, ReadOnlyError, UserDataKeyError, ros1
+from smachpy.base import slips
 
 
 def done(userdata):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from smachpy import ros1
-from smachpy.ros1.frames import (
+from smachpy.states.frames import (
     FrameError,
     Frames,
     OutOfTimeError,
@@ -46,6 +46,13 @@ def test_known_numbers(names):
     assert euler_from_quaternion([0.06146124, 0, 0, 0.99810947]) == pytest.approx([0.123, 0, 0])
     assert quaternion_about_axis(0.123, (1, 0, 0)) == pytest.approx([0.06146124, 0, 0, 0.99810947])
     assert quaternion_multiply([1, -2, 3, 4], [-5, 6, 7, 8]) == pytest.approx([-44, -14, 48, 28])
+
+
+def test_scales_along_a_direction_of_any_length(names):
+    from tf.transformations import scale_matrix
+
+    along_z = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]
+    assert np.allclose(scale_matrix(0.5, [0, 0, 1], [0, 0, 2]), along_z)
 
 
 @given(ANGLES, st.floats(-1.5, 1.5), ANGLES)

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from smachpy.places.robot_file import BatteryConfig
 from smachpy.sim.battery import Battery
-from smachpy.sim.config import BatteryConfig
 
 CONFIG = BatteryConfig(
     capacity=1.0, charge=0.5, idle_power=3.6, drive_power=36.0, charge_power=360.0

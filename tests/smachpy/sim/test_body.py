@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from smachpy.places.pose import Pose2D, quaternion_of, wrap_angle, yaw_of
+from smachpy.places.robot_file import RobotConfig
 from smachpy.sim.body import Body
-from smachpy.sim.config import RobotConfig
-from smachpy.sim.geometry import Pose2D, quaternion_of, wrap_angle, yaw_of
 
 LIMITS = RobotConfig(
     max_speed=1.0,

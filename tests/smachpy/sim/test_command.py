@@ -13,8 +13,8 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from smachpy.command import main as smachpy_main
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import FOLDER
+from smachpy.places.maps import FOLDER
+from smachpy.places.pose import Pose2D
 from smachpy.states import goal_at
 
 
@@ -27,7 +27,7 @@ def test_a_mistake_in_a_world_file_is_one_line_and_nothing_starts(tmp_path, caps
     path.write_text("robots:\n  - {x: 99, y: 7.1}\n  - {x: 9.8, y: 7.1, name: my robot}\n")
     assert main(["--world", str(path)]) == 2
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 2
+    assert len(lines) == 3
     assert f"{path}:2: robots[0].x: got 99; expected a place where the robot can stand" in lines[0]
     assert "world.yaml:3: robots[1].name: got 'my robot'" in lines[1]
 
@@ -83,7 +83,7 @@ def test_all_parameters_are_listed(capsys):
 def test_the_robot_is_called_as_configuration_and_command_line_say(tmp_path, words, name):
     config = tmp_path / "network.yaml"
     config.write_text(f"namespace: robot_9\ndomain: {os.environ['SMACHPY_DOMAIN']}\n")
-    command = [sys.executable, "-m", "smachpy.sim", *words]
+    command = [sys.executable, "-m", "smachpy", "robot", *words]
     environment = {**os.environ, "SMACHPY_CONFIG": str(config)}
     robot = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     try:
@@ -105,7 +105,7 @@ def test_a_rename_that_is_not_allowed_is_refused(capsys):
 @pytest.mark.slow
 @pytest.mark.zenoh
 def test_a_world_as_a_process():
-    command = [sys.executable, "-m", "smachpy.sim", "--world", FOLDER / "office_world.yaml"]
+    command = [sys.executable, "-m", "smachpy", "robot", "--world", FOLDER / "office_world.yaml"]
     world = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ.copy())
     try:
         assert world.stdout is not None

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import sys
 
-from smachpy.sim import maps
+from smachpy.places import maps
 
 
 def test_the_office_is_what_its_script_draws(tmp_path):

@@ -22,8 +22,8 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import SimpleActionState, StateMachine
-from smachpy.sim.geometry import Pose2D, quaternion_of, wrap_angle
-from smachpy.sim.maps import OFFICE_DOORS
+from smachpy.places.maps import OFFICE_DOORS
+from smachpy.places.pose import Pose2D, quaternion_of, wrap_angle
 from smachpy.sim.nav2 import Nav2Server
 from smachpy.sim.simulation import Simulation
 from smachpy.sim.world import Robot, World
@@ -310,7 +310,7 @@ def test_a_mission_waits_until_it_is_active(nav2: Any) -> None:
 
 def test_ready_made_states_with_ros_1_types_drive_it(nav2: Any) -> None:
     world = nav2("jazzy")
-    network = Ros2(domain=DOMAIN, distro="jazzy", names=("move_base", "odom"))
+    network = Ros2(domain=DOMAIN, distro="jazzy", names=("move_base", "odom", "tf"))
     session = world.network.session()
     config = Config(ros2=(network,))
     with (
@@ -338,7 +338,16 @@ def test_the_command_serves_it_behind_a_router() -> None:
     router = ZenohTransport(
         Config(mode="router", listen=(endpoint,), discovery="off", timestamping=True)
     )
-    command = [sys.executable, "-m", "smachpy.sim", "--ros2", endpoint, "--domain", str(DOMAIN)]
+    command = [
+        sys.executable,
+        "-m",
+        "smachpy",
+        "robot",
+        "--ros2",
+        endpoint,
+        "--domain",
+        str(DOMAIN),
+    ]
     process = subprocess.Popen(
         [*command, "--distro", "kilted", "--child"],
         stdin=subprocess.PIPE,
@@ -369,7 +378,7 @@ def test_the_command_serves_it_behind_a_router() -> None:
 @pytest.mark.zenoh
 def test_without_the_option_it_joins_no_robot_that_missions_drive() -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "smachpy.sim", "--child"],
+        [sys.executable, "-m", "smachpy", "robot", "--child"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -390,7 +399,7 @@ def test_without_the_option_it_joins_no_robot_that_missions_drive() -> None:
 @pytest.mark.zenoh
 def test_bad_input_is_one_clear_end(arguments: list[str]) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "smachpy.sim", *arguments],
+        [sys.executable, "-m", "smachpy", "robot", *arguments],
         capture_output=True,
         text=True,
         timeout=50,

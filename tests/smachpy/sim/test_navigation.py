@@ -5,12 +5,12 @@ import math
 
 import pytest
 
-from smachpy.sim.config import load_config
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import Pose2D, wrap_angle
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import load_map
+from smachpy.places.pose import Pose2D, wrap_angle
+from smachpy.places.robot_file import load_config
 from smachpy.sim.navigation import brake, drive_to
-from smachpy.sim.occupancy import load_map
 from smachpy.sim.world import Robot, World
 
 DT = 0.05
@@ -66,6 +66,18 @@ def test_it_arrives_at_rest_within_the_tolerances(robot, config, goal):
     assert robot.body.pose.distance(goal) <= config.control.xy_tolerance
     assert abs(wrap_angle(robot.body.yaw - goal.yaw)) <= config.control.yaw_tolerance
     assert not any(robot.planner.costmap.touches(p.x, p.y) for p in poses)
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.004, 0.05, -0.1])
+def test_a_robot_in_full_speed_stops_at_a_goal_where_it_is(robot, config, ahead):
+    commands = drive_to(robot, Pose2D(2.0, 3.0, 0.0))
+    run(robot, itertools.islice(commands, round(3.0 / DT)))
+    assert robot.body.speed > 0.3
+    x, y, yaw = robot.body.pose
+    goal = Pose2D(x + ahead * math.cos(yaw), y + ahead * math.sin(yaw), yaw)
+    run(robot, drive_to(robot, goal))
+    assert robot.body.standing
+    assert robot.body.pose.distance(goal) <= config.control.xy_tolerance
 
 
 def test_it_does_not_swing_about_the_way(robot):

@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from smachpy.sim.config import PlannerConfig
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.floor import Obstacle
+from smachpy.places.maps import OFFICE_MAP
+from smachpy.places.occupancy import OccupancyMap, load_map
+from smachpy.places.pose import ORIGIN, Pose2D
+from smachpy.places.robot_file import PlannerConfig
 from smachpy.sim.costmap import Costmap
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.floor import Obstacle
-from smachpy.sim.geometry import ORIGIN, Pose2D
-from smachpy.sim.maps import OFFICE_MAP
-from smachpy.sim.occupancy import OccupancyMap, load_map
 from smachpy.sim.planner import Planner
 
 

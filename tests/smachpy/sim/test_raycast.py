@@ -7,9 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from smachpy.sim.floor import Bar, Obstacle
-from smachpy.sim.geometry import ORIGIN, Pose2D
-from smachpy.sim.occupancy import OccupancyMap
+from smachpy.places.floor import Bar, Obstacle
+from smachpy.places.occupancy import OccupancyMap
+from smachpy.places.pose import ORIGIN, Pose2D
 from smachpy.sim.raycast import Raycaster, cast_at
 
 CELL = 0.1

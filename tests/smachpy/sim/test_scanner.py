@@ -8,7 +8,7 @@ import pytest
 
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.pubsub.topic import Subscriber
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.pose import Pose2D
 from smachpy.sim.scanner import Scanner
 from smachpy.sim.world import Robot, World
 

@@ -16,11 +16,11 @@ from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.interfaces.std_srvs.srv import Empty
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
-from smachpy.sim.config import load_config
-from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.places.maps import OFFICE_ROBOT
+from smachpy.places.occupancy import OCCUPIED, OccupancyMap
+from smachpy.places.pose import Pose2D, wrap_angle
+from smachpy.places.robot_file import load_config
 from smachpy.sim.interfaces import ChargeAction, ChargeGoal
-from smachpy.sim.maps import OFFICE_ROBOT
-from smachpy.sim.occupancy import OCCUPIED, OccupancyMap
 from smachpy.sim.pilot import Pilot
 from smachpy.sim.server import RobotServer
 from smachpy.sim.world import Robot, World

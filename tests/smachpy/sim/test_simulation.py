@@ -19,8 +19,8 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy.exceptions import MissionError
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.pose import Pose2D
 from smachpy.sim.interfaces import ChargeAction, ChargeGoal
 from smachpy.sim.server import RobotServer
 from smachpy.sim.simulation import simulation

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.occupancy import OccupancyMap
+from smachpy.places.occupancy import OccupancyMap
+from smachpy.places.pose import Pose2D
 from smachpy.sim.track import GoalMark, draw_track, draw_tracks
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from smachpy.sim.exceptions import InputFileError, NavigationError
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import FOLDER, OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.exceptions import InputFileError, NavigationError
+from smachpy.places.maps import FOLDER, OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.pose import Pose2D
 from smachpy.sim.world_file import load_world, place_robots
 
 OFFICE = f"map: {OFFICE_MAP}\nrobot: {OFFICE_ROBOT}\n"

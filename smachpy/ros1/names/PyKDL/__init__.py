@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from smachpy.ros1.frames import Transform
+from smachpy.states.frames import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

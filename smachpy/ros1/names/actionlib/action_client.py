@@ -21,7 +21,7 @@ class ActionClient(_ActionClient[Any]):
     """Sends goals and returns a handle for each."""
 
     def __init__(self, ns: str, ActionSpec: Any) -> None:
-        session().on_action(ns)
+        session().on_action(ns, getattr(ActionSpec, "_type", ""))
         super().__init__(ns, ActionSpec)
         self.ns = ns
 

@@ -19,7 +19,7 @@ class SimpleActionClient(_SimpleActionClient[Any]):
     """Sends one goal at a time; in a dry program goals succeed at once and are not sent."""
 
     def __init__(self, ns: str, ActionSpec: Any) -> None:
-        session().on_action(ns)
+        session().on_action(ns, getattr(ActionSpec, "_type", ""))
         super().__init__(ns, ActionSpec)
         self.ns = ns
         self._result_class = type(ActionSpec().action_result.result)
@@ -60,7 +60,7 @@ class SimpleActionClient(_SimpleActionClient[Any]):
         handle = self.gh
         # Called inside a callback, it must not wait for the goal's callbacks, as those run in this
         # thread. `until_end` would wait in another thread, where this is not recognised.
-        if handle is None or handle.manager.callbacks.is_inside():
+        if handle is None or handle.owner.callbacks.is_inside():
             return wait()
         return until_end(f"the result of action {self.ns!r}", wait, lambda: handle.goal.over)
 

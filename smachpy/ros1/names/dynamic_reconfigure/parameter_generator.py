@@ -17,8 +17,8 @@ from smachpy.ros1.names.dynamic_reconfigure.encoding import extract_params
 int_t, bool_t, str_t, double_t = "int", "bool", "str", "double"
 
 _NONE = {"int": 0, "double": 0.0, "str": "", "bool": False}
-_LEAST = {"int": -(2**31), "double": -math.inf, "str": "", "bool": False}
-_MOST = {"int": 2**31 - 1, "double": math.inf, "str": "", "bool": True}
+_MIN = {"int": -(2**31), "double": -math.inf, "str": "", "bool": False}
+_MAX = {"int": 2**31 - 1, "double": math.inf, "str": "", "bool": True}
 
 
 class Group:
@@ -48,8 +48,8 @@ class Group:
                 "level": level,
                 "description": description,
                 "default": _NONE[paramtype] if default is None else default,
-                "min": _LEAST[paramtype] if min is None else min,
-                "max": _MOST[paramtype] if max is None else max,
+                "min": _MIN[paramtype] if min is None else min,
+                "max": _MAX[paramtype] if max is None else max,
                 "edit_method": edit_method,
             }
         )

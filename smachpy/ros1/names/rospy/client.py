@@ -11,7 +11,8 @@ from typing import Any, Final, NoReturn
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import wait_for_service as _wait_for_service
 from actionlib_core.pubsub.topic import wait_for_message as _wait_for_message
-from actionlib_core.wire.presence import Kind, list_endpoints
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
 from smachpy.ros1.names.rospy.core import init_node as init_node
 from smachpy.ros1.names.rospy.core import myargv as myargv
 from smachpy.ros1.names.rospy.core import on_shutdown as on_shutdown
@@ -106,7 +107,7 @@ def wait_for_message(topic: str, topic_type: Any, timeout: Any = None) -> Any:
             f"a message on topic {topic!r}", lambda: wait_for_any(topic, limit), _interrupted
         )
     limit = _limit(timeout)
-    with as_rospy():
+    with as_rospy(f"message on topic {topic}"):
         return until_end(
             f"a message on topic {topic!r}",
             lambda: _wait_for_message(topic, topic_type, limit),
@@ -131,7 +132,7 @@ def wait_for_service(service: str, timeout: Any = None) -> None:
     now.check_time()
     if not now.dry:
         limit = _limit(timeout)
-        with as_rospy():
+        with as_rospy(f"service {resolve_name(service)}"):
             until_end(
                 f"service {service!r}", lambda: _wait_for_service(service, limit), _interrupted
             )

@@ -18,20 +18,19 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, current_clock
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.inputs.yaml_text import load_yaml
 from actionlib_core.interfaces.rosgraph_msgs.msg import Log
 from actionlib_core.names import check_name
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.time import Time
-from actionlib_core.yaml_text import load_yaml
 from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInitException
 from smachpy.ros1.session import session
-from smachpy.ros1.stubs import Anything
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-_MOST_LOGS: Final = 100  # queue of /rosout; beyond, the oldest messages are dropped
+_MAX_LOGS: Final = 100  # queue of /rosout; beyond, the oldest messages are dropped
 
 DEBUG: Final = 1
 INFO: Final = 2
@@ -86,8 +85,6 @@ def init_node(
         ROSException: called again with another name.
     """
     del disable_rostime, xmlrpc_port, tcpros_port
-    if isinstance(name, Anything):
-        name = str(name)
     if not name or not isinstance(name, str):
         raise ValueError(f"init_node: name: got {name!r}; expected a word.")
     try:
@@ -100,7 +97,8 @@ def init_node(
     if now.name:
         if not anonymous and _base(now.name) != name:
             raise ROSException(
-                f"init_node: got {name!r}; expected {now.name!r}, as it was called before."
+                "rospy.init_node() has already been called with different arguments: got "
+                f"{name!r}; expected {now.name!r}."
             )
         return
     full = f"{name}_{os.getpid()}_{_count()}" if anonymous else name
@@ -111,7 +109,7 @@ def init_node(
     _set_private_parameters(now.argv if argv is None else argv)
     shutdown.on_shutdown(lambda: now.run_hooks("shutdown"))
     if not (disable_rosout or now.dry):
-        now.rosout = Publisher("/rosout", Log, queue_size=_MOST_LOGS)
+        now.rosout = Publisher("/rosout", Log, queue_size=_MAX_LOGS)
     if not disable_signals:
         now.handle_signals()
 

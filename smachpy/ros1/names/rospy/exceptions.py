@@ -9,13 +9,15 @@ from actionlib_core.exceptions import (
     ActionlibError,
     FieldError,
     NodeError,
+    ServiceLostError,
+    ServiceUnavailableError,
     WaitTimeoutError,
 )
 from actionlib_core.exceptions import (
     ServiceException as _ServiceError,
 )
+from smachpy.engine.interrupt import ProgramEnds
 from smachpy.ros1.session import session
-from smachpy.run.interrupt import ProgramEnds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -87,17 +89,36 @@ class ServiceException(Exception):  # noqa: N818
 
 
 @contextlib.contextmanager
-def as_rospy() -> Iterator[None]:
-    """Raise rospy's exceptions instead of this package's."""
+def as_rospy(waits_for: str = "") -> Iterator[None]:
+    """Raise rospy's exceptions instead of this package's.
+
+    Their texts begin as rospy's do, because programs look for words in them.
+
+    Args:
+        waits_for: What is waited for, as in rospy's text: "message on topic scan".
+    """
     try:
         yield
     except _ServiceError as error:
-        raise ServiceException(str(error)) from error
+        raise ServiceException(_as_rospy_says(error)) from error
     except FieldError as error:
         raise ROSSerializationException(str(error)) from error
     except (NodeError, WaitTimeoutError) as error:
         if session().is_shutdown():
             raise ROSInterruptException("rospy shutdown") from error
-        raise ROSException(str(error)) from error
+        late = waits_for and isinstance(error, WaitTimeoutError)
+        begin = f"timeout exceeded while waiting for {waits_for}: " if late else ""
+        raise ROSException(f"{begin}{error}") from error
     except ActionlibError as error:
         raise ROSException(str(error)) from error
+
+
+def _as_rospy_says(error: _ServiceError) -> str:
+    name = f"service [/{error.name}]"
+    if isinstance(error, ServiceUnavailableError):
+        return f"{name} unavailable: {error.reason}"
+    if isinstance(error, ServiceLostError):
+        return f"transport error completing service call: {error}"
+    if error.remote_type:
+        return f"{name} responded with an error: error processing request: {error.remote_text}"
+    return f"{name} responded with an error: {error.reason}"

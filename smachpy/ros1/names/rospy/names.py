@@ -6,7 +6,6 @@ import re
 
 from actionlib_core.node import get_node
 from smachpy.ros1.session import session
-from smachpy.ros1.stubs import Anything
 
 __all__ = [
     "Named",
@@ -43,8 +42,6 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
         name: A relative, absolute or private name; "": the namespace itself.
         caller_id: Full name of the node for private names; None: this node.
     """
-    if isinstance(name, Anything):
-        name = str(name)
     if not name:
         return get_namespace()
     name = re.sub("//+", "/", name)

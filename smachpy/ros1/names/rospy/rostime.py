@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core import shutdown
-from actionlib_core._arguments import check_seconds
 from actionlib_core.clock import current_clock
+from actionlib_core.inputs.arguments import check_seconds
 from actionlib_core.time import Duration, Time
 from actionlib_core.time import TimeValue as TVal
 from smachpy.ros1.names.rospy.exceptions import ROSInterruptException
@@ -75,7 +75,7 @@ def wallsleep(duration: float) -> None:
     current_clock().sleep(float(duration))
 
 
-def sleep(duration: Any) -> None:
+def sleep(duration: float | Duration) -> None:
     """Sleep; a negative duration does nothing.
 
     Args:
@@ -182,7 +182,7 @@ class Timer:
 
     def __init__(
         self,
-        period: Any,
+        period: float | Duration,
         callback: Callable[[TimerEvent], object],
         oneshot: bool = False,
         reset: bool = False,

@@ -11,7 +11,8 @@ from typing import Any
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import get_service
 from actionlib_core.node import get_node
-from actionlib_core.wire.presence import Kind, list_endpoints
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
 from smachpy.ros1.names.rospy.client import MasterProxy
 from smachpy.ros1.names.rospy.names import resolve_name
 from smachpy.ros1.names.rospy.service import ServiceProxy

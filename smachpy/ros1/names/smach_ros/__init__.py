@@ -1,18 +1,16 @@
 """smach_ros's public names. As in ROS 1, importing it sends SMACH's log to rospy."""
 
-from typing import Any
-
-import smachpy
 from smachpy.actions.action_server_wrapper import ActionServerWrapper as _ActionServerWrapper
 from smachpy.actions.condition_state import ConditionState
 from smachpy.actions.monitor_state import MonitorState
 from smachpy.actions.service_state import ServiceState
 from smachpy.actions.simple_action_state import SimpleActionState
+from smachpy.base.log import set_loggers
+from smachpy.machines.preempt_handler import set_preempt_handler
 from smachpy.network.client import IntrospectionClient
 from smachpy.network.server import IntrospectionServer
 from smachpy.ros1.names.rospy import core as _core
 from smachpy.ros1.session import session
-from smachpy.run.preempt_handler import set_preempt_handler
 
 __all__ = [
     "ActionServerWrapper",
@@ -37,15 +35,7 @@ class ActionServerWrapper(_ActionServerWrapper):
 
 def _send_log_to_rospy() -> None:
     if not session().shows_transitions:
-        smachpy.set_loggers(_core.loginfo, _core.logwarn, _core.logdebug, _core.logerr)
+        set_loggers(_core.loginfo, _core.logwarn, _core.logdebug, _core.logerr)
 
 
 _send_log_to_rospy()
-
-
-def __getattr__(name: str) -> Any:
-    if name == "introspection":
-        from importlib import import_module
-
-        return import_module("smachpy.network.server")
-    raise AttributeError(f"module 'smach_ros' has no attribute {name!r}")

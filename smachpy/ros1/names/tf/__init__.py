@@ -18,7 +18,6 @@ from actionlib_core.interfaces.geometry_msgs.msg import (
     Vector3Stamped,
 )
 from actionlib_core.time import Duration, Time
-from smachpy.ros1.frames import Transform
 from smachpy.ros1.listening import Broadcaster
 from smachpy.ros1.names import tf2_geometry_msgs
 from smachpy.ros1.names.tf import transformations as transformations
@@ -29,6 +28,7 @@ from smachpy.ros1.names.tf2_ros import (
     LookupException,
     TransformException,
 )
+from smachpy.states.frames import Transform
 
 Exception = TransformException
 define_message("tf/tfMessage", "geometry_msgs/TransformStamped[] transforms\n")

@@ -15,7 +15,7 @@ from actionlib_core.interfaces.geometry_msgs.msg import (
     Vector3,
     Vector3Stamped,
 )
-from smachpy.ros1.frames import Transform
+from smachpy.states.frames import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,7 +16,8 @@ from actionlib_core.interfaces.std_msgs.msg import Header
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.time import Duration, Time
 from smachpy.ros1 import listening
-from smachpy.ros1.frames import (
+from smachpy.ros1.session import session
+from smachpy.states.frames import (
     IDENTITY,
     FrameError,
     Frames,
@@ -25,7 +26,7 @@ from smachpy.ros1.frames import (
     UnconnectedFramesError,
     UnknownFrameError,
 )
-from smachpy.ros1.session import session
+from smachpy.states.localising import add_transform
 
 
 class TransformException(Exception):  # noqa: N818  tf2's names, all of them
@@ -79,12 +80,12 @@ class Buffer:
     def __init__(self, cache_time: Any = None, debug: bool = True) -> None:
         del debug
         self._frames = Frames(float(cache_time)) if cache_time is not None else Frames()
-        self._listener: listening.Listener | None = None
+        self._listener: listening.FrameListener | None = None
 
-    def listen(self) -> listening.Listener:
+    def listen(self) -> listening.FrameListener:
         """Begin to receive the transforms on the network, if it does not yet."""
         if self._listener is None:
-            self._listener = listening.Listener(self._frames)
+            self._listener = listening.FrameListener(self._frames)
         return self._listener
 
     def lookup_transform(
@@ -172,7 +173,7 @@ class Buffer:
 
     def _add(self, transform: TransformStamped, *, static: bool) -> None:
         try:
-            listening.add(self._frames, transform, static=static)
+            add_transform(self._frames, transform, static=static)
         except FrameError as error:
             raise InvalidArgumentException(str(error)) from error
         if self._listener is not None:
@@ -246,5 +247,24 @@ class StaticTransformBroadcaster(TransformBroadcaster):
     _static = True
 
 
+class BufferClient(Buffer):
+    """The transforms that a server has in ROS 1; here it receives them itself.
+
+    Args:
+        ns: Name of the server; ignored, as the next two.
+        check_frequency: How often the client asked it [Hz].
+        timeout_padding: How much longer it waited for the answer.
+    """
+
+    def __init__(self, ns: str, check_frequency: Any = None, timeout_padding: Any = None) -> None:
+        del ns, check_frequency, timeout_padding
+        super().__init__()
+        self.listen()
+
+    def wait_for_server(self, timeout: Any = 0.0) -> bool:
+        """Return True: no server is needed."""
+        del timeout
+        return True
+
+
 BufferInterface = Buffer
-BufferClient = Buffer

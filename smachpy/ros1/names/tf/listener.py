@@ -1,3 +1,0 @@
-"""tf's module of that name."""
-
-from smachpy.ros1.names.tf import Transformer, TransformerROS, TransformListener
