@@ -6,7 +6,7 @@ import sys
 import unittest
 from typing import TYPE_CHECKING, Any, cast
 
-from smachpy import log
+from smachpy.base import log
 from smachpy.testing import session
 from smachpy.testing.kit import MissionKit
 
@@ -44,7 +44,7 @@ class MissionTestCase(unittest.TestCase):
             self._seed = seed
             # `IsolatedAsyncioTestCase.run` makes one, and fails if there is one of an earlier run.
             self._asyncioRunner = runner
-            part = _Part(result, is_last=number == len(seeds), all_skip=skips == number - 1)
+            part = _SeedResult(result, is_last=number == len(seeds), all_skip=skips == number - 1)
             super().run(cast("unittest.TestResult", part))
             skips += part.skipped
             if part.failed:
@@ -61,7 +61,7 @@ class MissionTestCase(unittest.TestCase):
         self.addCleanup(self.mission.__exit__, None, None, None)
 
 
-class _Part:
+class _SeedResult:
     """Collects a test's result with one of its seeds, and passes on what counts for the test.
 
     Only the last seed may report something else than a failure: pytest takes the first report for

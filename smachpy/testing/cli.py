@@ -15,7 +15,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "test",
         help="test missions with pytest",
         usage="%(prog)s [WORD ...]",
-        epilog="All words are passed to pytest: smachpy test tests -k patrol --mission-coverage. "
+        epilog="All words are passed to pytest: smachpy test tests -k patrol --smachpy-coverage. "
         "The options for missions are listed under 'robot missions' in pytest --help.",
     )
     parser.set_defaults(run=run, all_words=())

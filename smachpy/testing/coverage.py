@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from smachpy.events import Entered, Finished, Left, Preempted, PreemptRequested
-from smachpy.introspection import StateRecord
+from smachpy.events.introspection import StateRecord
 from smachpy.testing.runs import own_timeouts
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actionlib_core.process.output import printable
 from smachpy.events import Entered, Event, Left
-from smachpy.pictures import draw_run
+from smachpy.events.pictures import draw_run
 from smachpy.testing.coverage import KINDS
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def _figures(machine: Measured) -> str:
         for kind in KINDS
         for run, total in [machine.counts(kind)]
     )
-    name = html.escape(machine.name)
+    name = html.escape(printable(machine.name))
     return f"<h2>{name}: {machine.percent:.0f} %, {machine.runs} runs</h2><table>{cells}</table>"
 
 
@@ -78,6 +79,8 @@ def _states(machine: Measured) -> str:
         times = machine.taken["states"].get(state.path, 0)
         missed = [o for o in state.outcomes if f"{state.path} -{o}->" in machine.missed("outcomes")]
         cold = "" if times else " class=cold"
-        text = html.escape(", ".join(missed))
-        rows.append(f"<tr{cold}><td>{html.escape(state.path)}<td>{times}<td class=cold>{text}")
+        text = html.escape(printable(", ".join(missed)))
+        rows.append(
+            f"<tr{cold}><td>{html.escape(printable(state.path))}<td>{times}<td class=cold>{text}"
+        )
     return "<table><tr><th>state<th>times<th>outcomes that never came" + "".join(rows) + "</table>"

@@ -6,8 +6,8 @@ import inspect
 from collections import deque
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
-from smachpy.introspection import describe
 from smachpy.machines.container import Container
 from smachpy.machines.state import State, get_options
 from smachpy.testing.runs import find_path
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping
     from typing import TypeAlias
 
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
     # Name of a state, the function that makes its double, and the list that receives it.
     Replacement: TypeAlias = tuple[str, Callable[[Any], "Double"], list["Double"]]
@@ -25,7 +25,10 @@ S = TypeVar("S", bound=State)
 
 
 class DoubleError(SmachError):
-    """A double does not fit the state that it replaces."""
+    """A double does not fit the state that it replaces.
+
+    Try: use outcomes and keys that the replaced state has.
+    """
 
 
 class Double(State):
@@ -133,6 +136,7 @@ class Places:
 
     def __init__(self) -> None:
         self._before: list[tuple[Container, str, State]] = []
+        self._guards: list[tuple[Any, Any]] = []
 
     def put(self, root: Container, path: str, make: Callable[[Any], S]) -> S:
         """Replace the state at `path` by the result of `make`.
@@ -160,6 +164,12 @@ class Places:
         container._smachpy_exchange(label, double)
         return double
 
+    def exchange_guards(self, container: Container, guards: Mapping[str, Any]) -> None:
+        """Replace the conditions of a state machine's transitions."""
+        data: Any = container._smachpy
+        self._guards.append((data, data.guards))
+        data.guards, data.live.plan = guards, None
+
     def describe_whole(self, root: Container) -> StateRecord | None:
         """Return the record of `root` without doubles; None if there are none."""
         if not self._before:
@@ -175,7 +185,10 @@ class Places:
                 container._smachpy_exchange(label, state)
 
     def restore(self) -> None:
-        """Put the states back."""
+        """Put the states and conditions back."""
+        while self._guards:
+            data, guards = self._guards.pop()
+            data.guards, data.live.plan = guards, None
         while self._before:
             container, label, state = self._before.pop()
             container._smachpy_exchange(label, state)

@@ -10,17 +10,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.clock import Deadlock, TimeLimit, use_clock
+from actionlib_core.clock._virtual import START_TIME_NS
+from actionlib_core.interfaces.bags import read_bag
 from actionlib_core.node import use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
+from smachpy.engine.preempt import asking
+from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError, error_text
-from smachpy.introspection import describe
 from smachpy.machines.container import Container
-from smachpy.run.grace import asking
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.process import MissionNode, Process
-from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, Recorder, Stuck, Trigger
+from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, RunRecorder, Stuck, Trigger
 from smachpy.testing.runs import Run
 from smachpy.testing.servers import (
     ScriptedActionServer,
@@ -31,10 +33,19 @@ from smachpy.testing.servers import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import (
+        Awaitable,
+        Callable,
+        Collection,
+        Iterable,
+        Iterator,
+        Mapping,
+        Sequence,
+    )
     from types import TracebackType
     from typing import Self
 
+    from actionlib_core.names import NameArguments
     from smachpy.testing.doubles import Replacement
     from smachpy.testing.exploring.exploration import Exploration
 
@@ -44,6 +55,8 @@ SETTLE_S = 0.1  # [s] after a run, for messages that are still on their way to a
 
 class TimeLimitError(SmachError):
     """A mission under test exceeded the time limit, or ran endlessly while no time passed.
+
+    Try: look for a loop without a wait, or raise the limit with the call that is named.
 
     Args:
         run: The run so far.
@@ -83,6 +96,9 @@ class MissionKit:
         choose: As for `VirtualClock`.
         folder: Returns the folder for pictures of failed runs; called when one is drawn.
         on_run: Called with every run, for coverage.
+        begin_ns: The wall time at its begin [ns since the epoch].
+        namespace: Prefix of the mission's relative names.
+        arguments: Remapping of its names.
 
     Attributes:
         clock: The clock.
@@ -102,12 +118,21 @@ class MissionKit:
         choose: Callable[[list[str]], int] | None = None,
         folder: Callable[[], Path] | None = None,
         on_run: Callable[[Run], object] | None = None,
+        begin_ns: int = START_TIME_NS,
+        namespace: str = "",
+        arguments: NameArguments | None = None,
     ) -> None:
         self.seed = seed
-        self.clock = MissionClock(seed, rate=rate, choose=choose)
+        self.clock = MissionClock(seed, rate=rate, choose=choose, begin_ns=begin_ns)
         self.network = MemoryNetwork(self.clock)
         self.transport = self.network.session()
-        self.node = MissionNode("mission", transport=self.transport, clock=self.clock)
+        self.node = MissionNode(
+            "mission",
+            transport=self.transport,
+            clock=self.clock,
+            namespace=namespace,
+            arguments=arguments,
+        )
         self.shutdown = Shutdown()
         self.draws = True
         self.call = "mission"
@@ -200,7 +225,7 @@ class MissionKit:
             machine.userdata[key] = value
         record, whole = describe(machine), self._places.describe_whole(machine)
         triggers, self._triggers = self._triggers, []
-        recorder = Recorder(self.clock, machine, record, triggers, steps)
+        recorder = RunRecorder(self.clock, machine, record, triggers, steps)
         self.clock.limit, self.clock.most_turns = self.clock.now() + limit, steps // TURN_STEPS
         try:
             with self.clock.patched(), recorder.installed():
@@ -221,6 +246,7 @@ class MissionKit:
             recorder.unfired(),
             whole,
             tuple(goal_id for server in self._servers for goal_id in server.left),
+            tuple(goal_id for server in self._servers for goal_id in server.ignored),
         )
         if self.on_run is not None:
             self.on_run(run)
@@ -354,18 +380,53 @@ class MissionKit:
         """
         self._add_trigger("interrupt", 0.0 if at is None and on is None else at, on, after, visit)
 
+    def trigger(
+        self,
+        event: str | Callable[[Any], object],
+        *,
+        at: float | None = None,
+        on: str | None = None,
+        after: float = 0.0,
+        visit: int = 1,
+    ) -> None:
+        """Trigger an event of `smachpy.modes.Modes` during the next run, or call a function.
+
+        Args:
+            event: The event; or a function of the machine, such as `Modes.emergency_stop`.
+            at: As for `preempt`, like the other arguments and the errors.
+            on: See there.
+            after: See there.
+            visit: See there.
+        """
+
+        def act(machine: Any) -> None:
+            with asking("test"):
+                if isinstance(event, str):
+                    machine.trigger(event)
+                else:
+                    event(machine)
+
+        self._add_trigger("trigger", at, on, after, visit, act)
+
     def _add_trigger(
-        self, what: str, at: float | None, on: str | None, after: float, visit: int
+        self,
+        what: str,
+        at: float | None,
+        on: str | None,
+        after: float,
+        visit: int,
+        act: Callable[[Container], None] | None = None,
     ) -> None:
         if (at is None) == (on is None):
             raise ValueError(f"{what}: got at={at!r} and on={on!r}; expected one of them.")
 
-        def act(machine: Container) -> None:
+        def ask(machine: Container) -> None:
             if what == "interrupt":
                 self.shutdown.request("interrupted by the test")
             with asking("test", "", "interrupt" if what == "interrupt" else ""):
                 machine.request_preempt()
 
+        act = act or ask
         self._triggers.append(Trigger(what, act, at, on, after, visit))
 
     # -- servers and topics --------------------------------------------------------------------
@@ -381,6 +442,37 @@ class MissionKit:
     def topic(self, name: str, message_class: Any) -> ScriptedTopic:
         """Publish on a topic, and record its messages."""
         return ScriptedTopic(self, name, message_class)
+
+    def play(
+        self,
+        bag: str | Path,
+        *,
+        topics: Collection[str] | None = None,
+        remap: Mapping[str, str] | None = None,
+        start: float = 0.0,
+    ) -> list[ScriptedTopic]:
+        """Publish the messages of a bag at their times, the first one `start` [s] from now.
+
+        Args:
+            bag: A file of rosbag1 (.bag) or MCAP (.mcap), or a folder of rosbag2.
+            topics: Only these topics; None: all whose types are known.
+            remap: Topic of the bag -> topic of the mission.
+            start: See above.
+
+        Returns:
+            The topics.
+
+        Raises:
+            BagError: it cannot be read.
+        """
+        names = {old.strip("/"): new for old, new in (remap or {}).items()}
+        made: dict[str, ScriptedTopic] = {}
+        for one in read_bag(bag, topics):
+            name = names.get(one.topic, f"/{one.topic}")
+            if name not in made:
+                made[name] = self.topic(name, type(one.message))
+            made[name].publish_at(start + one.at, one.message)
+        return list(made.values())
 
     def add_end(self, end: ScriptedEnd) -> None:
         """Add a scripted server or topic to the test, which closes it at its end."""

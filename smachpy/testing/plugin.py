@@ -21,40 +21,72 @@ if TYPE_CHECKING:
     from smachpy.testing.kit import MissionKit
     from smachpy.testing.servers import ScriptedActionServer, ScriptedService, ScriptedTopic
 
-OWN = ("smachpy", "actionlib_core", "viz", "missions", "smachpy_programs")
+OWN = ("smachpy", "actionlib_core", "smachpy_viz", "smachpy_missions", "smachpy_programs")
 WORKER_KEY = "smachpy_mission_coverage"
+CUT_KEY = "smachpy_cut_exploration"
+MAX_CUT_LINES = 20  # lines of the summary
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
-    group = parser.getgroup("missions", "robot missions")
-    group.addoption("--mission-seed", type=int, help="seed of the missions' thread interleaving")
+    group = parser.getgroup("smachpy", "smachpy: robot missions")
     group.addoption(
+        "--smachpy-seed",
+        "--mission-seed",
+        dest="mission_seed",
+        type=int,
+        help="seed of the missions' thread interleaving",
+    )
+    group.addoption(
+        "--smachpy-seeds",
         "--mission-seeds",
+        dest="mission_seeds",
         type=int,
         metavar="COUNT",
-        help="run each test of a mission with this many seeds (from 0, or --mission-seed)",
+        help="run each test of a mission with this many seeds (from 0, or --smachpy-seed)",
     )
     group.addoption(
-        "--mission-rate", type=float, help="virtual seconds per real second, to watch missions"
+        "--smachpy-rate",
+        "--mission-rate",
+        dest="mission_rate",
+        type=float,
+        help="virtual seconds per real second, to watch missions",
     )
     group.addoption(
+        "--smachpy-ros1",
         "--ros1",
+        dest="ros1",
         action="store_true",
         help="tests and missions are scripts for ROS 1: provide rospy, smach and so on",
     )
     group.addoption(
-        "--mission-coverage", action="store_true", help="measure what the tests cover of missions"
+        "--smachpy-coverage",
+        "--mission-coverage",
+        dest="mission_coverage",
+        action="store_true",
+        help="measure what the tests cover of missions",
     )
     group.addoption(
+        "--smachpy-coverage-fail-under",
         "--mission-coverage-fail-under",
+        dest="mission_coverage_fail_under",
         type=float,
         metavar="PERCENT",
         help="fail when a machine's coverage is lower",
     )
-    group.addoption("--mission-coverage-json", metavar="FILE", help="write the coverage as JSON")
     group.addoption(
-        "--mission-coverage-html", metavar="FILE", help="write tables and heat pictures as HTML"
+        "--smachpy-coverage-json",
+        "--mission-coverage-json",
+        dest="mission_coverage_json",
+        metavar="FILE",
+        help="write the coverage as JSON",
+    )
+    group.addoption(
+        "--smachpy-coverage-html",
+        "--mission-coverage-html",
+        dest="mission_coverage_html",
+        metavar="FILE",
+        help="write tables and heat pictures as HTML",
     )
 
 
@@ -71,13 +103,15 @@ def pytest_configure(config: pytest.Config) -> None:
     rewritten.difference_update(OWN)
     count = config.getoption("mission_seeds")
     if count is not None and count < 1:
-        raise pytest.UsageError(f"--mission-seeds: got {count}; expected 1 or more.")
+        raise pytest.UsageError(f"--smachpy-seeds: got {count}; expected 1 or more.")
     wanted = (
         "mission_coverage",
         "mission_coverage_fail_under",
         "mission_coverage_json",
         "mission_coverage_html",
     )
+    cut = _Cut()
+    config.pluginmanager.register(cut, "smachpy-cut-explorations")
     measuring: _Measuring | None = None
     if any(config.getoption(name) for name in wanted):
         from smachpy.testing.coverage import Coverage
@@ -93,6 +127,7 @@ def pytest_configure(config: pytest.Config) -> None:
         _seeds(config) or (config.getoption("mission_seed"),),
         config.getoption("mission_rate"),
         None if measuring is None else measuring.coverage.add,
+        cut.add,
     )
     session.begin(made)
     config.add_cleanup(lambda: session.end(made))
@@ -102,6 +137,43 @@ def _seeds(config: pytest.Config) -> tuple[int, ...]:
     """Return the seeds of `--mission-seeds`."""
     first: int = config.getoption("mission_seed") or 0
     return tuple(range(first, first + (config.getoption("mission_seeds") or 0)))
+
+
+class _Cut:
+    """Lists the explorations that a limit has ended: their tests pass, but say less."""
+
+    def __init__(self) -> None:
+        self._found: list[str] = []
+
+    def add(self, text: str) -> None:
+        """Note an exploration of the present test."""
+        self._found.append(text)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
+        """Attach the explorations of a test to its report, which xdist passes on."""
+        self._found.clear()
+        try:
+            return (yield)
+        finally:
+            item.user_properties += [(CUT_KEY, text) for text in self._found]
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Show the list."""
+        reports = (report for some in terminalreporter.stats.values() for report in some)
+        lines = [
+            f"{report.nodeid}: {text}"
+            for report in reports
+            if getattr(report, "when", "") == "call"
+            for name, text in report.user_properties
+            if name == CUT_KEY
+        ]
+        if lines:
+            terminalreporter.section("explorations that did not try everything")
+            for line in lines[:MAX_CUT_LINES]:
+                terminalreporter.write_line(line)
+            if len(lines) > MAX_CUT_LINES:
+                terminalreporter.write_line(f"and {len(lines) - MAX_CUT_LINES} more")
 
 
 class _Measuring:
@@ -187,7 +259,7 @@ def mission_seed(request: pytest.FixtureRequest) -> int | None:
 
 
 @pytest.fixture
-def mission(
+def smachpy_mission(
     tmp_path_factory: pytest.TempPathFactory,
     mission_seed: int | None,
 ) -> Iterator[MissionKit]:
@@ -205,18 +277,24 @@ def mission(
 
 
 @pytest.fixture
-def action_server(mission: MissionKit) -> Callable[[str, Any], ScriptedActionServer]:
+def mission(smachpy_mission: MissionKit) -> MissionKit:
+    """Start missions: `smachpy_mission`, by a name that a project may have for itself, too."""
+    return smachpy_mission
+
+
+@pytest.fixture
+def action_server(smachpy_mission: MissionKit) -> Callable[[str, Any], ScriptedActionServer]:
     """Offer an action with scripted replies: `action_server("dock", DockAction)`."""
-    return mission.action_server
+    return smachpy_mission.action_server
 
 
 @pytest.fixture
-def service_server(mission: MissionKit) -> Callable[[str, Any], ScriptedService]:
+def service_server(smachpy_mission: MissionKit) -> Callable[[str, Any], ScriptedService]:
     """Offer a service with scripted replies: `service_server("dock", Trigger)`."""
-    return mission.service_server
+    return smachpy_mission.service_server
 
 
 @pytest.fixture
-def topic(mission: MissionKit) -> Callable[[str, Any], ScriptedTopic]:
+def topic(smachpy_mission: MissionKit) -> Callable[[str, Any], ScriptedTopic]:
     """Publish on a topic and record its messages: `topic("battery", BatteryState)`."""
-    return mission.topic
+    return smachpy_mission.topic

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.clock import use_clock
 from actionlib_core.node import Node, use_node
-from actionlib_core.wire.presence import Kind
+from actionlib_core.transport.tokens import Kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Event, Timer, VirtualClock
     from actionlib_core.clock._virtual_parts import VirtualTask
     from actionlib_core.transport.memory import MemoryNetwork
-    from actionlib_core.wire.presence import Endpoint
+    from actionlib_core.transport.tokens import Endpoint
 
 T = TypeVar("T")
 
@@ -30,7 +30,6 @@ class MissionNode(Node):
     on_client: Callable[[str, str], object] | None = None
 
     def endpoint(self, kind: Kind, name: str, type_name: str, md5: str) -> Endpoint:
-        """As `Node.endpoint`."""
         if kind is Kind.ACTION_CLIENT and self.on_client is not None:
             self.on_client(name, type_name)
         return super().endpoint(kind, name, type_name, md5)
@@ -107,23 +106,18 @@ class Process:
         return self._clock.numbers
 
     def now(self) -> float:
-        """As `Clock.now`."""
         return self._clock.now()
 
     def time_ns(self) -> int:
-        """As `Clock.time_ns`."""
         return self._clock.time_ns()
 
     def sleep(self, seconds: float) -> None:
-        """As `Clock.sleep`."""
         self._clock.sleep(seconds)
 
     def event(self, name: str = "an event") -> Event:
-        """As `Clock.event`."""
         return self._clock.event(name)
 
     def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
-        """As `Clock.spawn`."""
         task = self._clock.spawn(target, name=name)
         self._tasks.append(task)
         # A thread on its way out may still start others: they must end as well.
@@ -132,7 +126,6 @@ class Process:
         return task
 
     def call_later(self, delay: float, callback: Callable[[], object]) -> Timer:
-        """As `Clock.call_later`."""
         timer = self._clock.call_later(delay, callback)
         self._timers.append(timer)
         if self.is_killed:
@@ -140,5 +133,4 @@ class Process:
         return timer
 
     def run_async(self, main: Coroutine[object, object, Any]) -> Any:
-        """As `Clock.run_async`."""
         return self._clock.run_async(main)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from actionlib_core.clock import VirtualClock
+from actionlib_core.clock._virtual import START_TIME_NS
 from actionlib_core.clock._virtual_parts import Stopped
 from smachpy.events import Entered, Event
-from smachpy.events.buffer import SLOTS, RawEventBuffer
+from smachpy.events.buffer import RawEventBuffer
 from smachpy.testing.runs import find_path
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Clock, Timer
     from actionlib_core.clock._virtual_parts import VirtualTask
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
     from smachpy.machines.container import Container
 
 STEPS = 100_000  # events at one moment of virtual time, after which a run counts as endless
@@ -38,12 +39,12 @@ class MissionClock(VirtualClock):
         *,
         rate: float | None = None,
         choose: Callable[[list[str]], int] | None = None,
+        begin_ns: int = START_TIME_NS,
     ) -> None:
-        super().__init__(seed, rate=rate, choose=choose)
+        super().__init__(seed, rate=rate, choose=choose, begin_ns=begin_ns)
         self.failures: list[tuple[str, BaseException]] = []
 
     def spawn(self, target: Callable[[], object], *, name: str) -> VirtualTask:
-        """As `Clock.spawn`."""
 
         def run() -> None:
             try:
@@ -92,7 +93,7 @@ class Trigger:
         return f"{self.what}(on={self.on!r}{after}{visit})"
 
 
-class Recorder:
+class RunRecorder:
     """Records the events of one run, fires its triggers, and ends it when no time passes.
 
     Args:
@@ -186,7 +187,7 @@ class _StepBuffer(RawEventBuffer):
         self._time = clock
         self._moment = clock.now()
         self._begun = 0
-        self._size = most * SLOTS
+        self._size = 2 * most  # events: a step begins and ends
         super().__init__(machine)
 
     def take(self, event: Event) -> None:
@@ -194,11 +195,6 @@ class _StepBuffer(RawEventBuffer):
         super().take(event)
         if type(event) is Entered:  # published by the machine's own thread, which is to be ended
             self._look()
-
-    def room(self) -> tuple[Iterator[None], Callable[[tuple[Any, ...]], object]]:
-        """Return how often to append before asking again, and the function to append with."""
-        self._look()
-        return super().room()
 
     def _look(self) -> None:
         now, size = self._time.now(), len(self._entries)

@@ -16,25 +16,29 @@ from smachpy.events import (
     GoalDone,
     GoalSent,
     Left,
+    PreemptRequested,
     Started,
     TimedOut,
 )
+from smachpy.events.pictures import draw_run
 from smachpy.exceptions import SmachError, did_you_mean
-from smachpy.pictures import draw_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from smachpy.events import Event
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 Pattern: TypeAlias = str | EllipsisType
 
-MOST_LINES = 60  # lines in a run's explanation
+MAX_LINES = 60  # lines in a run's explanation
 
 
 class UnknownStateError(SmachError):
-    """A test names a state that the machine does not have."""
+    """A test names a state that the machine does not have.
+
+    Try: use one of the paths that the error lists.
+    """
 
 
 def find_path(record: StateRecord, name: str) -> str:
@@ -72,6 +76,7 @@ class Run:
         unfired: The preempts and interrupts of the test that never came, and why.
         whole: The machine without the test's doubles; None if there are none.
         served: Ids of the goals that the test's servers still work on, from any client.
+        ignored: Ids of those on which they work although somebody has cancelled them.
     """
 
     record: StateRecord
@@ -84,6 +89,7 @@ class Run:
     unfired: tuple[str, ...] = ()
     whole: StateRecord | None = field(default=None, repr=False)
     served: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
 
     # -- what happened -------------------------------------------------------------------------
 
@@ -97,6 +103,11 @@ class Run:
         """Paths of the leaves that were entered, in order."""
         leaves = {state.path for state in self.record.walk() if not state.is_container}
         return tuple(path for path in self.states if path in leaves)
+
+    @property
+    def preempted(self) -> bool:
+        """Whether anybody asked the machine, or a part of it, to stop."""
+        return any(isinstance(event, PreemptRequested) for event in self.events)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -114,11 +125,11 @@ class Run:
 
     @property
     def goals_left(self) -> tuple[str, ...]:
-        """Ids of the goals of states that have not ended, and of those in `served`."""
+        """Ids of the goals of states that have not ended, and of those in `served`, `ignored`."""
         sent = {event.goal_id: None for event in self.events if isinstance(event, GoalSent)}
         done = {event.goal_id for event in self.events if isinstance(event, GoalDone)}
         left = [goal_id for goal_id in sent if goal_id not in done]
-        return tuple(dict.fromkeys([*left, *self.served]))
+        return tuple(dict.fromkeys([*left, *self.served, *self.ignored]))
 
     def visits(self, state: str) -> int:
         """Return how often a state was entered; `state` is a path or the end of one."""
@@ -261,7 +272,7 @@ def _summary(events: Iterable[Event]) -> list[str]:
             lines.append(
                 f"{event.t - start:8.3f}  {event.path} {type(event).__name__} {fields}".rstrip()
             )
-    if len(lines) > MOST_LINES:
+    if len(lines) > MAX_LINES:
         lines[20:-20] = [f"   ... {len(lines) - 40} more"]
     return lines
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
@@ -10,24 +11,25 @@ from actionlib_core.action.server import ActionServer
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import Publisher, WatchingSubscriber
 from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
+from smachpy.base.problems import Problems, name_of
 from smachpy.exceptions import error_text
-from smachpy.machines.problems import Problems, name_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable
+    from collections.abc import Callable, Hashable, Iterator
     from typing import Self
 
     from actionlib_core.action.server import ServerGoalHandle
-    from actionlib_core.clock import VirtualClock
+    from actionlib_core.clock import Event, VirtualClock
     from actionlib_core.transport.memory import MemoryNetwork
 
 Status: TypeAlias = Literal["succeeded", "aborted", "preempted", "rejected"]
 STATUSES = ("succeeded", "aborted", "preempted", "rejected")
 TWICE = (0.0, 0.0)  # delays of the copies of a message [s]: two copies, both at once
-MOST_ERRORS = 5  # errors of one server that a failure shows
+MAX_ERRORS = 5  # errors of one server that a failure shows
 _UNASKED = (GoalStatus.PENDING, GoalStatus.ACTIVE)
+_ASKED = (GoalStatus.RECALLING, GoalStatus.PREEMPTING)
 _WAITING = (GoalStatus.PENDING, GoalStatus.RECALLING)
 _UNENDED = (*_WAITING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
@@ -129,6 +131,7 @@ class ScriptedEnd:
         self.replies: deque[Reply] = deque()
         self.default: Reply | None = Reply()
         self._default_is_given = False
+        self._chooser: Callable[[], Reply] | None = None
         self._faults: dict[str, deque[tuple[float, ...]]] = {}
         self._join()
         kit.add_end(self)
@@ -191,6 +194,15 @@ class ScriptedEnd:
         """Ids of the goals that it works on without a cancel."""
         return ()
 
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Ids of the goals that it works on although somebody has cancelled them."""
+        return ()
+
+    def choose_by(self, choose: Callable[[], Reply]) -> None:
+        """Call `choose` for the reply to every goal or request."""
+        self._chooser = choose
+
     def _queue(self, reply: Reply) -> Reply:
         if not self._default_is_given:
             self.default = None
@@ -203,6 +215,8 @@ class ScriptedEnd:
 
     def _next_reply(self, what: str, count: int, calls: str) -> Reply | None:
         """Return the reply to goal or request `count`; None, and an error, if there is none."""
+        if self._chooser is not None:
+            return self._chooser()
         reply = self.replies.popleft() if self.replies else self.default
         if reply is None:
             self.errors.append(
@@ -225,9 +239,9 @@ class ScriptedEnd:
         """Return and clear the deviations from the script and the exceptions."""
         errors, self.errors = self.errors, []
         causes, self.causes = self.causes, []
-        more = len(errors) - MOST_ERRORS
+        more = len(errors) - MAX_ERRORS
         last = [f"{self.name}: and {more} more"] if more > 0 else []
-        return [*errors[:MOST_ERRORS], *last], causes
+        return [*errors[:MAX_ERRORS], *last], causes
 
     def verify(self) -> None:
         """Fail if anything deviated from the script."""
@@ -246,6 +260,14 @@ def raise_errors(errors: list[str], causes: list[BaseException]) -> None:
         raise AssertionError("\n".join(errors)) from (causes[0] if causes else None)
 
 
+def _is_nested(value: dict[str, Any]) -> bool:
+    """Return whether messages inside a message are dicts, too."""
+    return any(
+        isinstance(one, dict) or (isinstance(one, list) and any(isinstance(x, dict) for x in one))
+        for one in value.values()
+    )
+
+
 def as_message(kind: Any, value: Any, what: str) -> Any:
     """Return a message of class `kind` from one, from a dict of its fields, or from None.
 
@@ -257,7 +279,7 @@ def as_message(kind: Any, value: Any, what: str) -> Any:
     if isinstance(value, kind):
         return value
     if isinstance(value, dict):
-        return kind(**value)
+        return kind.from_dict(value) if _is_nested(value) else kind(**value)
     raise TypeError(f"{what}: got {value!r}; expected {kind._type}, a dict of its fields, or None.")
 
 
@@ -284,9 +306,9 @@ class ScriptedActionServer(ScriptedEnd):
         self.cancelled: list[Any] = []
         self._awaited = 0
         self.conditional: list[tuple[Callable[[Any], bool], Reply]] = []
-        self._chooser: Callable[[], Reply] | None = None
         self._arrived = kit.clock.event(f"a goal for {name}")
-        self._cancels: dict[str, Any] = {}
+        self._cancels: dict[str, Event] = {}
+        self._deaf: dict[str, None] = {}  # ids of the goals whose cancel it ignores
         self._handles: dict[str, ServerGoalHandle] = {}
         self._arrivals: dict[str, float] = {}  # goal id -> when it came [s]
         super().__init__(kit, name, type_class)
@@ -364,9 +386,9 @@ class ScriptedActionServer(ScriptedEnd):
         """Answer all goals without another reply; arguments as for `reply`."""
         return self._set_default(self._make(result, status, duration, feedback, text))
 
-    def choose_by(self, choose: Callable[[], Reply]) -> None:
-        """Call `choose` for the reply to every goal."""
-        self._chooser = choose
+    def cancel_of(self, goal_id: str) -> Event:
+        """Return the event that is set when a goal that arrived is cancelled."""
+        return self._cancels[goal_id]
 
     def never_answer(self) -> Reply:
         """Receive the next goal without any sign of it, not even that it has arrived."""
@@ -451,6 +473,15 @@ class ScriptedActionServer(ScriptedEnd):
             if handle.get_goal_status().status in _UNASKED
         )
 
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Ids of the goals that it works on although somebody has cancelled them."""
+        return tuple(
+            goal_id
+            for goal_id in self._deaf
+            if self._handles[goal_id].get_goal_status().status in _ASKED
+        )
+
     def await_goal(self, timeout: float | None = None) -> Any:
         """Wait for the next goal and return it; each goal is returned once.
 
@@ -483,8 +514,6 @@ class ScriptedActionServer(ScriptedEnd):
         self._clock.spawn(lambda: self._play(handle, reply), name=f"{self.name} server")
 
     def _choose(self, goal: Any) -> Reply:
-        if self._chooser is not None:
-            return self._chooser()
         for predicate, reply in self.conditional:
             try:
                 holds = predicate(goal)
@@ -521,6 +550,8 @@ class ScriptedActionServer(ScriptedEnd):
                 self._give_up(handle, self.note_raised(reply.function, error))
             return
         cancel = self._cancels[handle.get_goal_id().id]
+        if reply.ignore_cancel:
+            self._deaf[handle.get_goal_id().id] = None
         if reply.accept_after is None:
             return
         if reply.accept_after and cancel.wait(reply.accept_after) and not reply.ignore_cancel:
@@ -572,6 +603,7 @@ class ScriptedActionServer(ScriptedEnd):
     def kill(self) -> None:
         """Die like a process that gets SIGKILL, together with its goals."""
         self._handles.clear()
+        self._deaf.clear()
         super().kill()
 
 
@@ -656,6 +688,37 @@ class ScriptedService(ScriptedEnd):
             raise
 
 
+class _Turns:
+    """The messages that a topic publishes one after another; its copies take the same ones.
+
+    Attributes:
+        endless: It is one message, again and again.
+    """
+
+    def __init__(self, topic: ScriptedTopic, messages: Any) -> None:
+        self._make = topic.make_message
+        self._taken: list[Any] = []
+        self._rest: Iterator[Any] = iter(())
+        self.endless = not isinstance(messages, Iterable) or isinstance(messages, (dict, str))
+        if self.endless:
+            self._taken.append(self._make(messages))
+        elif isinstance(messages, Collection):  # a list: a wrong message is reported at once
+            self._taken = [self._make(message) for message in messages]
+        else:
+            self._rest = iter(messages)
+
+    def take(self, number: int) -> Any:
+        """Return the message with this number, counted from 0; None: there are no more."""
+        if self.endless:
+            return self._taken[0]
+        while len(self._taken) <= number:
+            try:
+                self._taken.append(self._make(next(self._rest)))
+            except StopIteration:
+                return None
+        return self._taken[number]
+
+
 class ScriptedTopic(ScriptedEnd):
     """Publishes on a topic and records its messages; made by the `topic` fixture.
 
@@ -671,11 +734,11 @@ class ScriptedTopic(ScriptedEnd):
     def __init__(self, kit: Test, name: str, type_class: Any) -> None:
         self.received: list[Any] = []
         self._calls: list[Callable[[ScriptedTopic], object]] = []  # its script so far, for copies
-        self._due: list[float] = []  # when it will publish [s]
+        self._due: list[tuple[float, int]] = []  # when it will publish [s], and a message's number
         super().__init__(kit, name, type_class)
 
     def _start(self) -> None:
-        self._subscriber = Subscriber(
+        self._subscriber = WatchingSubscriber(
             self.name, self._type_class, self.received.append, node=self.node
         )
         self._publishers: dict[bool, Publisher] = {}  # latched or not
@@ -688,22 +751,62 @@ class ScriptedTopic(ScriptedEnd):
             latch: Whether later subscribers get it, too.
             **fields: The fields of the message, instead of `message`.
         """
-        made = self._message(message if message is not None else fields)
+        made = self.make_message(message if message is not None else fields)
         self._calls.append(lambda topic: topic.publish(made, latch=latch))
         self._publisher(latch=latch).publish(made)
 
-    def publish_at(self, at: float, message: Any = None, **fields: Any) -> None:
-        """Publish `at` this long from now [s]."""
-        made = self._message(message if message is not None else fields)
-        self._calls.append(lambda topic: topic.publish_at(at, made))
-        self._due.append(self._clock.now() + at)
-        publisher = self._publisher(latch=False)
+    def publish_at(
+        self, at: float, message: Any = None, *, latch: bool = False, **fields: Any
+    ) -> None:
+        """Publish `at` this long from now [s]; other arguments as for `publish`."""
+        made = self.make_message(message if message is not None else fields)
+        self._calls.append(lambda topic: topic.publish_at(at, made, latch=latch))
+        self._due.append((self._clock.now() + at, 0))
+        publisher = self._publisher(latch=latch)
         self._clock.call_later(at, lambda: publisher.publish(made))
 
-    def publish_every(self, period: float, messages: Iterable[Any], *, start: float = 0.0) -> None:
-        """Publish the messages `period` [s] apart, the first one `start` [s] from now."""
-        for number, message in enumerate(messages):
-            self.publish_at(start + number * period, message)
+    def publish_every(self, period: float, messages: Any, *, start: float = 0.0) -> None:
+        """Publish messages `period` [s] apart, the first one `start` [s] from now.
+
+        Args:
+            period: See above; more than 0.
+            messages: One message, or a dict of its fields, which is published again and again; or
+                an iterable of them, from which each is taken when its time has come, so that it
+                may have no end.
+            start: See above.
+
+        Raises:
+            InvalidStateError: one of the times is no duration, or `period` is 0.
+            TypeError: `messages`, or one of them, is something else.
+        """
+        problems = Problems(f"{self.name}: publish_every")
+        seconds = problems.seconds("period", period, optional=False)
+        if seconds == 0:
+            problems.add(f"period: got {period!r}; expected more than 0 s.")
+        first = problems.seconds("start", start, optional=False)
+        problems.raise_all()
+        assert seconds is not None  # for the type checker, as the other one
+        assert first is not None
+        self._publish_in_turn(seconds, _Turns(self, messages), first)
+
+    def _publish_in_turn(self, period: float, turns: _Turns, start: float) -> None:
+        self._calls.append(lambda topic: topic._publish_in_turn(period, turns, start))  # noqa: SLF001
+        publisher, begun = self._publisher(latch=False), self._clock.now() + start
+
+        def schedule(number: int) -> None:
+            message = turns.take(number)
+            if message is None:
+                return
+            at = begun + number * period
+            self._due = [due for due in self._due if due[0] > self._clock.now()]
+            self._due.append((at, 0 if turns.endless else number))
+            self._clock.call_later(at - self._clock.now(), lambda: publish(number, message))
+
+        def publish(number: int, message: Any) -> None:
+            publisher.publish(message)
+            schedule(number + 1)
+
+        schedule(0)
 
     def lose(self, count: int = 1) -> None:
         """Lose the next messages that this end publishes."""
@@ -727,7 +830,7 @@ class ScriptedTopic(ScriptedEnd):
     def situation(self) -> Hashable:
         """Return the times until its scheduled messages [s]."""
         now = self._clock.now()
-        return tuple(round(at - now, 6) for at in self._due if at > now)
+        return tuple((round(at - now, 6), number) for at, number in self._due if at > now)
 
     def disturb(self, fault: tuple[float, ...], count: int) -> None:
         """Deliver the next messages with these delays [s], one for each copy."""
@@ -741,5 +844,6 @@ class ScriptedTopic(ScriptedEnd):
             )
         return self._publishers[latch]
 
-    def _message(self, value: Any) -> Any:
+    def make_message(self, value: Any) -> Any:
+        """Return a message of the topic from one, or from a dict of its fields."""
         return as_message(self._type_class, value, f"{self.name}: message")

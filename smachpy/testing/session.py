@@ -19,11 +19,13 @@ class Session:
         seeds: The seeds; each test runs with all of them. None: threads take turns.
         rate: Virtual seconds per real second; None: as fast as possible.
         on_run: Called with every run, for coverage.
+        on_cut: Called with a text for each exploration that a limit has ended.
     """
 
     seeds: tuple[int | None, ...] = (None,)
     rate: float | None = None
     on_run: Callable[[Run], object] | None = None
+    on_cut: Callable[[str], object] | None = None
 
 
 _sessions = [Session()]

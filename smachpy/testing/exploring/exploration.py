@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import RealClock, VirtualClock
+from smachpy.base.problems import Problems, name_of, unknown_arguments
+from smachpy.engine.described import walk
+from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
-from smachpy.introspection import describe
-from smachpy.machines.container import Container
-from smachpy.machines.problems import Problems, name_of, unknown_arguments
+from smachpy.machines.container import Container, below
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions
@@ -30,9 +31,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
     from typing import Self, TypeAlias, Unpack
 
-    from smachpy.introspection import StateRecord
-    from smachpy.testing.exploring.kills import Journal, Kill
-    from smachpy.testing.exploring.search import Choice
+    from smachpy.events.introspection import StateRecord
+    from smachpy.testing.exploring.kills import Kill, MemoryJournal
+    from smachpy.testing.exploring.search import ScheduleChoice
     from smachpy.testing.exploring.verdicts import Verdict
     from smachpy.testing.runs import Run
 
@@ -44,7 +45,10 @@ ORDERS = 100  # the most thread orders that are compared with a run with a kill
 
 
 class ReplayError(SmachError):
-    """A replayed run came to another choice than the recorded one."""
+    """A replayed run came to another choice than the recorded one.
+
+    Try: explore again: the mission has changed since, or depends on more than the explorer chooses.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +107,9 @@ class Exploration:
 
     def assert_ok(self) -> None:
         """Fail with the counterexample, if there is one.
+
+        It does not fail if a limit has ended the exploration before every run was tried; pytest's
+        summary then lists it. Use `assert found.exhaustive` if all is to be tried.
 
         Raises:
             AssertionError: a run breaks an invariant.
@@ -174,7 +181,7 @@ def explore(
     search = Search(max_depth)
     stopped_by = ""
     example: Counterexample | None = None
-    with Runner("explore", machine, options, merges=not own) as runner:
+    with RepeatedRun("explore", machine, options, merges=not own) as runner:
 
         def verdict_on(run: Run, error: Exception | None) -> Verdict | None:
             return judge(run, error, runner.explorer, grace=grace, invariants=own)
@@ -200,6 +207,10 @@ def explore(
         file = folder() / f"{example.run.record.label}-counterexample.svg"
         example = replace(example, picture=example.run.draw(file))
     left_out = runner.explorer.not_raised
+    note = session.current().on_cut
+    if example is None and stopped_by and note is not None:
+        path = runner.explorer.root_path
+        note(f"{path}: explored {budget.runs} runs, not all there are: {stopped_by}")
     return Exploration(
         example is None,
         budget.runs,
@@ -225,7 +236,7 @@ def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOption
     """
     check_machine(machine, "replay", functions=True)
     kill = None
-    with Runner("replay", machine, options) as runner:
+    with RepeatedRun("replay", machine, options) as runner:
         if "kill" in runner.options["faults"] and choices:
             from smachpy.testing.exploring.kills import parse_kill
 
@@ -270,7 +281,7 @@ class _Budget:
         return ""
 
 
-class Runner:
+class RepeatedRun:
     """Runs a machine many times, always from the same initial state.
 
     Args:
@@ -323,7 +334,7 @@ class Runner:
         self._restore()
         self._places.restore()
 
-    def _prepare(self, journal: Journal | None = None) -> None:
+    def _prepare(self, journal: MemoryJournal | None = None) -> None:
         """Make the machine, and put doubles into it.
 
         Args:
@@ -350,9 +361,14 @@ class Runner:
             self.explorer.go_on(machine, self._places, journal.active())
         self._userdata = [
             (c.userdata, {key: c.userdata[key] for key in c.userdata.keys()})  # noqa: SIM118
-            for c in _containers(machine)
+            for c in below(machine)
+            if isinstance(c, Container)
         ]
-        self._scripts = [(path, state, state.script) for path, state in _doubles(machine)]
+        self._scripts = [
+            (path, state, state.script)
+            for path, state in walk(machine, f"/{machine.name or 'SM_ROOT'}")
+            if isinstance(state, Double)
+        ]
         self._restore()  # the runs get copies, so that none can change the values stored here
         if journal is not None:
             for path, double, script in self._scripts:
@@ -395,9 +411,11 @@ class Runner:
         kit = MissionKit(choose=explorer.turn, on_run=runs.append)
         self.journal = None
         if "kill" in options["faults"]:
-            from smachpy.testing.exploring.kills import Journal  # slow to import, and seldom needed
+            from smachpy.testing.exploring.kills import (
+                MemoryJournal,  # slow to import, and seldom needed
+            )
 
-            self.journal = Journal(self._machine, kill)
+            self.journal = MemoryJournal(self._machine, kill)
         begins = None if self.journal is None else self.journal.begins
         explorer.begin(kit, prefix, picks=like, begins=begins)
         with kit:
@@ -444,7 +462,7 @@ class Runner:
             unsubscribe()
 
     def _execute_kept(
-        self, kit: MissionKit, userdata: Mapping[str, Any] | None, journal: Journal
+        self, kit: MissionKit, userdata: Mapping[str, Any] | None, journal: MemoryJournal
     ) -> None:
         """Run with a journal, in one process after another until none is killed."""
         from smachpy.durable.mission import kept_mission
@@ -493,29 +511,11 @@ def _copied(values: Mapping[str, Any] | None) -> dict[str, Any]:
     return copies
 
 
-def _containers(container: Container) -> Iterator[Container]:
-    yield container
-    for child in container.get_children().values():
-        if isinstance(child, Container):
-            yield from _containers(child)
-
-
-def _doubles(container: Container, path: str = "") -> Iterator[tuple[str, Double]]:
-    """Yield the doubles below a container, with their paths."""
-    path = path or f"/{container.name or 'SM_ROOT'}"
-    for label, state in container.get_children().items():
-        where = f"{path}/{label}"
-        if isinstance(state, Container):
-            yield from _doubles(state, where)
-        elif isinstance(state, Double):
-            yield where, state
-
-
 # -- the counterexample ----------------------------------------------------------------------------
 
 
 def _shrunk(
-    runner: Runner,
+    runner: RepeatedRun,
     verdict_on: Callable[[Run, Exception | None], Verdict | None],
     max_time: float,
     verdict: Verdict,
@@ -550,7 +550,7 @@ def _shrunk(
 
 
 def _killed_anywhere(
-    runner: Runner,
+    runner: RepeatedRun,
     verdict_on: Callable[[Run, Exception | None], Verdict | None],
     budget: _Budget,
 ) -> tuple[Counterexample | None, str]:
@@ -576,13 +576,15 @@ def _killed_anywhere(
     return None, ""
 
 
-def _texts(choices: list[Choice]) -> tuple[str, ...]:
+def _texts(choices: list[ScheduleChoice]) -> tuple[str, ...]:
     """Return choices as texts, up to the last unusual one; later ones are the usual ones."""
     last = max((number for number, choice in enumerate(choices, 1) if choice.picked), default=0)
     return tuple(map(str, choices[:last]))
 
 
-def _difference(runner: Runner, kill: Kill, explorer: Explorer, expected: Mapping[str, Any]) -> str:
+def _difference(
+    runner: RepeatedRun, kill: Kill, explorer: Explorer, expected: Mapping[str, Any]
+) -> str:
     """Return how the last run, with a kill, differs from the one without; "" if not at all."""
     from smachpy.testing.exploring.kills import difference
 
@@ -594,7 +596,7 @@ def _difference(runner: Runner, kill: Kill, explorer: Explorer, expected: Mappin
 
 
 def _is_other_order(
-    runner: Runner, picks: Mapping[Hashable, str], facts: Mapping[str, Any]
+    runner: RepeatedRun, picks: Mapping[Hashable, str], facts: Mapping[str, Any]
 ) -> bool:
     """Return whether the run ends like that without a kill, in another order of its threads.
 
@@ -613,7 +615,7 @@ def _is_other_order(
     return False
 
 
-def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:
+def _simpler(choices: list[ScheduleChoice]) -> Iterator[tuple[int, ...]]:
     """Yield prefixes of runs that may be shorter, the shortest first."""
     picks = tuple(choice.picked for choice in choices)
     for number, choice in enumerate(choices):
@@ -624,11 +626,11 @@ def _simpler(choices: list[Choice]) -> Iterator[tuple[int, ...]]:
                     yield (*picks[:number], other, picks[number + 1])
 
 
-def _size(run: Run, choices: list[Choice]) -> tuple[int, int]:
+def _size(run: Run, choices: list[ScheduleChoice]) -> tuple[int, int]:
     return len(run.path), sum(choice.picked != 0 for choice in choices)
 
 
-def _script(runner: Runner, choices: tuple[str, ...], reason: str) -> str:
+def _script(runner: RepeatedRun, choices: tuple[str, ...], reason: str) -> str:
     """Return a program that repeats a run."""
     options: dict[str, Any] = dict(runner.options)
     call, note = "replay", "from smachpy.testing import replay\n"

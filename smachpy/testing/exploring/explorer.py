@@ -8,13 +8,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from actionlib_core.interfaces import get_action
+from smachpy.engine.preempt import asking
 from smachpy.events import Entered, Failed, Finished, Iterated, Left, Retried
-from smachpy.introspection import describe
+from smachpy.events.introspection import describe
 from smachpy.machines.container import Container
+from smachpy.machines.guards import When
 from smachpy.machines.state import get_options
-from smachpy.run.grace import asking
 from smachpy.testing.doubles import Double, Places
-from smachpy.testing.exploring.search import Choice
+from smachpy.testing.exploring.search import ScheduleChoice
 from smachpy.testing.recorder import STEPS
 from smachpy.testing.runs import find_path
 from smachpy.testing.servers import Reply
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock import Timer
     from smachpy.events import Event
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
     from smachpy.machines.state import State
     from smachpy.testing.doubles import Replacement
     from smachpy.testing.kit import MissionKit
@@ -164,6 +165,7 @@ class Explorer:
         too_long: Whether too many leaves ran.
         mismatch: Why it could not follow the given choices.
         not_raised: Names of the exceptions that should be raised but cannot be made.
+        root_path: Path of the machine.
     """
 
     def __init__(
@@ -171,7 +173,7 @@ class Explorer:
     ) -> None:
         record = describe(root)
         states = list(record.walk())
-        self._root, self._root_path = root, record.path
+        self._root, self.root_path = root, record.path
         self._options = options
         # A plan's next step depends on its marking, not only on the active states.
         self._merges = merges and all(s.net is None for s in states)
@@ -200,11 +202,11 @@ class Explorer:
         self._step_s = {path: STEP_S + n * tie_s for n, path in enumerate(sorted(self._leaves), 1)}
         self._kept = _kept_by(record, options["keep"])
         self._replace_leaves(places, root, record.path, self._kept)
-        self.choices: list[Choice] = []
+        self.choices: list[ScheduleChoice] = []
         self.picks: dict[Hashable, str] = {}
 
     @property
-    def turns(self) -> list[Choice]:
+    def turns(self) -> list[ScheduleChoice]:
         """The choices for the turns of threads, in order."""
         return [choice for choice in self.choices if choice.where == TURN]
 
@@ -267,9 +269,7 @@ class Explorer:
         self._active = {path: t for path, t in self._active.items() if path in going_on}
         self._hanging.clear()
         self._over = False
-        self._replace_leaves(
-            places, root, self._root_path, self._kept
-        )  # skips those that are there
+        self._replace_leaves(places, root, self.root_path, self._kept)  # skips those that are there
 
     def end(self) -> None:
         """Cancel a preempt whose time has not come."""
@@ -315,7 +315,7 @@ class Explorer:
                     f"replay: choice {number}: got {given!r}; expected one of {texts}. Has the "
                     "machine changed, or does it depend on something outside?"
                 )
-        self.choices.append(Choice(where, tuple(options), picked, situation))
+        self.choices.append(ScheduleChoice(where, tuple(options), picked, situation))
         if key is not None:
             self.picks[key] = options[picked]
         if situation is None and self._merges:
@@ -336,7 +336,7 @@ class Explorer:
             self._forget_ends(event.path)
             if event.path in self._leaves:
                 self._begin_leaf(event.path)
-        elif isinstance(event, Finished) and event.path == self._root_path:
+        elif isinstance(event, Finished) and event.path == self.root_path:
             self._over = True
         elif isinstance(event, Left | Failed):
             self._active.pop(event.path, None)
@@ -372,12 +372,12 @@ class Explorer:
         if not self._merges:
             return None
         now = self._clock.now()
-        running = {self._root_path, *self._active}
+        running = {self.root_path, *self._active}
         parallel = running & self._parallel
         return (
             about,
             self._preempts,
-            self._attempts.get(self._root_path, 0),
+            self._attempts.get(self.root_path, 0),
             frozenset(
                 (path, self._age(path, now - t), self._attempts.get(path, 0))
                 for path, t in self._active.items()
@@ -440,6 +440,7 @@ class Explorer:
         self, places: Places, container: Container, path: str, kept: set[str]
     ) -> None:
         real = self._options["real_actions"]
+        self._choose_cases(places, container, path, kept)
         for label, state in list(container.get_children().items()):
             where = f"{path}/{label}"
             if isinstance(state, Container):
@@ -452,6 +453,34 @@ class Explorer:
                 if options.timeout is not None or options.retry is not None:
                     self._bounded.add(where)
                 places.exchange(container, label, partial(self._double, path=where))
+
+    def _choose_cases(
+        self, places: Places, container: Container, path: str, kept: set[str]
+    ) -> None:
+        """Make the conditions of transitions choices, except those after states that are kept."""
+        guards = getattr(container._smachpy, "guards", None)
+        if guards and not self._options["real_actions"]:
+            made = {
+                label: cases
+                if f"{path}/{label}" in kept
+                else {
+                    outcome: tuple(self._case(f"{path}/{label}", outcome, one) for one in ones)
+                    for outcome, ones in cases.items()
+                }
+                for label, cases in guards.items()
+            }
+            places.exchange_guards(container, made)
+
+    def _case(self, path: str, outcome: str, case: When) -> When:
+        """Return a case whose condition holds or not, as the exploration chooses."""
+        what = f"{path} -{outcome}-> if {case.text}"
+
+        def holds(_: Any) -> bool:
+            key = (what, 0 if self._begins is None else self._begins(path))
+            return bool(self.choose(what, ("no", "yes"), self._situation(what), key))
+
+        holds.__qualname__ = case.text
+        return When(holds, case.target)
 
     def _double(self, state: State, path: str) -> Double:
         def execute(ud: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from actionlib_core.clock._virtual_parts import Stopped
@@ -51,7 +52,7 @@ def parse_kill(text: object) -> Kill | None:
     return found and Kill(int(found[2]), found[1] == "after", found[3])
 
 
-class Journal:
+class MemoryJournal:
     """The journal of an explored run, in memory, with the methods of `Store` that are needed.
 
     Args:
@@ -71,6 +72,7 @@ class Journal:
         self._row = new_mission(machine, mission=MISSION)
         self._kill = kill
         self._entries: list[dict[str, Any]] = []
+        self._blobs: dict[str, bytes] = {}
         self._fence = 0
         self._begins: Counter[str] = Counter()
         self._chosen: set[str] = set()
@@ -113,20 +115,25 @@ class Journal:
     # -- the store -----------------------------------------------------------------------------
 
     def mission(self, _: str) -> MissionRow:
-        """As `Store.mission`."""
         return self._row
 
-    def claim(self, mission: str, runner: str, *, seconds: float) -> Lease:  # noqa: ARG002
-        """As `Store.claim`; the previous process is dead."""
+    def claim(self, mission: str, runner: str, **_: Any) -> Lease:
+        """The previous process is dead."""
         self._fence += 1
         return Lease(mission, self._fence, runner)
 
-    def renew(self, lease: Lease, *, seconds: float) -> bool:  # noqa: ARG002
-        """As `Store.renew`."""
+    def renew(self, lease: Lease, **_: Any) -> bool:  # noqa: ARG002
         return False
 
-    def append(self, lease: Lease, entries: Sequence[bytes], **_: Any) -> None:
-        """As `Store.append`; nothing is compacted.
+    def append(
+        self,
+        lease: Lease,
+        entries: Sequence[bytes],
+        *,
+        blobs: Mapping[str, bytes] = MappingProxyType({}),
+        **_: Any,
+    ) -> None:
+        """Nothing is compacted.
 
         Raises:
             Stopped: the process is killed, or was.
@@ -136,6 +143,7 @@ class Journal:
             raise Stopped
         read = [json.loads(entry) for entry in entries]
         told = ", ".join(f"{entry['kind']} {entry['path']}" for entry in read)
+        self._blobs.update(blobs)
         self.writes.append((told, _summary(self.position)))
         at = kill is not None and self._fence == 1 and len(self.writes) == kill.write
         if not at or (kill is not None and kill.written):
@@ -149,11 +157,12 @@ class Journal:
             raise Stopped
 
     def read(self, _: str) -> tuple[None, list[bytes]]:
-        """As `Store.read`."""
         return None, [json.dumps(entry).encode() for entry in self._entries]
 
-    def release(self, lease: Lease, status: str) -> None:
-        """As `Store.release`."""
+    def blob(self, _: str, digest: str) -> bytes:
+        return self._blobs[digest]
+
+    def release(self, lease: Lease, status: str, *, note: str = "") -> None:  # noqa: ARG002
         if lease.fence != self._fence:
             raise FencedError("a journal in memory", lease, None)
         del status
@@ -169,7 +178,7 @@ class Journal:
                 self._chosen.add(entry["next"])
 
 
-def kills_of(journal: Journal, seen: set[object]) -> Iterator[Kill]:
+def kills_of(journal: MemoryJournal, seen: set[object]) -> Iterator[Kill]:
     """Yield the kills for a run, two at each write, except at places that were tried before.
 
     Args:

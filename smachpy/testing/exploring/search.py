@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class ScheduleChoice:
     """One choice of a run.
 
     Attributes:
@@ -53,7 +53,7 @@ class Search:
         """Return the first choices of the next run; None if all were tried."""
         return self._waiting.popleft() if self._waiting else None
 
-    def add(self, prefix: tuple[int, ...], choices: list[Choice]) -> None:
+    def add(self, prefix: tuple[int, ...], choices: list[ScheduleChoice]) -> None:
         """Queue the runs that differ from a finished one by one more choice.
 
         Args:

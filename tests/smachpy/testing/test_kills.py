@@ -163,3 +163,107 @@ def test_doubles_of_the_test_go_on_with_their_script(mission):
     )
     found.assert_ok()
     assert set(seen) == {("bad", "bad", "ok")}
+
+
+# -- requests that were served ----------------------------------------------------------------
+
+STOPPABLE = ["done", "preempted"]
+
+
+class Drive(State):
+    """Runs until it is asked to stop; with `ask`, it does that itself."""
+
+    def __init__(self, ask=None):
+        super().__init__(STOPPABLE)
+        self.ask = ask
+
+    def execute(self, _userdata):
+        if self.ask is not None:
+            self.ask()
+        return "preempted" if self.sleep(100.0) else "done"
+
+
+class Tidy(State):
+    """Must not be stopped by a request that was served before it began."""
+
+    def __init__(self):
+        super().__init__(["done", "cut"])
+
+    def execute(self, _userdata):
+        return "cut" if self.sleep(1.0) else "done"
+
+
+def served(where, how):
+    """Return a mission in which `how` asks the machine at depth `where`; its child serves that."""
+
+    def make():
+        root = StateMachine([*STOPPABLE, "cut"], name="SERVED")
+        options = {"timeout": 5.0, "timeout_outcome": "preempted"} if how == "timeout" else {}
+        machines = [root]
+        for depth in (1, 2):
+            last = StateMachine([*STOPPABLE, "cut"], **(options if depth == where else {}))
+            machines.append(last)
+        paths = ["/SERVED", "/SERVED/IN", "/SERVED/IN/IN"]
+        asks = {
+            "program": lambda: root.request_preempt(by="the door"),
+            "operator": lambda: root.control.preempt(paths[where]),
+        }
+        machines[2].add("DRIVE", Drive(asks.get(how)), {"preempted": "TIDY"})
+        machines[2].add("TIDY", Tidy(), {"done": "AFTER"})
+        machines[2].add("AFTER", Tidy())
+        for machine, inner in ((machines[1], machines[2]), (root, machines[1])):
+            if how == "sibling" and machine is machines[1]:
+                both = Concurrence(
+                    [*STOPPABLE, "cut"],
+                    "preempted",
+                    child_termination_cb=lambda ends: ends["LOOK"] == "ok",
+                    outcome_map={"done": {"IN": "done"}},
+                )
+                both.add("IN", inner)
+                both.add("LOOK", CBState(nothing, outcomes=["ok"]))
+                inner = both
+            machine.add("IN", inner, {"done": "LAST", "preempted": "LAST"})
+            machine.add("LAST", Tidy())
+        assert root.control is not None  # made before the run, as a viewer does
+        return root
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("where", "how"),
+    [
+        (0, "program"),
+        (1, "operator"),
+        (2, "operator"),
+        (1, "timeout"),
+        (2, "timeout"),
+        (2, "sibling"),
+    ],
+)
+def test_a_request_that_was_served_does_not_come_back(where, how):
+    """It stopped the clean-up of the resumed mission, hours later."""
+    found = explore(
+        served(where, how), faults=["kill"], keep=["DRIVE", "TIDY", "AFTER", "LAST"], preempts=0
+    )
+    found.assert_ok()
+
+
+def test_a_request_to_what_tidies_up_is_kept():
+    """A second one, after the first was served, is for the child that runs then."""
+
+    def make():
+        root = StateMachine([*STOPPABLE, "cut"], name="TWICE")
+
+        class Asked(Tidy):
+            def execute(self, userdata):
+                root.request_preempt(by="the door")
+                return super().execute(userdata)
+
+        root.add("DRIVE", Drive(lambda: root.request_preempt(by="the door")), {"preempted": "TIDY"})
+        root.add("TIDY", Asked(), {"cut": "LAST"})
+        root.add("LAST", Tidy())
+        return root
+
+    found = explore(make, faults=["kill"], keep=["DRIVE", "TIDY", "LAST"], preempts=0)
+    found.assert_ok()

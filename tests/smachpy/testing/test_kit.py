@@ -240,7 +240,7 @@ def test_a_trigger_changes_nothing_before_it_acts(mission):
 
     class Look(Wait):
         def execute(self, ud):
-            hearing.append(len(sm._smachpy.listeners))
+            hearing.append(len(sm._smachpy.live.listeners))
             return super().execute(ud)
 
     def machine():

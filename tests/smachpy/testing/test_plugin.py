@@ -57,6 +57,43 @@ def test_the_fixtures_need_no_conftest(pytester):
     pytester.runpytest_inprocess(*OPTIONS).assert_outcomes(passed=3)
 
 
+def test_pytest_takes_no_imported_interface_for_a_test_class(pytester):
+    pytester.makepyfile("""
+from actionlib_core.interfaces import define_service
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestFeedback, TestGoal
+from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose as TestNavigation
+
+TestService = define_service("test_msgs/TestService", "---\\n")
+from actionlib_core.interfaces.ros2.std_srvs.srv import Trigger as TestTrigger
+
+def test_it(mission, action_server):
+    action_server("dig", TestAction)
+""")
+    result = pytester.runpytest_inprocess(*OPTIONS, "-W", "error")
+    result.assert_outcomes(passed=1, warnings=0)
+
+
+@pytest.mark.parametrize("workers", [[], ["-n", "1"]])
+def test_an_exploration_that_a_limit_has_ended_is_in_the_summary(pytester, workers):
+    pytester.makepyfile(
+        TESTS
+        + """
+def test_cut(mission):
+    mission.explore(machine, max_runs=2).assert_ok()
+
+def test_all(mission):
+    assert mission.explore(machine).exhaustive
+"""
+    )
+    result = pytester.runpytest_inprocess(*OPTIONS, *workers, "-k", "cut or all")
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(
+        ["*explorations that did not try everything*",
+         "*::test_cut: /M: explored 2 runs, not all there are: max_runs"]
+    )  # fmt: skip
+    assert "test_all: " not in result.stdout.str()
+
+
 def test_pytest_does_not_parse_the_packages_of_the_plugin(pytester, monkeypatch):
     """What it parses for its asserts while a thread of ours parses fails in Python 3.11."""
     monkeypatch.setenv("PYTHONPATH", str(Path(smachpy.__file__).parents[1]))  # as installed
@@ -374,7 +411,7 @@ def test_the_alias_warns_of_nothing_where_the_package_is_installed(tmp_path):
     facts.mkdir()
     (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: plugged\nVersion: 1.0\n")
     (facts / "RECORD").write_text("smachpy/__init__.py,,\n")
-    (facts / "entry_points.txt").write_text("[pytest11]\nplugged = smachpy.log\n")
+    (facts / "entry_points.txt").write_text("[pytest11]\nplugged = smachpy.base.log\n")
     (tmp_path / "test_m.py").write_text("def test_it(): pass\n")
     done = subprocess.run(
         [sys.executable, "-m", "smachpy.command", "test", "test_m.py"],
@@ -465,7 +502,7 @@ def test_seeds_are_at_least_one(pytester):
     for count in ("0", "-1"):
         result = pytester.runpytest_inprocess(*OPTIONS, f"--mission-seeds={count}")
         assert result.ret == pytest.ExitCode.USAGE_ERROR
-        told = f"*--mission-seeds: got {count}; expected 1 or more.*"
+        told = f"*--smachpy-seeds: got {count}; expected 1 or more.*"
         result.stderr.fnmatch_lines([told])
 
 
@@ -475,3 +512,32 @@ def test_a_test_may_choose_its_seed(pytester):
         "def test_it(mission):\n    assert mission.seed == 5\n"
     )
     pytester.runpytest_inprocess(*OPTIONS).assert_outcomes(passed=1)
+
+
+def test_a_projects_own_fixture_called_mission_does_not_disturb_the_servers(pytester):
+    pytester.makeconftest(
+        "import pytest\n@pytest.fixture\ndef mission():\n    return {'name': 'of the project'}\n"
+    )
+    pytester.makepyfile(
+        """
+        import smachpy
+        from actionlib_core.interfaces.actionlib.msg import TestAction
+
+        def test_ours(mission, smachpy_mission, action_server):
+            robot = action_server("test", TestAction)
+            robot.default_result()
+            state = smachpy.SimpleActionState("test", TestAction)
+            sm = smachpy.StateMachine(outcomes=["succeeded", "aborted", "preempted"])
+            sm.add("GO", state)
+            smachpy_mission(sm).assert_outcome("succeeded")
+            assert mission["name"] == "of the project"
+        """
+    )
+    pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize("option", ["--smachpy-seed", "--mission-seed"])
+def test_options_have_the_name_of_the_package_and_their_former_one(pytester, option):
+    pytester.makepyfile("def test_seed(mission_seed):\n    assert mission_seed == 7\n")
+    done = pytester.runpytest_subprocess("-p", "no:cacheprovider", f"{option}=7")
+    done.assert_outcomes(passed=1)

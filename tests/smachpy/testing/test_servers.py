@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import re
+
 import pytest
 
 from actionlib_core import Duration
@@ -129,7 +132,7 @@ def test_goals_without_end_at_one_moment_are_told_with_what_the_server_missed(mi
         TimeLimitError, match=r"its threads took 400 turns \(5 steps each\) at 0 s"
     ) as caught:
         mission(drive_again_and_again(), steps=2000)
-    notes = caught.value.__notes__
+    notes = caught.value.__notes__[1:]
     assert notes[0].startswith("move_base: goal number 2 came; expected 1")
     assert notes[5].startswith("move_base: and ")
     server.default_result(duration=1)
@@ -164,7 +167,7 @@ def test_the_errors_of_all_servers_are_told_and_of_their_own_run(mission, server
 
     with pytest.raises(InvalidUserCodeError) as raised:
         mission(twice(lambda ud: 1 / 0))
-    assert [note.partition(" came")[0] for note in raised.value.__notes__[:2]] == [
+    assert [note.partition(" came")[0] for note in raised.value.__notes__[1:3]] == [
         "move_base: goal number 2",
         "dock: goal number 2",
     ]
@@ -313,9 +316,10 @@ def test_a_result_of_another_type(server):
 
 def test_never_answers(mission, server):
     server.never_answer()
-    run = mission(drive(exec_timeout=30.0, preempt_timeout=5.0))
+    limits = {"server_wait_timeout": 20.0, "exec_timeout": 30.0, "preempt_timeout": 5.0}
+    run = mission(drive(**limits))
     assert run.outcome == "aborted"
-    assert run.duration <= 40
+    assert run.duration <= 30
 
 
 def test_never_finishes(mission, server):
@@ -325,6 +329,30 @@ def test_never_finishes(mission, server):
     run = mission(drive(exec_timeout=30.0, preempt_timeout=5.0))
     assert run.outcome == "aborted"
     assert run.duration == pytest.approx(35, abs=0.1)
+
+
+@pytest.mark.parametrize("obeys", [False, True])
+def test_a_goal_that_is_cancelled_in_vain_is_left(mission, server, obeys):
+    if obeys:
+        server.never_finish()
+    else:
+        server.ignore_cancel(600)
+
+    run = mission(drive(exec_timeout=30.0, preempt_timeout=5.0))
+
+    assert run.outcome == "aborted"
+    assert len(run.goals_left) == (not obeys)
+    assert run.ignored == run.goals_left == server.ignored
+    assert server.left == ()
+
+
+def test_a_goal_that_has_ended_in_spite_of_a_cancel_is_not_left(mission, server):
+    server.ignore_cancel(40)
+
+    run = mission(drive(exec_timeout=30.0, preempt_timeout=20.0))
+
+    assert run.duration == pytest.approx(40, abs=0.1)
+    assert run.goals_left == run.ignored == ()
 
 
 def test_accepts_late(mission, server):
@@ -462,6 +490,60 @@ def test_a_topic_at_moments_that_the_test_says(mission, topic):
     chatter.publish_every(2, [{"data": "go"}, {"data": "go"}, {"data": "stop"}], start=1)
     assert mission(watch()).duration == 5
     assert [message.data for message in chatter.received] == ["go", "go", "stop"]
+
+
+@pytest.mark.parametrize("message", [String("go"), {"data": "go"}], ids=["message", "fields"])
+def test_one_message_is_published_again_and_again(mission, topic, message):
+    chatter = topic("chatter", String)
+    chatter.publish_every(5.0, message, start=2.0)
+    chatter.publish_at(1000.0, data="stop")
+    assert mission(watch()).duration == 1000
+    assert [each.data for each in chatter.received] == ["go"] * 200 + ["stop"]
+
+
+def test_messages_without_an_end_are_taken_when_their_time_has_come(mission, topic):
+    """All were taken at once: the call never returned."""
+    taken = []
+
+    def messages():
+        for number in itertools.count():
+            taken.append(mission.clock.now())
+            yield String("go" if number < 9 else "stop")
+
+    begun = mission.clock.now()
+    topic("chatter", String).publish_every(3.0, messages())
+    assert mission(watch()).duration == 27
+    assert len(taken) <= 11
+    assert taken[0] == begun
+
+
+def test_copies_of_a_topic_take_the_same_messages(topic):
+    """An iterator was used up by the first of the runs."""
+    chatter = topic("chatter", String)
+    chatter.publish_every(1.0, (String(word) for word in ("go", "go", "stop")))
+    machine = watch()
+    for _ in range(2):
+        with mission_kit() as other:
+            chatter.copy_to(other)
+            assert other(machine).duration == 2
+
+
+@pytest.mark.parametrize(
+    ("period", "messages", "error", "text"),
+    [
+        (0.0, String("go"), InvalidStateError, "period: got 0.0; expected more than 0 s."),
+        (-1.0, [], InvalidStateError, "period: got -1.0"),
+        (float("nan"), [], InvalidStateError, "period: got nan"),
+        (None, [], InvalidStateError, "period: got None"),
+        (1.0, 7, TypeError, "message: got 7; expected std_msgs/String"),
+        (1.0, "go", TypeError, "message: got 'go'"),
+        (1.0, [String("go"), 7], TypeError, "message: got 7"),
+    ],
+)
+def test_wrong_arguments_of_publish_every(topic, period, messages, error, text):
+    """A message alone ended with "'String' object is not iterable", from inside of the library."""
+    with pytest.raises(error, match=re.escape(text)):
+        topic("chatter", String).publish_every(period, messages)
 
 
 def test_a_latched_topic(mission, topic):
