@@ -10,15 +10,15 @@ sets `words=()`, it receives the words after the first `--` there, and ROS name 
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-import traceback
 from importlib.metadata import EntryPoint, entry_points, version
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
-from actionlib_core.exceptions import ActionlibError
+from actionlib_core.command_line.program import EXIT_ERROR as EXIT_ERROR
+from actionlib_core.command_line.program import CommandParser, run_command
+from actionlib_core.exceptions import ActionlibError, more_about
 from actionlib_core.names import parse_arguments
-from actionlib_core.output import printable, run_program, tell
+from actionlib_core.shutdown import terminable
 from smachpy.command.extras import advice
 from smachpy.exceptions import SmachError
 
@@ -26,21 +26,38 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 GROUP = "smachpy.commands"
-EXIT_ERROR = 2
+SUMMARIES = {
+    "new": "write a mission to begin with, and its test",
+    "list": "list the missions",
+    "run": "run a mission",
+    "check": "find mistakes in a machine without running it",
+    "test": "test missions with pytest",
+    "render": "draw a state machine into a file",
+    "simulate": "do many runs of a mission in virtual time",
+    "view": "watch running machines in a browser",
+    "runs": "list, show, compare and export recorded runs",
+    "answer": "answer the question of a mission",
+    "robot": "start the simulated robot",
+    "doctor": "diagnose the connection to a ROS 2 robot, and the size of a journal",
+    "bridge": "connect robots that use another middleware",
+    "missions": "list, show, resume, cancel, forget and prune durable missions",
+    "submit": "put a mission into the queue of runners",
+    "runner": "run the missions of a queue",
+    "port": "rewrite a ROS 1 script with the API of smachpy",
+    "export": "write a machine as a mission file or a Petri net",
+    "states": "list the states that mission files can name",
+    "completion": "print what completes commands in bash or zsh",
+}
+"""What `smachpy --help` says of our own commands, which need not be imported for that."""
 _HELP = (["-h"], ["--help"])
-EXIT_INTERRUPTED = 128 + signal.SIGINT
 
 
 class UsageError(SmachError):
     """The command cannot do what was asked; the text says why and what to try."""
 
 
-class _Parser(argparse.ArgumentParser):
-    """argparse with smachpy's exit code and the hint `--help` in every error."""
-
-    def error(self, message: str, way_out: str = "") -> NoReturn:
-        way_out = printable(f"Try '{self.prog} --help'{way_out}.")
-        self.exit(EXIT_ERROR, f"{self.prog}: {printable(message)}\n{way_out}\n")
+class _Parser(CommandParser):
+    """A parser that separates the words of a mission, and names of the network, from its own."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Separate the words for this command from those for the mission that it runs."""
@@ -60,7 +77,10 @@ class _Parser(argparse.ArgumentParser):
             text = " ".join(unknown)
             way_out = ""
             if self.get_default("words") is not None and "--" not in args:
-                way_out = f", or '-- {text}' if the mission or script itself takes them"
+                way_out = (
+                    f"Try '{self.prog} --help', or '-- {text}' if the mission or script itself "
+                    "takes them."
+                )
             self.error(f"unrecognized arguments: {text}", way_out)
         return found, []
 
@@ -71,62 +91,81 @@ def main(
     """Run the command line and return the exit code.
 
     Exit codes: 0 success, 1 the mission or check did not succeed, 2 bad input or an output that
-    cannot be written, 130 Ctrl-C.
+    cannot be written; 130 Ctrl-C, 143 SIGTERM, 129 a closed terminal, 131 SIGQUIT.
 
     Args:
         argv: The arguments; None takes those of the process.
         on_ready: Called when everything is imported, before the command starts.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    return run_program("smachpy", lambda: _run(arguments, on_ready), draws=True)
+    return run_command(
+        "smachpy", arguments, lambda: _run(arguments, on_ready), _text_of, draws=True
+    )
 
 
 def _run(arguments: list[str], on_ready: Callable[[], object]) -> int:
-    try:
-        args = _parser(arguments).parse_args(arguments)
-        on_ready()
+    args = _parser(arguments).parse_args(arguments)
+    on_ready()
+    with terminable():
         return int(args.run(args))
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
-    except (SmachError, ActionlibError) as error:
-        return _report(error, str(error), debug="--debug" in arguments)
-    except ImportError as error:
-        text = advice(error)
-        if text is None:
-            raise
-        return _report(error, text, debug="--debug" in arguments)
 
 
-def _report(error: Exception, text: str, *, debug: bool) -> int:
-    if debug:
-        sys.stderr.write(printable("".join(traceback.format_exception(error))))
-    else:
-        tell("smachpy", text)
-    return EXIT_ERROR
+def _text_of(error: Exception) -> str | None:
+    if isinstance(error, UsageError):
+        return str(error)
+    if isinstance(error, SmachError | ActionlibError):
+        return f"{error}\n{more_about(type(error))}"
+    return advice(error) if isinstance(error, ImportError) else None
 
 
-def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+def _parser(arguments: Sequence[str] | None) -> argparse.ArgumentParser:
     parser = _Parser(
         prog="smachpy",
         description="Robot missions: run, draw and test them.",
-        epilog="Begin with: smachpy run patrol --start-robot",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="""\
+begin with:
+  smachpy run countdown                a first run, without a robot
+  smachpy new my_mission               a mission of your own, with its test
+  smachpy run patrol --start-robot     a simulated robot; needs: pip install 'smachpy[sim]'""",
     )
     parser.add_argument("--version", action="version", version=f"smachpy {version('smachpy')}")
     subparsers = parser.add_subparsers(
         metavar="COMMAND", required=True, parser_class=_Parser, dest="command"
     )
     for command in _wanted(arguments):
-        _load(command)(subparsers)
+        if isinstance(command, str):
+            subparsers.add_parser(command, help=SUMMARIES[command])
+        else:
+            _load(command)(subparsers)
     for subparser in subparsers.choices.values():
         subparser.add_argument("--debug", action="store_true", help="show tracebacks of errors")
     return parser
 
 
-def _wanted(arguments: Sequence[str]) -> list[EntryPoint]:
-    """Return only the given command, so that the others need not be imported; without one, all."""
-    commands = sorted(entry_points(group=GROUP), key=lambda command: command.name)
+def full_parser() -> argparse.ArgumentParser:
+    """Return the parser with all options of all commands.
+
+    Raises:
+        UsageError: a command cannot be loaded.
+    """
+    return _parser(None)
+
+
+def _wanted(arguments: Sequence[str] | None) -> list[EntryPoint | str]:
+    """Return what to offer: the given command alone, so that the others need not be imported.
+
+    Without one, or with an unknown one, only help or an error is printed: ours are only named then.
+    """
+    found = {command.name: command for command in entry_points(group=GROUP)}
+    known = [name for name in SUMMARIES if name in found]
+    commands = {name: found[name] for name in [*known, *sorted(found)]}
+    if arguments is None:
+        return list(commands.values())
     first = next((word for word in arguments if not word.startswith("-")), None)
-    return [command for command in commands if command.name == first] or commands
+    if first in commands:
+        return [commands[first]]
+    return [name if name in SUMMARIES else command for name, command in commands.items()]
 
 
 def _load(command: EntryPoint) -> Callable[[Any], None]:

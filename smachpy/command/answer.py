@@ -10,7 +10,7 @@ import socket
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.output import printable
+from actionlib_core.process.output import printable
 from smachpy.exceptions import MissionError, did_you_mean
 
 if TYPE_CHECKING:
@@ -117,8 +117,8 @@ def _nodes() -> Iterator[list[Node]]:
     """Yield nodes: on the network of the environment, or on the default one and private runs."""
     from actionlib_core.config import Config
     from actionlib_core.node import Node, get_node
-    from actionlib_core.private_network import list_private_networks, network_is_chosen
     from actionlib_core.wire.presence import settle_network
+    from actionlib_core.wire.private_network import list_private_networks, network_is_chosen
 
     node = get_node()
     settle_network(node.transport, node.clock)

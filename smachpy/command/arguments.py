@@ -14,6 +14,7 @@ from __future__ import annotations
 import datetime as dt
 import enum
 import inspect
+import logging
 import math
 import re
 import types
@@ -34,13 +35,19 @@ from typing import (
     is_typeddict,
 )
 
-from actionlib_core.suggest import nearest
-from actionlib_core.yaml_text import YamlTextError, load_yaml
+from actionlib_core.config import LARGEST_SECRET
+from actionlib_core.inputs.checked_file import read_limited
+from actionlib_core.inputs.suggest import nearest
+from actionlib_core.inputs.yaml_text import YamlTextError, load_yaml
+from actionlib_core.names import is_rule
 from smachpy.exceptions import MissionError
 from smachpy.machines.container import Container
+from smachpy.userdata.secret import MASK, Secret, is_secret_name, masked
 
 if TYPE_CHECKING:
     from smachpy.command.targets import Target
+
+logger = logging.getLogger(__name__)
 
 NO_DEFAULT: Final = inspect.Parameter.empty
 _OPTION = re.compile(r"--?[^\W\d]")  # a letter of any script, or the underscore of `_name`
@@ -58,6 +65,7 @@ _WORDS: Final[dict[object, str]] = {
     dt.date: "a date",
     dt.datetime: "a date and time",
     type(None): "null",
+    Secret: "a secret, as @FILE",
     Any: "a value in YAML",
 }
 
@@ -83,6 +91,7 @@ class Parameter:
         text: Its text in the docstring.
         rest: It takes all remaining words: a list that is the last positional parameter.
         named: It is keyword-only.
+        secret: Its values are shown nowhere; `@FILE` reads one from a file.
     """
 
     name: str
@@ -91,6 +100,7 @@ class Parameter:
     text: str = ""
     rest: bool = False
     named: bool = False
+    secret: bool = False
 
     @property
     def required(self) -> bool:
@@ -202,11 +212,11 @@ def _read(text: Text, kinds: tuple[Any, ...]) -> Any:
             return choices[text]
     value = _yaml(text)
     for kind in kinds:
-        if kind not in {str, Path} and (_is_a(value, kind) or kind is Any):
+        if kind not in {str, Path, Secret} and (_is_a(value, kind) or kind is Any):
             return value
     for kind in kinds:
-        if kind in {str, Path}:
-            return kind(text)
+        if kind in {str, Path, Secret}:
+            return kind(str(text))
         converted = _convert(value, kind, text)
         if converted is not None:
             return converted
@@ -291,6 +301,7 @@ def parameters_of(thing: object) -> dict[str, Parameter]:
             text=texts.get(parameter.name, ""),
             rest=places[-1:] == [parameter.name] and any(map(_is_list, _alternatives(hint))),
             named=parameter.kind is parameter.KEYWORD_ONLY,
+            secret=Secret in _alternatives(hint) or is_secret_name(parameter.name),
         )
     return made
 
@@ -328,6 +339,38 @@ def _texts(thing: object) -> dict[str, str]:
     return texts
 
 
+# -- secrets ---------------------------------------------------------------------------------------
+
+
+def read_secret(text: Text, where: str, *, kept: bool) -> Text:
+    """Return a secret that was given as text: what `@FILE` has in its first line, or the text.
+
+    Args:
+        text: As given; "@@x" stands for "@x". A secret in clear is logged as a warning.
+        where: What it was given as.
+        kept: Whether the text is kept, and so must name a file, by its absolute path.
+
+    Raises:
+        MisfitError: the file cannot be read, or the secret itself was given.
+    """
+    if text.startswith("@@"):
+        text = Text(text[1:])
+    elif text.startswith("@"):
+        if kept and not Path(text[1:]).is_absolute():
+            raise MisfitError("@FILE with its whole path, as other processes read it")
+        try:
+            lines = read_limited(Path(text[1:]), LARGEST_SECRET).decode("utf-8").splitlines()
+            return Text(lines[0])
+        except (OSError, IndexError, ValueError) as error:
+            raise MisfitError(f"@FILE with a first line ({error})") from error
+    if kept:
+        raise MisfitError(
+            "@FILE, with the secret in its first line: journals and queues keep arguments"
+        )
+    logger.warning("%s: got the secret itself; `ps` shows it to all users. Try @FILE.", where)
+    return text
+
+
 # -- the words after `--` --------------------------------------------------------------------------
 
 
@@ -346,7 +389,8 @@ def usage(target: Target) -> str:
     for parameter in parameters:
         words = expectation(parameter.hint)
         if not parameter.required:
-            words += f", {parameter.default} when not given"
+            default = masked(parameter.default, parameter.name)
+            words += f", {default} when not given"
         text = f"{parameter.text.rstrip('.')} ({words})" if parameter.text else words
         lines.append(f"  {parameter.shown():{width}}  {text}")
     if parameters:
@@ -363,7 +407,7 @@ def usage_line(target: Target, parameters: Sequence[Parameter]) -> str:
 
 
 def read_words(
-    target: Target, words: Sequence[str], given: Mapping[str, object]
+    target: Target, words: Sequence[str], given: Mapping[str, object], *, kept: bool = False
 ) -> dict[str, object]:
     """Return the arguments of a mission's function.
 
@@ -372,12 +416,13 @@ def read_words(
         words: The words after `--`: values in the order of the parameters, `--name VALUE`,
             `--name=VALUE`; `--flag` and `--no-flag` for a bool.
         given: Values that were already given by name (`--input`).
+        kept: The words are kept in a journal or queue: secrets must be given as @FILE.
 
     Raises:
         MissionError: words are superfluous, unknown, missing or do not fit; all are listed.
     """
     parameters = parameters_of(target.thing)
-    reader = _Reader(parameters, given)
+    reader = _WordBinder(parameters, given, kept=kept)
     reader.read(list(words))
     if reader.problems:
         line = usage_line(target, list(parameters.values()))
@@ -386,10 +431,13 @@ def read_words(
     return reader.values
 
 
-class _Reader:
+class _WordBinder:
     """Fills parameters from words."""
 
-    def __init__(self, parameters: Mapping[str, Parameter], given: Mapping[str, object]) -> None:
+    def __init__(
+        self, parameters: Mapping[str, Parameter], given: Mapping[str, object], *, kept: bool
+    ) -> None:
+        self._kept = kept
         self.values: dict[str, object] = {}
         self.problems: list[str] = []
         self._parameters = parameters
@@ -404,6 +452,11 @@ class _Reader:
                 break
             if _OPTION.match(word):
                 self._take_option(word, words)
+            elif is_rule(word):
+                self.problems.append(
+                    f"got {word!r}, which renames, behind --; expected it before. Try 'smachpy run "
+                    f"TARGET {word}', or '-- -- {word}' if it is an argument."
+                )
             else:
                 places.append(word)
         for name, value in self._given.items():
@@ -471,8 +524,11 @@ class _Reader:
             self.problems.append(f"{where}: given twice; expected once.")
             return
         try:
+            if parameter.secret and isinstance(value, Text):
+                value = read_secret(value, where, kept=self._kept)
             self.values[parameter.name] = fit(value, parameter.hint)
         except MisfitError as error:
             shown = str(value) if isinstance(value, Text) else value
+            shown = MASK if parameter.secret else shown
             self.problems.append(f"{where}: got {shown!r}; expected {error}.")
             self.values[parameter.name] = None

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from smachpy.sim.geometry import positive_seconds
+from actionlib_core.command_line.numbers import seconds
+from actionlib_core.process.output import printable
 
 if TYPE_CHECKING:
     import argparse
@@ -59,7 +60,7 @@ def register(subparsers: Any) -> None:
     )
     ros1.add_argument(
         "--status-timeout",
-        type=positive_seconds,
+        type=seconds,
         default=5.0,
         metavar="S",
         help="an action server of the robot that is silent for this long is gone [s] "
@@ -89,7 +90,7 @@ def _run(args: argparse.Namespace) -> int:
         with bridge:
             forget = ending.on_shutdown(bridge.close)
             if bridge.wait_for_master():
-                print(_ready(bridge, args.namespace), flush=True)
+                print(printable(_ready(bridge, args.namespace)), flush=True)
             bridge.wait()
             forget()
     return EXIT_ENDED if bridge.ended else 0

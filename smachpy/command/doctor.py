@@ -1,14 +1,18 @@
-"""`smachpy doctor --ros2`: checks whether a ROS 2 robot can be used from here."""
+"""`smachpy doctor`: whether a ROS 2 robot can be used from here, and how large a journal is."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.command_line.ros2_options import add_ros2_options, ros2_of_options
 from actionlib_core.config import ROS2_VARIABLE, ROUTER_ENDPOINT, load_config
 from actionlib_core.exceptions import ConfigError, TransportError
-from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
+from actionlib_core.process.output import printable
+from smachpy.command.pruning import size_text
+from smachpy.durable.store import open_store, store_name
 
 if TYPE_CHECKING:
     import argparse
@@ -21,6 +25,8 @@ if TYPE_CHECKING:
     from actionlib_core.wire.ros2.network import RosNetwork
 
 EXIT_PROBLEM = 1
+LARGE_JOURNAL = 2**30
+"""A journal of so many bytes is noted."""
 LIST_S = 2.0  # [s] for the list of the robot's nodes
 ASK_S = 2.0  # [s] for the nodes' answers
 PARAMETERS = "rcl_interfaces/srv/GetParameters"
@@ -30,45 +36,70 @@ def register(subparsers: Any) -> None:
     """Add `smachpy doctor`."""
     parser = subparsers.add_parser(
         "doctor",
-        help="diagnose the connection to a ROS 2 robot",
+        help="diagnose the connection to a ROS 2 robot, and the size of a journal",
         description="Look at a ROS 2 robot whose middleware is rmw_zenoh: router, nodes, type "
-        "hashes, actions, quality of service, answers, clock. Exit codes: 0 no problems, 1 "
-        "problems, 2 bad input.",
+        "hashes, actions, quality of service, answers, clock. With --durable, look at a journal of "
+        "missions: its size. Exit codes: 0 no problems, 1 problems, 2 bad input.",
         epilog="example: smachpy doctor --ros2 tcp/robot.local:7447 --domain 42",
     )
     # `--ros2` needs no value here: this command has nothing else to check.
     add_ros2_options(parser, nargs="?", const=os.environ.get(ROS2_VARIABLE) or ROUTER_ENDPOINT)
+    parser.add_argument(
+        "--durable", metavar="JOURNAL", help="look at a file, or postgresql://HOST/DATABASE"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=_run)
 
 
 def _run(args: argparse.Namespace) -> int:
+    found: list[tuple[str, Finding]] = []  # with what was looked at
+    if args.durable is not None:
+        found.append((store_name(args.durable), look_at_journal(args.durable)))
     with ros2_of_options(args):
         config = load_config()
-        if not config.ros2:
+        if not (config.ros2 or found):
             raise ConfigError(
                 "doctor",
                 f"got no robot; expected its router. Try --ros2 tcp/robot.local:7447, "
                 f"{ROS2_VARIABLE} or 'ros2' in the configuration file.",
             )
-        from actionlib_core.node import Node
+        if config.ros2:
+            from actionlib_core.node import Node
 
-        findings: list[tuple[Ros2, Finding]] = []
-        with Node(f"doctor_{os.getpid()}", config=config) as node:
-            for settings in config.ros2:
-                findings += [(settings, finding) for finding in look_at(node, settings)]
+            with Node(f"doctor_{os.getpid()}", config=config) as node:
+                for one in config.ros2:
+                    found += [(one.router, finding) for finding in look_at(node, one)]
     if args.json:
-        print(json.dumps([{"router": s.router, **f._asdict()} for s, f in findings]))
+        print(json.dumps([{"router": where, **f._asdict()} for where, f in found]))
     else:
-        _print(findings)
-    return EXIT_PROBLEM if any(f.level == "problem" for _, f in findings) else 0
+        _print(found)
+    return EXIT_PROBLEM if any(f.level == "problem" for _, f in found) else 0
 
 
-def _print(findings: list[tuple[Ros2, Finding]]) -> None:
+def look_at_journal(journal: str) -> Finding:
+    """Return how large a journal of missions is.
+
+    Raises:
+        StoreError: it cannot be read.
+
+    Blocks: until the store has answered.
+    """
+    from actionlib_core.wire.ros2.diagnosis import Finding, Level
+
+    with contextlib.closing(open_store(journal, create=False)) as store:
+        missions, size = store.size()
+    text = f"{store_name(journal)}: {missions} missions, {size_text(size)}"
+    if size < LARGE_JOURNAL:
+        return Finding(Level.OK, "journal", text)
+    way_out = "old missions can be deleted: smachpy missions prune --older-than 30d --keep failed"
+    return Finding(Level.NOTE, "journal", text, way_out)
+
+
+def _print(findings: list[tuple[str, Finding]]) -> None:
     for _, (level, what, text, way_out) in findings:
-        print(f"{level:8} {what:8} {text}")
+        print(printable(f"{level:8} {what:8} {text}"))
         if way_out:
-            print(f"{'':17} -> {way_out}")
+            print(printable(f"{'':17} -> {way_out}"))
 
 
 def look_at(node: Node, settings: Ros2) -> list[Finding]:

@@ -6,18 +6,21 @@ import argparse
 import contextlib
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from actionlib_core.output import tell
+from actionlib_core.command_line.numbers import seconds
+from actionlib_core.names import clean_namespace
+from actionlib_core.process.output import printable, tell
 from smachpy.command.targets import PLANS
+from smachpy.durable.store import store_name
 from smachpy.exceptions import MissionError
-from smachpy.mission_info import mission_info
-from smachpy.sim.geometry import positive_seconds
+from smachpy.machines.mission_info import mission_info
+from smachpy.userdata.secret import masked_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from smachpy.command.targets import Target
     from smachpy.durable.mission import Outage
@@ -43,6 +46,8 @@ class DurableOptions:
         max_outage: The largest age of the journal [s]; None: as the mission declares.
         lease_s: How long a silent process holds the mission [s].
         migrate: Old path -> new path.
+        reserved: The runner that has reserved the mission for this process, "host:pid", and the
+            fence of its lease; None if none has.
     """
 
     journal: str
@@ -54,6 +59,7 @@ class DurableOptions:
     max_outage: float | None
     lease_s: float
     migrate: dict[str, str]
+    reserved: tuple[str, int] | None = None
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -76,13 +82,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--max-outage",
-        type=positive_seconds,
+        type=seconds,
         metavar="S",
         help="refuse a journal that is older [s] (default: as the mission declares)",
     )
     group.add_argument(
         "--lease",
-        type=positive_seconds,
+        type=seconds,
         default=LEASE_S,
         metavar="S",
         help="in a database: after this long without a sign of this process another one may take "
@@ -96,6 +102,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="OLD=NEW",
         help="a state's new path, if it changed since the mission began",
     )
+    # From a runner, see `Store.reserve`.
+    group.add_argument("--reserved", type=_reserved, help=argparse.SUPPRESS)
 
 
 def durable_options(args: argparse.Namespace) -> DurableOptions | None:
@@ -117,11 +125,11 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
             if is_given
         ]
         if given:
-            raise MissionError(f"{given[0]}: got it without --durable; expected both.")
+            raise MissionError(f"{given[0]}: got no --durable beside it; expected both.")
         return None
     if args.time.virtual:
         raise MissionError(
-            f"--durable: got it beside --time {args.time}; expected real time, in which there are "
+            f"--durable: got --time {args.time} beside it; expected real time, in which there are "
             "outages."
         )
     return DurableOptions(
@@ -129,11 +137,12 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
         mission=args.mission,
         target=whole_target(args.target),
         argv=words_of(args),
-        robot=args.robot or None,
+        robot=clean_namespace(args.robot) or None,
         outage=args.outage,
         max_outage=args.max_outage,
         lease_s=args.lease,
         migrate=dict(args.migrate),
+        reserved=args.reserved,
     )
 
 
@@ -160,11 +169,19 @@ def _leave(error: FencedError) -> None:
 
 @contextlib.contextmanager
 def journalled(
-    target: Target, machine: Container, options: DurableOptions | None
+    target: Target,
+    machine: Container,
+    options: DurableOptions | None,
+    close: Iterable[Callable[[], object]] = (),
 ) -> Iterator[None]:
     """Write the run of `machine` to its journal within the block, or continue one.
 
-        Without options nothing is written.
+    Args:
+        target: The mission.
+        machine: Its machine.
+        options: The journal; None writes nothing.
+        close: Called before the process ends because the mission was suspended: they restore the
+            terminal and complete files.
 
     Raises:
         SmachError: as `smachpy.run_durable` does.
@@ -173,7 +190,7 @@ def journalled(
         yield
         return
     from smachpy.durable.mission import kept_mission
-    from smachpy.durable.store import open_store
+    from smachpy.durable.store import Lease, open_store
 
     info = mission_info(target.thing)
     limit = info.max_outage if options.max_outage is None else options.max_outage
@@ -183,6 +200,16 @@ def journalled(
     with contextlib.closing(open_store(options.journal, patience=patience)) as store:
         row = find_or_create(store, machine, options)
         verb = "begins" if row.status == "queued" else "is resumed"
+
+        def tell_suspended(by: str) -> None:
+            for each in close:
+                each()
+            id_ = row.id
+            text = (
+                f"mission {id_}: suspended by {by}; its goals run on. It goes on at the next start"
+            )
+            tell("smachpy", f"{text}; 'smachpy missions cancel {id_}' ends it.")
+
         migrate: Any = options.migrate or info.migrations
         with kept_mission(
             machine,
@@ -192,10 +219,12 @@ def journalled(
             max_outage=limit,
             migrate=migrate,
             lease_s=options.lease_s,
+            reserved=options.reserved and Lease(row.id, options.reserved[1], options.reserved[0]),
             on_fenced=_leave,
+            on_suspended=tell_suspended,
         ):
             where = store_name(options.journal)
-            print(f"mission {row.id} {verb}; journal: {where}", file=sys.stderr)
+            print(printable(f"mission {row.id} {verb}; journal: {where}"), file=sys.stderr)
             yield
 
 
@@ -205,24 +234,36 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
     Raises:
         MissionError: the mission that has begun has other arguments.
     """
+    from actionlib_core.node import get_node
+    from smachpy.command.mission_run import driven_robot, needed_servers
     from smachpy.durable.mission import new_mission
+    from smachpy.durable.store import OVER
+    from smachpy.events.introspection import describe
 
-    open_ones = [row for row in store.missions(open_only=True) if row.every is None]
     if options.mission is not None:
-        alike = [row for row in open_ones if row.id == options.mission]
+        # A mission that is reserved for this process and was deleted since must not begin.
+        known = store.mission(options.mission) if options.reserved else store.find(options.mission)
+        if known is not None and known.status in OVER:
+            how = f"{known.status}: {known.outcome}" if known.outcome else known.status
+            raise MissionError(
+                f"{store_name(options.journal)}: mission {known.id!r} has {how}; expected one that "
+                "goes on, or a new id. Try another --mission, or none, which begins a new mission."
+            )
+        alike = [] if known is None else [known]
     else:
-        alike = [
-            row for row in open_ones if (row.target, row.robot) == (options.target, options.robot)
-        ]
+        rows = store.missions(open_only=True, target=options.target)
+        alike = [row for row in rows if row.robot == options.robot]
+    alike = [row for row in alike if row.every is None]
     same = [row for row in alike if row.argv == options.argv]
     if same:
         return same[-1]
     if alike:
         row = alike[-1]
         raise MissionError(
-            f"{options.target}: arguments: got {list(options.argv)}, but mission {row.id!r} "
-            f"has begun with {list(row.argv)}; expected the same. Try 'smachpy missions resume "
-            f"{row.id}', 'smachpy missions forget {row.id}', or --mission NAME for another one."
+            f"{options.target}: arguments: got {masked_words(options.argv)}, but mission "
+            f"{row.id!r} has begun with {masked_words(row.argv)}; expected the same. Try 'smachpy "
+            f"missions resume {row.id}', 'smachpy missions forget {row.id}', or --mission NAME for "
+            "another one."
         )
     row = new_mission(
         machine,
@@ -231,14 +272,16 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
         argv=options.argv,
         robot=options.robot,
     )
-    store.create(row)
-    return row
+    actions = needed_servers(describe(machine))
+    names = [get_node().resolve(name, "action name") for name in actions]
+    return store.create(replace(row, drives=driven_robot(names, options.robot)))
 
 
-def store_name(journal: str) -> str:
-    """Return a journal's name for messages, without the password in its URL."""
-    scheme, mark, rest = journal.partition("://")
-    return f"{scheme}{mark}{rest.rpartition('@')[2]}" if mark else journal
+def _reserved(text: str) -> tuple[str, int]:
+    runner, _, fence = text.rpartition(":")
+    if ":" not in runner or not fence.isdecimal():
+        raise argparse.ArgumentTypeError(f"got {text!r}; expected HOST:PID:FENCE")
+    return runner, int(fence)
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Self
 from actionlib_core.clock import RealClock, SerialExecutor
 from smachpy.events import to_record
 from smachpy.events.recording import event_line, header_line
+from smachpy.events.steady import SteadyStamps
 
 if TYPE_CHECKING:
     from typing import TextIO
 
     from smachpy import events as ev
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
 CLOSE_S = 10.0
 """Longest wait at the end for a slow reader [s]."""
@@ -42,6 +43,7 @@ class EventStream:
         self._waiting: deque[str] = deque()
         self._scheduled = False
         self._number = 0
+        self._steady = SteadyStamps()
         self._gone = False
 
     def __enter__(self) -> Self:
@@ -63,7 +65,7 @@ class EventStream:
         record = to_record(event)
         with self._lock:
             self._number += 1
-            line = event_line({**record, "seq": self._number})
+            line = event_line({**self._steady.fix(record), "seq": self._number})
         self._put(line)
 
     def print_summary(self, outcome: str | None) -> None:

@@ -1,9 +1,10 @@
-"""`smachpy export`: writes a machine as a Petri net, for other tools."""
+"""`smachpy export`: writes a machine as a mission file, or as a Petri net for other tools."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from actionlib_core.process.output import printable
 from smachpy.command import UsageError
 from smachpy.command.targets import load_target
 
@@ -15,13 +16,16 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Add the command."""
     parser = subparsers.add_parser(
         "export",
-        help="write a machine as a Petri net",
-        description="Write a machine, or a plan, as a Petri net in PNML.",
+        help="write a machine as a mission file or a Petri net",
+        description="Write a machine as a mission file, or a machine or plan as a Petri net in "
+        "PNML.",
     )
     parser.add_argument(
         "target", metavar="TARGET", help="mission, module:factory, path.py[:factory] or plan.pnml"
     )
-    parser.add_argument("--pnml", metavar="FILE", required=True, help="where to write it")
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("-o", "--output", metavar="FILE.yaml", help="write a mission file")
+    where.add_argument("--pnml", metavar="FILE", help="write a Petri net")
     parser.add_argument(
         "--dialect",
         choices=("pnp", "2009"),
@@ -33,14 +37,37 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace) -> int:
     """Write the file."""
+    if args.output is not None:
+        return _write_file(args.target, args.output)
     from smachpy.pnp.export import export_net
     from smachpy.pnp.pnml import write_pnml
 
-    exported = export_net(load_target(args.target).build())
+    exported = export_net(load_target(args.target, imports=False).build())
     try:
-        print(write_pnml(exported.net, args.pnml, dialect=args.dialect))
+        print(printable(write_pnml(exported.net, args.pnml, dialect=args.dialect)))
     except OSError as error:
         raise UsageError(
             f"smachpy export: {args.pnml!r} cannot be written: {error.strerror}"
         ) from error
+    return 0
+
+
+def _write_file(target: str, output: str) -> int:
+    """Write a mission file."""
+    from smachpy.files import NotWrittenError, write
+    from smachpy.machines.state_machine import StateMachine
+
+    machine = load_target(target, imports=False).build()
+    if type(machine) is not StateMachine:
+        got = type(machine).__name__
+        raise UsageError(f"smachpy export: got a {got}; expected a state machine for a file.")
+    try:
+        write(machine, output)
+    except NotWrittenError as error:
+        lines = "\n".join(f"  {problem}" for problem in error.problems)
+        raise UsageError(f"smachpy export: {target!r} cannot be written:\n{lines}") from error
+    except OSError as error:
+        problem = f"smachpy export: {output!r} cannot be written: {error.strerror}"
+        raise UsageError(problem) from error
+    print(printable(output))
     return 0

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import importlib.util
 import json
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.process.private_files import make_private_folder, open_private
+from smachpy.base.log import logwarn
 from smachpy.command.extras import advice, load_view
 from smachpy.command.track_recorder import TrackRecorder
 from smachpy.events.recording import Recorder, RecordingError
 from smachpy.exceptions import MissionError
-from smachpy.log import logwarn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -45,7 +47,7 @@ class OutFolder:
         self._draw: Callable[..., Path] = load_view("run")
         self._events = self._path(".jsonl")
         with self._writing():
-            folder.mkdir(parents=True, exist_ok=True)
+            make_private_folder(folder)
             # Errors in drawing or writing show up here, before the robot moves.
             self._draw(machine, self._path(".svg"))
             for old in (self._events, self._path("_summary.json"), self._path("_track.png")):
@@ -87,7 +89,8 @@ class OutFolder:
             elif self._track.has_goals:
                 files.append(self._draw_track(f"{self._name}: {facts['outcome']}"))
             path = self._path("_summary.json")
-            path.write_text(json.dumps({**facts, **self._summary()}, indent=2) + "\n", "utf-8")
+            with open_private(path, "w") as file:
+                file.write(json.dumps({**facts, **self._summary()}, indent=2) + "\n")
         return [*files, self._events, path]
 
     def _summary(self) -> dict[str, Any]:
@@ -126,6 +129,8 @@ class OutFolder:
 
 def _why_no_track() -> str | None:
     """Import the track drawing now, since that takes a moment; return what is missing for it."""
+    if importlib.util.find_spec("smachpy.sim") is None:
+        return "the simulated robot, which draws it, is not installed"
     try:
         importlib.import_module("smachpy.sim.track")
     except ModuleNotFoundError as error:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.output import printable
+from actionlib_core.process.output import printable
 from smachpy.command.targets import TargetError
 
 if TYPE_CHECKING:
@@ -33,25 +34,36 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Rewrite the script; notes go to standard error."""
-    from smachpy.ros1.port import port_file
+    from smachpy.checks.unbuilt import changed_inputs
+    from smachpy.ros1 import python2
+    from smachpy.ros1.port import port
 
     try:
-        ported = port_file(args.script)
+        source = args.script.read_bytes()
+        ported = port(source, str(args.script))
     except OSError as error:
-        raise TargetError(str(args.script), f"got {error}; expected a script.") from error
+        raise TargetError(
+            str(args.script), f"got nothing to read ({error.strerror or error}); expected a script."
+        ) from error
     except SyntaxError as error:
         raise TargetError(
-            str(args.script), f"line {error.lineno}: got {error.msg}; expected Python, 2 or 3."
+            str(args.script),
+            f"line {error.lineno}: got a syntax error ({error.msg}); expected Python, 2 or 3.",
         ) from error
     if args.output is None:
-        sys.stdout.write(ported.text)
+        # As it is for files and pipes: it is a program.
+        shown = printable(ported.text) if sys.stdout.isatty() else ported.text
+        sys.stdout.write(shown)
     else:
         try:
             with Path(args.output).open("x", encoding="utf-8") as file:
                 file.write(ported.text)
         except OSError as error:
-            raise TargetError(args.output, f"got {error}; expected a new file.") from error
-        print(args.output)
-    for line, text in ported.notes:
+            raise TargetError(
+                args.output, f"got a failed write ({error.strerror or error}); expected a new file."
+            ) from error
+        print(printable(args.output))
+    old = ast.parse(python2.to_text(python2.read(source), str(args.script)))
+    for line, text in sorted({*ported.notes, *changed_inputs(old)}):
         print(printable(f"{args.script}:{line}: {text}"), file=sys.stderr)
     return 0

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from actionlib_core import shutdown
 from actionlib_core.clock import current_clock
+from actionlib_core.command_line.numbers import between, finite
+from actionlib_core.command_line.ros2_options import missing_router, router_endpoint
 from actionlib_core.config import Distro, Ros2
-from actionlib_core.ros2_options import missing_router, router_endpoint
-from smachpy.sim.config import SimConfig, load_config
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import Pose2D, finite, wrap_angle
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.robot_process import end_with_stdin
+from actionlib_core.process.output import printable
+from actionlib_core.shutdown.child_process import end_with_stdin
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.pose import Pose2D, wrap_angle
+from smachpy.places.robot_file import SimConfig, load_config
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from smachpy.sim.world import Robot
     from smachpy.sim.world_file import WorldSpec
 
-_MOST_ROBOTS = 1000
+_MAX_ROBOTS = 1000
 
 
 def register(subparsers: Any) -> None:
@@ -49,7 +51,10 @@ def register(subparsers: Any) -> None:
         "--world", type=Path, help="a world file, YAML: robots, doors, docks, moving obstacles"
     )
     several.add_argument(
-        "--robots", type=_count, metavar="N", help="N robots in namespaces robot_0, robot_1, ..."
+        "--robots",
+        type=between(1, _MAX_ROBOTS),
+        metavar="N",
+        help="N robots in namespaces robot_0, robot_1, ...",
     )
     ros2 = parser.add_argument_group("for ROS 2", "a Nav2 robot on a network of ROS 2 nodes")
     ros2.add_argument(
@@ -60,7 +65,7 @@ def register(subparsers: Any) -> None:
         "tcp/127.0.0.1:7447 for example",
     )
     ros2.add_argument(
-        "--domain", type=_domain, metavar="N", help="their ROS_DOMAIN_ID (default: 0)"
+        "--domain", type=between(0), metavar="N", help="their ROS_DOMAIN_ID (default: 0)"
     )
     ros2.add_argument(
         "--distro",
@@ -95,7 +100,7 @@ def add_robot_options(group: Any) -> None:
 
 def _run(args: argparse.Namespace) -> int:
     if args.parameters:
-        print(parameters())
+        print(printable(parameters()))
         return 0
     if not args.ros2 and (args.domain is not None or args.distro is not None):
         raise missing_router()
@@ -148,7 +153,7 @@ def serve(args: argparse.Namespace) -> int:
                 server = Simulation(world, node=node, on_ros2=bool(args.ros2))
             try:
                 server.start()
-                print(_ready(server, node, args), flush=True)
+                print(printable(_ready(server, node, args)), flush=True)
                 forget = ending.on_shutdown(server.close)
                 server.wait()
                 forget()
@@ -169,7 +174,7 @@ def make_robot(floor: Path, config: Path, pose: Sequence[float]) -> Robot:
         InputFileError: a file has problems.
         NavigationError: the robot cannot stand there.
     """
-    from smachpy.sim.occupancy import load_map
+    from smachpy.places.occupancy import load_map
     from smachpy.sim.world import Robot, World
 
     parameters, grid = load_config(config), load_map(floor)
@@ -183,7 +188,7 @@ def make_robot(floor: Path, config: Path, pose: Sequence[float]) -> Robot:
 
 def team(floor: Path, config: Path, pose: Sequence[float], count: int) -> WorldSpec:
     """Return a world with robots robot_0, robot_1, ...; arguments and errors as in `make_robot`."""
-    from smachpy.sim.occupancy import load_map
+    from smachpy.places.occupancy import load_map
     from smachpy.sim.world_file import WorldSpec, place_robots
 
     parameters, grid = load_config(config), load_map(floor)
@@ -236,17 +241,3 @@ def parameters() -> str:
     lines += ["start: {x: 0, y: 0, yaw: 0}     # Where it begins, in the map frame. [m, m, rad]"]
     lines += ["dock: {x: 0, y: 0, yaw: 0}      # Where it charges; left out: it has no dock."]
     return "\n".join(lines)
-
-
-def _count(text: str) -> int:
-    """Read the number of robots."""
-    if not (text.isdecimal() and 1 <= int(text) <= _MOST_ROBOTS):
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected 1 to {_MOST_ROBOTS}")
-    return int(text)
-
-
-def _domain(text: str) -> int:
-    """Read a ROS_DOMAIN_ID."""
-    if not (text.isascii() and text.isdecimal()):
-        raise argparse.ArgumentTypeError(f"got {text!r}; expected 0 or more")
-    return int(text)

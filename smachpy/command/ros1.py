@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core import shutdown
 from actionlib_core.clock import Deadlock, current_clock
 from actionlib_core.node import Node, get_node, use_node
-from actionlib_core.output import printable, tell
-from smachpy import describe
-from smachpy.command.out_folder import OutFolder
-from smachpy.command.ros1_options import script_of, tell_stubs
-from smachpy.command.runner import (
+from actionlib_core.process.output import printable, tell
+from smachpy.command.mission_run import (
     EXIT_OTHER_OUTCOME,
     EXIT_SUCCESS,
     good_outcomes,
@@ -22,8 +19,11 @@ from smachpy.command.runner import (
     show_run,
     signal_exit,
 )
-from smachpy.command.surroundings import ROBOT_ACTIONS, open_surroundings
+from smachpy.command.out_folder import OutFolder
+from smachpy.command.ros1_options import script_of, tell_stubs
+from smachpy.command.surroundings import is_of_robot, open_surroundings
 from smachpy.command.watching import watched
+from smachpy.events.introspection import describe
 from smachpy.exceptions import InvalidUserCodeError, MissionError
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from actionlib_core.ros1 import Ros1Bridge
+    from smachpy.command.mission_run import RunOptions
     from smachpy.command.ros1_options import Ros1Options
-    from smachpy.command.runner import RunOptions
     from smachpy.command.surroundings import Surroundings
     from smachpy.machines.container import Container
 
@@ -76,7 +76,7 @@ def run_ros1(
         made.parameters.robot = robot
         session.begin(made)
         stack.callback(session.end, made)
-        runs = _Runs(script.stem, options, surroundings, stack)
+        runs = _ScriptRuns(script.stem, options, surroundings, stack)
         made.on_action = runs.need
         runs.observe()
         if options.robot.start:
@@ -127,7 +127,6 @@ def _run(script: Path, argv: list[str], options: RunOptions) -> int | None:
 
 
 def _node_maker(options: RunOptions, stack: contextlib.ExitStack) -> Callable[[str], Node]:
-    from smachpy.ros1.program import ScriptNode
     from smachpy.ros1.session import make_default
 
     def make(name: str) -> Node:
@@ -135,7 +134,7 @@ def _node_maker(options: RunOptions, stack: contextlib.ExitStack) -> Callable[[s
             return make_default(name, ())
 
         before = get_node()
-        node = ScriptNode(
+        node = Node(
             name,
             transport=before.transport,
             clock=before.clock,
@@ -149,7 +148,7 @@ def _node_maker(options: RunOptions, stack: contextlib.ExitStack) -> Callable[[s
     return make
 
 
-class _Runs:
+class _ScriptRuns:
     """Shows every machine that a script runs, and keeps the outcome of the last one."""
 
     def __init__(
@@ -173,17 +172,17 @@ class _Runs:
 
     def observe(self) -> None:
         """Start observing the machines of this process."""
-        from smachpy.run.threads import OBSERVERS
+        from smachpy.engine.threads import OBSERVERS
 
         OBSERVERS.append(self._begin)
         self._stack.callback(OBSERVERS.remove, self._begin)
 
-    def need(self, action: str) -> None:
+    def need(self, action: str, type_name: str) -> None:
         """In virtual time, start the simulated robot whose action is called, unless it is there."""
         node = get_node()
         name = node.resolve(action, "action name")  # as the command line renames it
-        prefix, _, word = name.removeprefix(f"{node.namespace}/").rpartition("/")
-        wanted = self._options.pace.virtual and word in ROBOT_ACTIONS
+        prefix = name.removeprefix(f"{node.namespace}/").rpartition("/")[0]
+        wanted = self._options.pace.virtual and is_of_robot(name, type_name)
         if wanted and prefix not in self._robots:
             self._robots.add(prefix)
             self._surroundings.put_robot(prefix, self._options.server_timeout)
@@ -195,8 +194,8 @@ class _Runs:
 
     def _begin(self, machine: Container) -> Callable[[str | None], object]:
         record = describe(machine)
-        for action in needed_servers(record):
-            self.need(action)
+        for action, type_name in needed_servers(record).items():
+            self.need(action, type_name)
         options, clock = self._options, current_clock()
         if id(machine) not in self._seen:
             self._seen[id(machine)] = machine
@@ -243,7 +242,7 @@ class _Runs:
                 "exit_code": self.exit_code(),
                 "time": str(self._options.pace),
             }
-            print(f"\nWritten: {', '.join(map(str, self._out.write(facts)))}")
+            print(printable(f"\nWritten: {', '.join(map(str, self._out.write(facts)))}"))
         if self._watch is not None:
             self._watch.linger(self._last[0] if self._last else None, ending)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.names import NameArguments
-from actionlib_core.output import tell
+from actionlib_core.process.output import tell
 from smachpy.command.targets import Target, TargetError, load_target
 from smachpy.exceptions import MissionError
 
@@ -77,6 +77,12 @@ def add_options(parser: Any, *, loads: bool) -> None:
             metavar="S",
             help="longest time to build its machine [s] (default: %(default)g)",
         )
+        parser.add_argument(
+            "--import",
+            action="store_true",
+            dest="imports",
+            help="import the modules that the actions of a plan name; that runs their code",
+        )
 
 
 def options_of(args: argparse.Namespace) -> Ros1Options | None:
@@ -98,7 +104,7 @@ def options_of(args: argparse.Namespace) -> Ros1Options | None:
         for name in ("params", "stub_missing"):
             if getattr(args, name):
                 flag = name.replace("_", "-")
-                raise MissionError(f"--{flag}: got it without --ros1; expected both.")
+                raise MissionError(f"--{flag}: got no --ros1 beside it; expected both.")
         return None
     return Ros1Options(
         tuple(_params(text) for text in args.params),
@@ -120,7 +126,10 @@ def load_script(text: str, options: Ros1Options) -> Target:
         LoadError: there is none.
         TargetError: no such file.
     """
+    from smachpy.checks import ignore
+    from smachpy.machines.container import Container, below
     from smachpy.ros1 import load
+    from smachpy.ros1.session import session
 
     file, colon, function = text.partition(".py:")
     place = script_of(f"{file}.py" if colon else text)
@@ -134,6 +143,11 @@ def load_script(text: str, options: Ros1Options) -> Target:
         stubbed=stubbed,
     )
     tell_stubs(stubbed)
+    if not session().executed:  # it waits for others, and may add states when they call
+        for container in below(machine):
+            if isinstance(container, Container) and not container.get_children():
+                reason = "it had no states when the script began to wait"
+                ignore(container, "inconsistent", reason)
     return Target(place.stem, f"{place}", "", machine)
 
 
@@ -158,4 +172,6 @@ def tell_stubs(stubbed: list[str]) -> None:
 def load_any(text: str, args: argparse.Namespace) -> Target:
     """Load a target: a script for ROS 1 with `--ros1`, else as `load_target`."""
     options = options_of(args)
-    return load_target(text) if options is None else load_script(text, options)
+    if options:
+        return load_script(text, options)
+    return load_target(text, imports=args.imports, allow=getattr(args, "allow", None))

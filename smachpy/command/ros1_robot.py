@@ -36,7 +36,7 @@ def refuse_simulation(args: argparse.Namespace, option: str) -> None:
         (args.world, "--world"),
     ):
         if given:
-            raise MissionError(f"{option}: got it beside {other}; expected one of them.")
+            raise MissionError(f"{option}: got {other} beside it; expected one of them.")
 
 
 @contextlib.contextmanager

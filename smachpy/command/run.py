@@ -4,32 +4,38 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import random
 import re
+import secrets
 import sys
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from actionlib_core.command_line.numbers import seconds
+from actionlib_core.command_line.ros2_options import add_ros2_options, ros2_of_options
 from actionlib_core.names import check_name
-from actionlib_core.output import printable
-from actionlib_core.ros2_options import add_ros2_options, ros2_of_options
+from actionlib_core.process.output import printable
 from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
 from smachpy.command.durable import add_options as add_durable_options
 from smachpy.command.durable import durable_options
+from smachpy.command.logs import add_log_options, logging_as
 from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import options_of
 from smachpy.command.ros1_robot import add_option as add_ros1_robot
 from smachpy.command.ros1_robot import refuse_simulation, ros1_robot
+from smachpy.events.inputs import WHICH
 from smachpy.exceptions import MissionError
-from smachpy.mission_info import mission_info
-from smachpy.sim.geometry import positive_seconds
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.machines.mission_info import mission_info
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.userdata.secret import MASK, Secret, is_secret_name, masked
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import TextIO
 
-    from smachpy.command.runner import RunOptions
+    from smachpy.command.mission_run import RunOptions
     from smachpy.command.surroundings import Pace, RobotOptions
     from smachpy.command.targets import Target
 
@@ -83,6 +89,12 @@ def register(subparsers: Any) -> None:
         help="real; virtual: within this process, as fast as possible; 10x: virtual at that rate",
     )
     parser.add_argument(
+        "--bag",
+        type=Path,
+        metavar="FILE",
+        help="publish the topics of a bag during the run: .bag, .mcap, or a folder of rosbag2",
+    )
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write events, pictures and a summary there"
     )
     shown = parser.add_mutually_exclusive_group()
@@ -97,12 +109,13 @@ def register(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--server-timeout",
-        type=positive_seconds,
+        type=seconds,
         default=10.0,
         metavar="S",
         help="how long to wait for the mission's action servers [s] (default: %(default)g)",
     )
     _add_watching(parser)
+    add_log_options(parser)
     add_durable_options(parser)
     add_ros2_options(parser)
     add_ros1_options(parser, loads=False)
@@ -133,6 +146,16 @@ def register(subparsers: Any) -> None:
         help="with robots of its own: use the common network (default: a network of its own, "
         "unless SMACHPY_DOMAIN or SMACHPY_CONFIG names one)",
     )
+    # For what rows of a store name; the target on the command line is then only shown.
+    parser.add_argument("--queued", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="PACKAGE",
+        help="let a mission file name code of this package, besides modules in its own folder "
+        "(repeatable)",
+    )
     parser.set_defaults(run=_run, words=())
 
 
@@ -157,6 +180,13 @@ def _add_watching(parser: argparse.ArgumentParser) -> None:
         "--control", action="store_true", help="let viewers pause, step, jump and preempt"
     )
     group.add_argument("--record", type=Path, metavar="FILE", help="write the run to a file")
+    group.add_argument(
+        "--record-inputs",
+        choices=WHICH,
+        default="seen",
+        help="what the file has of answers and messages, to reproduce the run: what the mission "
+        "has seen, large messages as hash and summary (default); all of it; none",
+    )
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -177,12 +207,17 @@ def _list(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     events = sys.stdout if args.json else None
+    if args.queued:
+        from smachpy.command.queued import take_row
+
+        take_row(args)
     if args.ros2:
         refuse_simulation(args, "--ros2")
     with contextlib.ExitStack() as stack:
         stack.enter_context(ros2_of_options(args))
         if args.json:  # standard output is for events only: a mission's prints go to standard error
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))
+        stack.enter_context(logging_as(args))
         shown = args.time.virtual and args.view
         # Before the mission's module is imported: that may join a network.
         if args.start_robot or shown:
@@ -193,12 +228,12 @@ def _run(args: argparse.Namespace) -> int:
 def _use_own_network(args: argparse.Namespace, stack: contextlib.ExitStack) -> None:
     """Give a run with its own robots a domain of its own, unless one was chosen."""
     from actionlib_core.node import has_node
-    from actionlib_core.private_network import network_is_chosen, private_network
+    from actionlib_core.wire.private_network import network_is_chosen, private_network
 
     alone = args.time.virtual and not args.view
     if not (args.share or alone or network_is_chosen() or has_node()):
         domain = stack.enter_context(private_network())
-        print(f"network of this run: SMACHPY_DOMAIN={domain}", file=sys.stderr)
+        print(f"network of this run: SMACHPY_DOMAIN={domain:d}", file=sys.stderr)
 
 
 def _brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Text]) -> bool:
@@ -217,8 +252,8 @@ def _brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Te
 def _run_mission(
     args: argparse.Namespace, events: TextIO | None, stack: contextlib.ExitStack
 ) -> int:
+    from smachpy.command.mission_run import run_mission
     from smachpy.command.ros1 import run_ros1
-    from smachpy.command.runner import run_mission
     from smachpy.command.targets import load_target
 
     ros1 = options_of(args)
@@ -228,16 +263,24 @@ def _run_mission(
         robot = stack.enter_context(ros1_robot(args))
     if ros1 is not None:
         if args.input:
-            raise MissionError("--input: got it beside --ros1; expected --params FILE.")
+            raise MissionError("--input: got --ros1 beside it; expected --params FILE.")
         return run_ros1(args.target, ros1, _options(args, {}, None, events), robot)
-    target = load_target(args.target)
+    target = load_target(args.target, allow=args.allow)
+    if args.queued:
+        from smachpy.command.queued import check_is_mission
+
+        check_is_mission(target)
     if wants_help(args.words):
         print(usage(target))
         return 0
     inputs = read_inputs(args.input)
     if _brings_robots(target, args.words, inputs):
         _use_own_network(args, stack)
-    return run_mission(target, _options(args, inputs, mission_info(target.thing).world, events))
+    origin = _origin(args, target, inputs)
+    if args.record is not None or args.view:
+        random.seed(origin["seed"])  # a mission that throws dice throws the same ones again
+    world = mission_info(target.thing).world
+    return run_mission(target, _options(args, inputs, world, events, origin))
 
 
 def _options(
@@ -245,8 +288,9 @@ def _options(
     inputs: Mapping[str, Text],
     world: Path | None,
     events: TextIO | None,
+    origin: Mapping[str, Any] = MappingProxyType({}),
 ) -> RunOptions:
-    from smachpy.command.runner import RunOptions
+    from smachpy.command.mission_run import RunOptions
     from smachpy.command.watching import Watching
 
     return RunOptions(
@@ -257,6 +301,7 @@ def _options(
         names=args.names,
         namespace=check_name(args.robot, "robot name") if args.robot else "",
         out=args.out,
+        bag=args.bag,
         plain=args.plain,
         events=events,
         success=tuple(args.success),
@@ -265,14 +310,45 @@ def _options(
         durable=durable_options(args),
         watching=Watching(
             record=args.record,
+            inputs=args.record_inputs,
+            origin=origin,
             view=args.view,
             view_for=args.view_for,
             port=args.port,
             control=args.control,
             journal=args.durable,
+            allow=_allowed(args),
             alone=args.time.virtual,
         ),
     )
+
+
+def _origin(args: argparse.Namespace, target: Target, inputs: Mapping[str, Text]) -> dict[str, Any]:
+    """Return how to begin this mission again, for recordings: without secrets."""
+    from smachpy.command.durable import whole_target
+
+    has_secret = any(
+        is_secret_name(name) or Secret.__name__ in str(parameter.hint)
+        for name, parameter in parameters_of(target.thing).items()
+    )
+    return {
+        "target": whole_target(args.target),
+        "folder": str(Path.cwd()),
+        "words": [MASK for _ in args.words] if has_secret else list(args.words),
+        "inputs": {key: str(masked(value, key)) for key, value in inputs.items()},
+        "names": [f"{rule.old}:={rule.new}" for rule in args.names.rules],
+        "robot": args.robot,
+        "time": str(args.time),
+        "seed": secrets.randbits(32),
+    }
+
+
+def _allowed(args: argparse.Namespace) -> tuple[str, ...]:
+    """Return the places whose missions the page of this run may resume: it runs one itself."""
+    from smachpy.command.durable import whole_target
+
+    place, _, attribute = whole_target(args.target).partition(":")
+    return (*args.allow, place) if attribute or "/" in place else tuple(args.allow)
 
 
 def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
@@ -282,7 +358,7 @@ def _robot(args: argparse.Namespace, world: Path | None) -> RobotOptions:
     said = args.pose or args.map != OFFICE_MAP or args.config != OFFICE_ROBOT
     if args.world is not None and said:
         raise MissionError(
-            "--world: got it beside --map, --config or --pose; expected it alone: the file says "
+            "--world: got --map, --config or --pose beside it; expected it alone, as the file says "
             "all of that."
         )
     pose = tuple(args.pose or ())

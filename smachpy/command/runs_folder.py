@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import os
 import re
+import tempfile
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from smachpy import log
+from actionlib_core.process.private_files import make_private_folder
+from smachpy.base import log
 from smachpy.events.recording import run_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 VARIABLE: Final = "SMACHPY_RUNS"
-KEPT: Final = 100
+MAX_KEPT_RECORDINGS: Final = 100
 """The number of files kept; only files with names of `new_file` are ever removed."""
 
 _NAME = re.compile(r".+-\d{8}-\d{6}-\d+\.jsonl")
@@ -24,12 +26,21 @@ _NAME = re.compile(r".+-\d{8}-\d{6}-\d+\.jsonl")
 def runs_folder(environment: Mapping[str, str] = os.environ) -> Path:
     """Return the folder: `SMACHPY_RUNS`, else `smachpy/runs` in the user's folder for state.
 
+    A user without a home, as of a container that runs as any number, has one among the temporary
+    files.
+
     Sources: the XDG base directory specification names `XDG_STATE_HOME`, else `~/.local/state`.
     """
     if environment.get(VARIABLE):
         return Path(environment[VARIABLE]).expanduser()
     state = environment.get("XDG_STATE_HOME") or "~/.local/state"
-    return Path(state).expanduser() / "smachpy" / "runs"
+    try:
+        return Path(state).expanduser() / "smachpy" / "runs"
+    except RuntimeError:
+        own = Path(tempfile.gettempdir()) / f"smachpy-{os.getuid()}"
+        if own.exists() and own.stat().st_uid != os.getuid():  # somebody else could read in it
+            own = Path(tempfile.mkdtemp(prefix="smachpy-"))
+        return own / "runs"
 
 
 def new_file(mission: str, stamp_ns: int, run: str = "") -> Path | None:
@@ -46,13 +57,13 @@ def new_file(mission: str, stamp_ns: int, run: str = "") -> Path | None:
     """
     folder = runs_folder()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_private_folder(folder)
         ours = [path for path in folder.iterdir() if _NAME.fullmatch(path.name)]
         known = next((path for path in ours if run and run_of(path) == run), None)
         if known is not None:
             return known
         ours.sort(key=lambda path: path.stat().st_mtime)
-        for path in ours[: max(0, len(ours) - KEPT + 1)]:
+        for path in ours[: max(0, len(ours) - MAX_KEPT_RECORDINGS + 1)]:
             path.unlink(missing_ok=True)
         if not os.access(folder, os.W_OK):
             raise PermissionError(13, "no permission to write")

@@ -12,13 +12,14 @@ from actionlib_core import shutdown
 from actionlib_core.clock import current_clock, use_clock
 from actionlib_core.config import ROS2_VARIABLE
 from actionlib_core.exceptions import NodeError
+from actionlib_core.inputs.suggest import nearest
 from actionlib_core.node import Node, get_node, init, use_node
-from actionlib_core.output import tell
-from actionlib_core.suggest import nearest
+from actionlib_core.process.output import tell
+from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.ports import is_on_ros2, watch_for_server
-from actionlib_core.wire.presence import Kind, list_endpoints
+from actionlib_core.wire.presence import list_endpoints
+from smachpy.command.robot_process import RobotProcess
 from smachpy.exceptions import MissionError
-from smachpy.sim.robot_process import RobotProcess
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -27,14 +28,17 @@ if TYPE_CHECKING:
     from actionlib_core.names import NameArguments
     from actionlib_core.transport import Closable, Transport
     from smachpy.machines.container import Container
-    from smachpy.sim.geometry import Pose2D
-    from smachpy.sim.occupancy import OccupancyMap
+    from smachpy.places.occupancy import OccupancyMap
+    from smachpy.places.pose import Pose2D
     from smachpy.sim.world_file import WorldSpec
 
-ROBOT_ACTIONS: Final = frozenset({"move_base", "charge"})
-"""The actions of the simulated robot, by the last part of their name."""
+ROBOT_ACTIONS: Final = {
+    "move_base": "move_base_msgs/MoveBaseAction",
+    "charge": "mission_msgs/ChargeAction",
+}
+"""The actions of the simulated robot: the last part of their name, and their type."""
 
-MOST_NAMED: Final = 3
+MAX_NAMED_SERVERS: Final = 3
 """The most names that an error suggests."""
 
 _NUMBERED = re.compile(r"robot_(\d{1,2})")
@@ -116,8 +120,8 @@ class RobotOptions:
         Raises:
             InputFileError: a file has problems.
         """
-        from smachpy.sim.config import load_config
-        from smachpy.sim.occupancy import load_map
+        from smachpy.places.occupancy import load_map
+        from smachpy.places.robot_file import load_config
 
         if self.world is None:
             return load_map(self.map), load_config(self.config).dock
@@ -143,6 +147,15 @@ class RobotOptions:
         if name not in names:
             raise MissionError(f"--robot: got {name!r}; expected one of {names}, of {self.world}.")
         return name
+
+    def names_robots(self, needed: Mapping[str, str]) -> bool:
+        """Return whether a mission's own names say which robots of the world it drives."""
+        if self.world is None:
+            return False
+        from smachpy.sim.world_file import load_world
+
+        prefixes = _prefixes(needed)
+        return bool(prefixes) and prefixes <= {r.name for r in load_world(self.world).robots}
 
 
 class Surroundings(Protocol):
@@ -213,15 +226,16 @@ def open_surroundings(
         MissionError: names are to be remapped, but the mission's module has already made its node;
             or the world file has problems, or has no such robot.
     """
+    said = bool(namespace)
     if pace.virtual or robot.start:
         namespace = robot.choose_robot(namespace)
     if pace.virtual:
-        with _open_virtual(pace, robot, names, namespace) as surroundings:
+        with _open_virtual(pace, robot, names, namespace, said=said) as surroundings:
             yield surroundings
         return
     if names.rules or namespace:
         _name_node(names, namespace)
-    real = _Network(robot)
+    real = _Network(robot, said=said)
     try:
         yield real
     finally:
@@ -249,14 +263,16 @@ def _name_node(names: NameArguments, namespace: str) -> None:
 class _Network:
     """The configured network; the robot runs in a process of its own."""
 
-    def __init__(self, robot: RobotOptions) -> None:
+    def __init__(self, robot: RobotOptions, *, said: bool) -> None:
         self._options = robot
+        self._said = said
         self._robot: RobotProcess | None = None
         self._wait: ServerWait | None = None
         self._forget: Callable[[], None] = lambda: None
 
     def start(self, machine: Container, needed: Mapping[str, str]) -> None:
         if self._options.start:
+            _leave_names(self._options, needed, said=self._said)
             refuse_ros2(needed)
         self._wait = ServerWait(needed)
         self._forget = shutdown.on_shutdown(self._wait.wake)
@@ -289,17 +305,22 @@ class _Network:
     def wait(self, timeout: float) -> bool:
         assert self._wait is not None
         missing = self._wait.wait(timeout, self._robot)
-        if missing and get_node().config.ros2 and self._wait.found:
-            tell("smachpy", f"{missing_on_robot(missing, timeout)} The mission runs without.")
-        elif missing:
-            there = list_endpoints(get_node().transport, kind=Kind.ACTION_SERVER)
-            text = missing_text(missing, {end.name for end in there}, timeout)
-            if get_node().config.ros2:
-                text = f"{missing_on_robot(missing, timeout)} Try: smachpy doctor --ros2"
-            elif self._options.ros1:
-                text = missing_on_ros1_robot(missing, timeout, self._options.ros1)
-            raise MissionError(text)
+        if missing:
+            text, way_out = self._explain(missing, timeout)
+            # A real robot may lack what the mission needs only in some cases.
+            if not ((get_node().config.ros2 or self._options.ros1) and self._wait.found):
+                raise MissionError(f"{text}{way_out}")
+            tell("smachpy", f"{text} The mission runs without.")
         return not shutdown.requested()
+
+    def _explain(self, missing: Mapping[str, str], timeout: float) -> tuple[str, str]:
+        """Return the error for actions without a server, and what more to try."""
+        if get_node().config.ros2:
+            return missing_on_robot(missing, timeout), " Try: smachpy doctor --ros2"
+        if self._options.ros1:
+            return missing_on_ros1_robot(missing, timeout, self._options.ros1), ""
+        there = list_endpoints(get_node().transport, kind=Kind.ACTION_SERVER)
+        return missing_text(missing, {end.name for end in there}, timeout), ""
 
     def over(self) -> None:
         if self._robot is not None:
@@ -316,6 +337,31 @@ class _Network:
             self._robot.stop()
 
 
+def _leave_names(robot: RobotOptions, needed: Mapping[str, str], *, said: bool) -> None:
+    """Take the names of a mission as they are if they say which robots of the world it drives.
+
+    Without --robot a mission's names are those of the first robot of a world, which must be known
+    before the mission is built; what it calls is known only then.
+    """
+    if not said and robot.names_robots(needed):
+        node = get_node()
+        node.rename(node.name, namespace="")
+
+
+def is_of_robot(name: str, type_name: str) -> bool:
+    """Return whether an action is one that the simulated robot serves."""
+    return ROBOT_ACTIONS.get(name.rpartition("/")[2]) == type_name
+
+
+def _prefixes(needed: Mapping[str, str]) -> set[str]:
+    """Return what stands before the names of the robots' actions."""
+    return {
+        name.strip("/").rpartition("/")[0]
+        for name, type_name in needed.items()
+        if is_of_robot(name, type_name)
+    }
+
+
 def _robots_of(needed: Mapping[str, str]) -> tuple[str, int]:
     """Return the robots whose actions a mission calls: a prefix and their number.
 
@@ -324,11 +370,7 @@ def _robots_of(needed: Mapping[str, str]) -> tuple[str, int]:
     Raises:
         MissionError: there are several, with other names.
     """
-    prefixes = {
-        name.strip("/").rpartition("/")[0]
-        for name in needed
-        if name.rpartition("/")[2] in ROBOT_ACTIONS
-    }
+    prefixes = _prefixes(needed)
     if len(prefixes) < 2:  # noqa: PLR2004  one, or none
         return (prefixes.pop() if prefixes else ""), 1
     matches = [_NUMBERED.fullmatch(prefix) for prefix in prefixes]
@@ -355,10 +397,10 @@ def refuse_ros2(needed: Mapping[str, str]) -> None:
         if is_on_ros2(node, full := node.resolve(name, "action name"), type_name)
     ]
     if there:
-        what, be = ("action", "is") if len(there) == 1 else ("actions", "are")
+        what = "action" if len(there) == 1 else "actions"
         raise MissionError(
-            f"--start-robot: {what} {', '.join(there)} {be} on the ROS 2 robot that "
-            f"{ROS2_VARIABLE} or the configuration names; expected the simulated robot. Try "
+            f"--start-robot: goals of {what} {', '.join(there)} would be sent to the ROS 2 robot "
+            f"that {ROS2_VARIABLE} or the configuration names; expected the simulated robot. Try "
             f"without --start-robot, or without {ROS2_VARIABLE}."
         )
 
@@ -490,7 +532,7 @@ def _close_names(name: str, there: Collection[str]) -> list[str]:
     """Return names that may be meant by `name`: the same action elsewhere, or a similar one."""
     word = name.rpartition("/")[2]
     same = sorted(other for other in there if other.rpartition("/")[2] == word)
-    return same[:MOST_NAMED] or nearest(name, there)
+    return same[:MAX_NAMED_SERVERS] or nearest(name, there)
 
 
 # -- virtual time ----------------------------------------------------------------------------------
@@ -498,7 +540,7 @@ def _close_names(name: str, there: Collection[str]) -> list[str]:
 
 @contextlib.contextmanager
 def _open_virtual(
-    pace: Pace, robot: RobotOptions, names: NameArguments, namespace: str
+    pace: Pace, robot: RobotOptions, names: NameArguments, namespace: str, *, said: bool
 ) -> Iterator[_VirtualNetwork]:
     from actionlib_core.clock import VirtualClock
     from actionlib_core.transport.memory import MemoryNetwork
@@ -513,7 +555,7 @@ def _open_virtual(
             arguments=names,
         )
         with node, use_node(node):
-            surroundings = _VirtualNetwork(pace, robot, network.session)
+            surroundings = _VirtualNetwork(pace, robot, network.session, said=said)
             try:
                 yield surroundings
             finally:
@@ -523,8 +565,11 @@ def _open_virtual(
 class _VirtualNetwork:
     """A network in memory, with the robot in this process and nobody else."""
 
-    def __init__(self, pace: Pace, robot: RobotOptions, session: Callable[[], Transport]) -> None:
+    def __init__(
+        self, pace: Pace, robot: RobotOptions, session: Callable[[], Transport], *, said: bool
+    ) -> None:
         self._pace = pace
+        self._said = said
         self._options = robot
         self._session = session
         self._needed: Mapping[str, str] = {}
@@ -532,14 +577,16 @@ class _VirtualNetwork:
 
     def start(self, machine: Container, needed: Mapping[str, str]) -> None:
         del machine
-        others = {name for name in needed if name.rpartition("/")[2] not in ROBOT_ACTIONS}
+        others = {name: kind for name, kind in needed.items() if not is_of_robot(name, kind)}
         if others:
+            called = ", ".join(f"{name} ({kind})" for name, kind in sorted(others.items()))
             raise MissionError(
-                f"--time {self._pace}: the mission calls {sorted(others)}, which nobody in this "
+                f"--time {self._pace}: the mission calls {called}, which nobody in this "
                 "process serves; expected a mission that needs the simulated robot only. Try "
                 "--time real."
             )
         self._needed = needed
+        _leave_names(self._options, needed, said=self._said)
         if self._options.world is not None:
             self._put_world(self._options.world)
         elif needed or self._options.start:

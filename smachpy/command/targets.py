@@ -2,37 +2,44 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import importlib
 import importlib.util
 import inspect
 import sys
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.suggest import did_you_mean
-from smachpy.command.extras import advice, clash, hidden_by
+from actionlib_core.inputs.suggest import did_you_mean
+from smachpy.command.extras import advice
+from smachpy.engine.stack_text import trace_of
 from smachpy.exceptions import SmachError, error_text
 from smachpy.machines.container import Container
-from smachpy.mission_info import is_mission, mission
-from smachpy.run.stack_text import trace_of
+from smachpy.machines.mission_info import is_mission, mission, mission_info
+from smachpy.machines.state import set_options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from types import ModuleType
+    from collections.abc import Iterator, Sequence
+    from types import CodeType, ModuleType
 
 GROUP = "smachpy.missions"
 DEFAULT_NAMES = ("mission", "machine", "sm")
 PLANS = (".pnml", ".plan", ".pddlout")
+MISSION_FILES = (".yaml", ".yml")
 # A script that calls `sys.exit()` would end the command, with 0 as if the mission had succeeded.
 _FAILURES = (Exception, SystemExit)
 
 
 class TargetError(SmachError):
     """The named mission, module or file cannot be loaded.
+
+    Try: `smachpy list` shows the missions; a file or module is named as `FILE.py:FUNCTION`.
 
     Attributes:
         target: The user's text.
@@ -53,12 +60,15 @@ class Target:
         name: Its name in messages and file names.
         source: Where it was found, `module:attribute`.
         summary: First line of its docstring.
+        shown_name: Its name for viewers and of recordings, as two machines of one file need two
+            names; "" for `name`.
     """
 
     name: str
     source: str
     summary: str
     thing: Any
+    shown_name: str = ""
 
     def build(self, /, **arguments: object) -> Container:
         """Return the machine; a factory is called with `arguments`.
@@ -91,6 +101,9 @@ class Target:
             raise TargetError(
                 self.name, f"{self.source} returned {machine!r}; expected a state machine.{hint}"
             )
+        success = mission_info(self.thing).success
+        if success is not None:
+            set_options(machine, success=success)
         return machine
 
     def _check_arguments(self, arguments: dict[str, object]) -> None:
@@ -119,20 +132,27 @@ class Target:
 def list_missions() -> dict[str, str]:
     """Return the missions of all installed packages: name -> summary, in one line.
 
-    They are the entry points `smachpy.missions`. If one cannot be loaded, its line says why.
+    They are the entry points `smachpy.missions`. If one cannot be loaded, or if the simulated robot
+    that it drives is not installed, its line says so, with what installs that.
     """
     lines = {}
+    no_robot = importlib.util.find_spec("scipy") is None
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
-        hidden = hidden_by(point.module)
         try:
-            lines[point.name] = (
-                f"not available: hidden by {str(hidden)!r}"
-                if hidden is not None
-                else _load_mission(point.name).summary
-            )
+            mission = _load_mission(point.name)
+            lines[point.name] = mission.summary
+            if no_robot and _drives(mission.thing):
+                lines[point.name] += " Its simulated robot: pip install 'smachpy[sim]'"
         except TargetError as error:
             lines[point.name] = f"not available: {error.problem.splitlines()[0]}"
     return lines
+
+
+def _drives(mission: Any) -> bool:
+    """Return whether a mission's module uses what the simulated robot offers."""
+    names = vars(sys.modules[mission.__module__]) if hasattr(mission, "__module__") else {}
+    offered = ("drive_to", "MoveBaseAction", "goal_at", "ChargeAction")
+    return mission_info(mission).world is not None or any(name in names for name in offered)
 
 
 def list_plans(folder: Path) -> dict[str, str]:
@@ -151,7 +171,9 @@ def list_plans(folder: Path) -> dict[str, str]:
     try:
         files = sorted(path for path in folder.iterdir() if path.suffix in PLANS)
     except OSError as error:
-        raise TargetError(str(folder), f"got {error.strerror}; expected a folder.") from error
+        raise TargetError(
+            str(folder), f"got no list of its files ({error.strerror}); expected a folder."
+        ) from error
     for path in files:
         try:
             plan = understand(read_net(path)[0])
@@ -163,32 +185,45 @@ def list_plans(folder: Path) -> dict[str, str]:
     return lines
 
 
-def load_target(text: str) -> Target:
+def load_target(text: str, *, imports: bool = True, allow: Sequence[str] | None = None) -> Target:
     """Load the machine that a user names.
 
     Args:
-        text: A mission's name (`patrol`), `module:factory`, or `path.py[:factory]`. Without
-            `:factory` it is the file's `mission`, `machine` or `sm`, else its only function with
-            `@smachpy.mission`, else its only machine. Or a Petri net plan, `path.pnml` (.plan,
-            .pddlout), with its actions and conditions in STEM.actions.yaml or actions.yaml beside
-            it.
+        text: A mission's name (`patrol`), `module[:factory]`, or `path.py[:factory]`; a module
+            without a factory has a dot in its name. A file of a package is imported as a module of
+            it. Without `:factory` it is the file's `mission`, `machine` or `sm`, else its only
+            function with `@smachpy.mission`, else its only machine. Or a Petri net plan,
+            `path.pnml` (.plan, .pddlout), with its actions and conditions in STEM.actions.yaml or
+            actions.yaml beside it.
+            Or a mission file, `path.yaml`.
+        imports: False to import nothing that a plan or a mission file names: it is only looked at.
+        allow: Packages of which a mission file may name code, besides its own folder; None: no
+            others, and with `imports=False` any.
 
     Raises:
         TargetError: there is no such target; the nearest names are listed.
     """
     if text.endswith(PLANS):
-        return _plan_target(text)
+        return _plan_target(text, imports)
+    if text.endswith(MISSION_FILES):
+        return _mission_file(text, imports, allow)
     place, _, attribute = text.partition(":")
     if place.endswith(".py") or "/" in place:
-        return _from_module(text, _import_file(text, Path(place)), attribute, Path(place).stem)
+        path = Path(place)
+        _check_source(text, path, attribute)
+        target = _from_module(text, _import_file(text, path), attribute, path.stem)
+        is_plain = attribute in {*DEFAULT_NAMES, "", path.stem}
+        return target if is_plain else replace(target, shown_name=f"{path.stem}_{attribute}")
     if attribute:
         return _from_module(text, _import_module(text, place), attribute, attribute)
-    if place in _mission_names():
+    if place in mission_names():
         return _load_mission(place)
-    raise TargetError(text, f"no such mission; {_suggest(place, _mission_names())}")
+    if "." in place and _is_module(place):
+        return _from_module(text, _import_module(text, place), "", place.rpartition(".")[2])
+    raise TargetError(text, f"no such mission; {_suggest(place, mission_names())}")
 
 
-def _plan_target(text: str) -> Target:
+def _plan_target(text: str, imports: bool) -> Target:
     from smachpy.pnp.files import load_plan
 
     path = Path(text)
@@ -199,12 +234,44 @@ def _plan_target(text: str) -> Target:
 
     def plan() -> Container:
         """Run a Petri net plan."""
-        return load_plan(path, to_run=False)
+        return load_plan(path, to_run=False, imports=imports)
 
     return Target(path.name.partition(".")[0], text, "a Petri net plan", plan)
 
 
-def _mission_names() -> list[str]:
+def _mission_file(text: str, imports: bool, allow: Sequence[str] | None) -> Target:
+    from smachpy.files import MissionFileError, load, read, resolve
+    from smachpy.files.reading import signature
+
+    path = Path(text)
+    if not path.is_file():
+        near = [str(p) for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+        raise TargetError(text, f"no file {text!r}; {_suggest(text, near)}")
+    try:
+        about, parameters = read(path)
+    except MissionFileError:
+        load(path, to_run=False)  # has all problems of the file, not only those of its parameters
+        raise
+
+    def mission(**arguments: Any) -> Container:
+        to_run = imports or allow is not None
+        machine = load(path, allow=allow or (), to_run=to_run, **arguments)
+        return resolve(machine) if imports else machine
+
+    mission.__signature__ = signature(parameters)  # type: ignore[attr-defined]
+    mission.__annotations__ = {
+        name: one.annotation for name, one in inspect.signature(mission).parameters.items()
+    }
+    described = [
+        f"    {one.name}: {one.help or one.type}{one.unit and f' [{one.unit}]'}."
+        for one in parameters
+    ]
+    mission.__doc__ = "\n".join([about or "A mission file.", "", "Args:", *described])
+    return Target(path.stem, text, (about or "a mission file").splitlines()[0], mission)
+
+
+def mission_names() -> list[str]:
+    """Return the names of the installed missions."""
     return sorted(point.name for point in entry_points(group=GROUP))
 
 
@@ -229,9 +296,18 @@ def _load_mission(name: str) -> Target:
 def _import_file(text: str, path: Path) -> ModuleType:
     if not path.is_file():
         near = sorted(str(p) for p in path.parent.glob("*.py") if p.is_file())
+        shipped = path.stem in mission_names()
+        if shipped or not near:
+            ways = [f"{path.stem!r} without .py, which is installed"] if shipped else []
+            ways.append(f"'smachpy new {f'--from {path.stem}' if shipped else path.stem}'")
+            raise TargetError(text, f"no file {str(path)!r}. Try {', or '.join(ways)}.")
         raise TargetError(text, f"no file {str(path)!r}; {_suggest(str(path), near)}")
+    module = _in_package(text, path)
+    if module is not None:
+        return module
     name = _free_name(path.stem)
-    spec = importlib.util.spec_from_file_location(name, path)
+    loader = _UncachedLoader(name, str(path.absolute())) if path.suffix == ".py" else None
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     if spec is None or spec.loader is None:
         raise TargetError(
             text, f"{str(path)!r} is not a Python file; expected a name ending in .py"
@@ -243,13 +319,93 @@ def _import_file(text: str, path: Path) -> ModuleType:
             spec.loader.exec_module(module)
     except _FAILURES as error:
         sys.modules.pop(name, None)  # it was executed only in part
-        why = clash(error, [path.parent]) if isinstance(error, ImportError) else None
-        why = why or _ros1_text(error)
-        why = why or f"running the file raised {raised_text(error)}"
+        why = _ros1_text(error) or f"running the file raised {raised_text(error)}"
         if isinstance(error, SystemExit):
             why += "\n    Try `if __name__ == '__main__':` before what is not to run here."
         raise TargetError(text, why) from error
     return module
+
+
+class _UncachedLoader(SourceFileLoader):
+    """Executes the file as it is now.
+
+    Python takes the cached bytecode for a file that has changed within a second, if its length is
+    the same: a mission with another number would do what it did before.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Return the code of the file itself."""
+        path = self.get_filename(fullname)
+        code: CodeType = self.source_to_code(self.get_data(path), path)
+        return code
+
+
+def _check_source(text: str, path: Path, attribute: str) -> None:
+    """Refuse a file that cannot have the machine, before its code is executed.
+
+    Args:
+        text: The user's text.
+        path: The file; one that cannot be read or parsed is left to the import.
+        attribute: The name that is asked for; "" for none.
+
+    Raises:
+        TargetError: the file gives no such name to anything.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the import gives them
+            tree = ast.parse(path.read_bytes())
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+        return
+    names: set[str] = set()
+    for node in ast.walk(tree):  # also inside functions, which may have `global`
+        match node:
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+                names.add(name)
+            case ast.ClassDef(name=name) | ast.Name(id=name, ctx=ast.Store()):
+                names.add(name)
+            case ast.alias(name=name, asname=asname):
+                names.add(asname or name.partition(".")[0])
+            case ast.Name(id="globals" | "vars" | "locals" | "exec" | "setattr"):
+                return
+            case ast.Global(names=given):
+                names.update(given)
+    wanted = attribute.partition(".")[0]
+    if "*" in names or (wanted in names if wanted else names):
+        return
+    what = (
+        f"nothing is called {wanted!r}" if wanted else "which machine is meant? got no name at all"
+    )
+    hint = _suggest(wanted, sorted(name for name in names if not name.startswith("_")))
+    raise TargetError(text, f"{what}; {hint} The file was not executed.")
+
+
+def _in_package(text: str, path: Path) -> ModuleType | None:
+    """Import a file as a module of its package; None if it is in none, or not found by that name.
+
+    Its relative imports and those of the package then work, as with `python -m`.
+    """
+    folder, names = path.resolve().parent, [] if path.stem == "__init__" else [path.stem]
+    while (folder / "__init__.py").is_file() and folder.name.isidentifier():
+        names.insert(0, folder.name)
+        folder = folder.parent
+    if len(names) < 2 or not path.stem.isidentifier():  # noqa: PLR2004  a package and a module
+        return None
+    name = ".".join(names)
+    with _on_python_path(folder):
+        top = importlib.util.find_spec(names[0])
+        if top is None or Path(top.origin or "?").resolve() != folder / names[0] / "__init__.py":
+            return None  # another package has that name
+        return _import_module(text, name)
+
+
+def _is_module(name: str) -> bool:
+    """Return whether a name is one of a module, on the Python path or in this folder."""
+    try:
+        with _on_python_path(Path.cwd()):
+            return importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):
+        return False
 
 
 @contextlib.contextmanager
@@ -265,8 +421,10 @@ def _on_python_path(folder: Path) -> Iterator[None]:
 
 def _ros1_text(error: BaseException) -> str:
     """Return what to try if a file needs the modules of ROS 1; "" if that is not the cause."""
-    from smachpy.ros1.hook import OLD_NAMES
-
+    try:
+        from smachpy.ros1.hook import OLD_NAMES
+    except ModuleNotFoundError:  # installed without what runs such scripts
+        return ""
     name = (getattr(error, "name", None) or "").partition(".")[0]
     if not isinstance(error, ModuleNotFoundError) or not (
         name in OLD_NAMES or importlib.util.find_spec(f"actionlib_core.interfaces.{name}")
@@ -293,14 +451,18 @@ def _import_module(text: str, name: str) -> ModuleType:
         with _on_python_path(here):
             return importlib.import_module(name)
     except ModuleNotFoundError as error:
-        why = clash(error, [here])
+        if error.name is None or not f"{name}.".startswith(f"{error.name}."):
+            raise TargetError(text, _why_not(name, error)) from error
         raise TargetError(
             text,
-            why
-            or f"no module {error.name!r}; expected one on the Python path or in {str(here)!r}.",
+            f"no module {error.name!r}; expected one on the Python path or in {str(here)!r}.",
         ) from error
     except _FAILURES as error:
-        raise TargetError(text, f"importing {name!r} raised {raised_text(error)}") from error
+        raise TargetError(text, _why_not(name, error)) from error
+
+
+def _why_not(name: str, error: BaseException) -> str:
+    return _ros1_text(error) or f"importing {name!r} raised {raised_text(error)}"
 
 
 def _from_module(text: str, module: ModuleType, attribute: str, name: str) -> Target:

@@ -7,12 +7,12 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from smachpy import events as ev
-from smachpy.sim.geometry import Pose2D, yaw_of
+from smachpy.places.pose import Pose2D, yaw_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from smachpy.sim.occupancy import OccupancyMap
+    from smachpy.places.occupancy import OccupancyMap
     from smachpy.sim.track import GoalMark
 
 _SAME_STATE = 3  # a state with more goals than this does not name them

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import RealClock, use_clock
 from actionlib_core.node import Node
-from actionlib_core.output import printable
-from smachpy import IntrospectionServer
+from actionlib_core.process.output import printable
 from smachpy.command import runs_folder
 from smachpy.command.extras import load_view
+from smachpy.durable.store import for_child
 from smachpy.events.recording import Recorder
 from smachpy.network.robot_topics import RobotTopics
+from smachpy.network.server import IntrospectionServer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from actionlib_core.shutdown import Shutdown
+    from smachpy.events.inputs import Which
     from smachpy.machines.container import Container
 
 
@@ -30,20 +32,26 @@ class Watching:
 
     Attributes:
         record: File to record the run to; None records only viewed runs, in the folder of runs.
+        inputs: Which inputs of the mission the recording has (`smachpy.events.inputs`).
+        origin: How to begin the mission again, for the recording.
         view: Serve the page of the live viewer during the run and after its end.
         view_for: How long after its end [s]; None: until the program is to end.
         port: Port of that page; 0 takes any.
         control: Obey commands of viewers: pause, step, jump and so on.
         journal: Journal of a durable mission, for the page's list of runs.
+        allow: Places of missions that the page may resume, see `smachpy.command.queued`.
         alone: The mission is not on a shared network: only `view` shows it.
     """
 
     record: Path | None = None
+    inputs: Which = "seen"
+    origin: Mapping[str, Any] = field(default_factory=dict)
     view: bool = False
     view_for: float | None = None
     port: int = 8080
     control: bool = False
     journal: str | None = None
+    allow: tuple[str, ...] = ()
     alone: bool = False
 
 
@@ -68,6 +76,14 @@ class Watch:
         if self._viewer is not None and self._viewer.exit_code is not None:
             self._over.set()
 
+    def close(self) -> None:
+        """Complete the recording; a second call does nothing.
+
+        Blocks: 2 s at most.
+        """
+        if self._file is not None:
+            self._file.close()
+
     def linger(self, outcome: str | None, ending: Shutdown) -> None:
         """Complete the recording, say where the run can be viewed, and keep the page for a while.
 
@@ -77,17 +93,18 @@ class Watch:
 
         Blocks: until the time is over, `ending` is requested, or the viewer has ended.
         """
-        if self._file is not None:
-            self._file.close()
+        self.close()
         if self._viewer is None:
             return
         if self._file is not None:
             print(f"recorded: smachpy view {printable(str(self._file.path))}", flush=True)
         if ending.requested() or self._stay == 0 or self._viewer.exit_code is not None:
             return
-        how = "raised an exception" if outcome is None else f"ended: {printable(outcome)}"
+        how = "raised an exception" if outcome is None else f"ended: {outcome}"
         left = "" if self._stay is None else f" for {self._stay:g} s"
-        print(f"{how}; still at {self._viewer.address}{left} (Ctrl-C ends it)", flush=True)
+        print(
+            printable(f"{how}; still at {self._viewer.address}{left} (Ctrl-C ends it)"), flush=True
+        )
         with use_clock(self._clock):  # the mission's virtual clock has stopped by now
             cancel = ending.on_shutdown(self._over.set)
         self.viewer_ended()
@@ -119,7 +136,10 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         if watching.alone and watching.view:
             node = stack.enter_context(Node("mission", clock=RealClock()))
         file = _file(name, machine, watching)
+        begun: list[bool] = []
         if file is not None:
+            if watching.record is None and not file.earlier:
+                stack.callback(_forget_unless, begun, file.path)
             stack.enter_context(file)
             stack.callback(robot.listen(file.observe))
         server = IntrospectionServer(
@@ -137,22 +157,33 @@ def watched(name: str, machine: Container, path: str, watching: Watching) -> Ite
         viewer = None
         if watching.view:
             control = ("--control",) if watching.control and not watching.alone else ()
-            journal = () if watching.journal is None else ("--durable", watching.journal)
+            address, secrets = for_child(watching.journal or "")
+            journal = () if watching.journal is None else (f"--durable={address}",)
+            allow = [f"--allow={place}" for place in watching.allow]
             port = ("--port", str(watching.port))
-            viewer = load_view("viewer")(("--auto-focus", *port, *control, *journal))
+            words = ("--auto-focus", *port, *control, *journal, *allow)
+            viewer = load_view("viewer")(words, environment=secrets)
         watch = Watch(file, viewer, watching.view_for)
         if viewer is not None:
             viewer.on_change = watch.viewer_ended
             stack.enter_context(viewer)
-            print(f"watch it at {viewer.address}", flush=True)
+            print(printable(f"watch it at {viewer.address}"), flush=True)
+        begun.append(True)
         yield watch
+
+
+def _forget_unless(begun: list[bool], recording: Path) -> None:
+    """Remove the recording of a run that did not begin, as its page could not be served."""
+    if not begun:
+        recording.unlink(missing_ok=True)
 
 
 def _file(name: str, machine: Container, watching: Watching) -> Recorder | None:
     """Return the recorder; a durable run that continues goes to the file that it began with."""
-    journal = machine._smachpy.journal
-    run = "" if journal is None else journal.run
+    run = machine._smachpy.live.journal.run
     path = watching.record
     if path is None and watching.view:
         path = runs_folder.new_file(name, RealClock().time_ns(), run)
-    return None if path is None else Recorder(path, machine, run=run)
+    if path is None:
+        return None
+    return Recorder(path, machine, run=run, inputs=watching.inputs, origin=watching.origin)

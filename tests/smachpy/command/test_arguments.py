@@ -339,3 +339,18 @@ def test_the_usage_shows_the_word_that_changes_a_truth_value():
 
     first = usage(target(mission)).splitlines()[0]
     assert first.endswith("-- [--no-start] [--together] --must VALUE")
+
+
+@pytest.mark.parametrize("word", ["__ns:=x", "move_base:=robot_1/move_base", "_speed:=3"])
+def test_a_renaming_behind_the_dashes_is_no_argument(word):
+    def mission(place: str = "") -> None:
+        del place
+
+    target = Target("m", "m.py", "", mission)
+    with pytest.raises(
+        MissionError, match=r"which renames, behind --; expected it before\. Try 'sm"
+    ):
+        read_words(target, [word], {})
+    assert read_words(target, ["--", word], {}) == {"place": word}
+    assert read_words(target, [f"--place={word}"], {}) == {"place": word}
+    assert read_words(target, ["{a: 1, b:=2}"], {}) == {"place": "{a: 1, b:=2}"}

@@ -14,8 +14,9 @@ from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.attachment import answer_to, unpack_attachment
 from actionlib_core.wire.ros2.graph import RosNode, RosType
 from actionlib_core.wire.ros2.names import Kind
-from smachpy.command import main
+from smachpy.command import doctor, main
 from smachpy.command.doctor import look_at
+from smachpy.durable.store import open_store
 from tests.free_port import free_port
 from tests.ros2_server import Ros2Server
 
@@ -67,3 +68,16 @@ def test_no_robot_is_named(capsys, monkeypatch):
     monkeypatch.delenv("SMACHPY_ROS2", raising=False)
     assert main(["doctor"]) == 2
     assert "--ros2" in capsys.readouterr().err
+
+
+def test_the_size_of_a_journal_is_told(tmp_path, monkeypatch, capsys):
+    place = str(tmp_path / "journal.db")
+    open_store(place).close()
+    assert main(["doctor", "--durable", place]) == 0
+    assert capsys.readouterr().out.startswith(f"ok       journal  {place}: 0 missions, ")
+    monkeypatch.setattr(doctor, "LARGE_JOURNAL", 1)
+    assert main(["doctor", "--durable", place, "--json"]) == 0
+    (finding,) = json.loads(capsys.readouterr().out)
+    assert (finding["level"], finding["what"]) == ("note", "journal")
+    assert "missions prune" in finding["way_out"]
+    assert main(["doctor", "--durable", str(tmp_path / "none.db")]) == 2

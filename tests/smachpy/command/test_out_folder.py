@@ -10,8 +10,8 @@ import smachpy
 from smachpy import events as ev
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import RobotOptions
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.pose import Pose2D
 from smachpy.states import goal_at
 
 

@@ -16,7 +16,8 @@ import pytest
 
 from actionlib_core import node
 from smachpy.command import main
-from smachpy.sim.maps import OFFICE_MAP
+from smachpy.places.maps import OFFICE_MAP
+from tests.places import ROOT
 
 pytestmark = pytest.mark.zenoh
 
@@ -248,7 +249,7 @@ def test_a_mission_that_raises_ends_with_1(tmp_path):
 
 @pytest.mark.slow
 def test_two_robots_of_one_name():
-    robot = [sys.executable, "-m", "smachpy.sim"]
+    robot = [sys.executable, "-m", "smachpy", "robot"]
     with running(robot) as first:
         wait_for_line(first, "ready")
         # Of its action, or of its service if the network told of the first robot late.
@@ -361,7 +362,7 @@ def test_names_cannot_be_changed_after_the_mission_s_module_made_its_node(tmp_pa
 def test_list_names_the_missions():
     done = run("list")
     assert done.returncode == 0
-    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     named = [line.split()[0] for line in done.stdout.splitlines() if not line.startswith(" ")]
     assert named == sorted(project["entry-points"]["smachpy.missions"])
 
@@ -390,7 +391,7 @@ def test_what_a_mission_says_of_itself_cannot_write_to_the_terminal(monkeypatch,
 
 def test_the_parameters_of_the_robot_are_listed_and_can_be_read_again(tmp_path):
     from smachpy.command.robot import parameters
-    from smachpy.sim.config import SimConfig, load_config
+    from smachpy.places.robot_file import SimConfig, load_config
 
     path = tmp_path / "all.yaml"
     path.write_text(parameters())

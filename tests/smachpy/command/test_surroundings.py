@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import json
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.config import Config, Ros2
+from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.nav2_msgs.action import Spin
 from actionlib_core.node import Node, use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
+from smachpy import StateMachine
 from smachpy.command import main
 from smachpy.command.surroundings import (
     REAL_TIME,
     Pace,
+    RobotOptions,
+    _Network,
     missing_on_robot,
     missing_text,
     refuse_ros2,
@@ -164,14 +171,76 @@ def test_a_signal_ends_it(nap, capsys, pace, number, code):
     assert "NAP: preempted" in capsys.readouterr().out
 
 
+TWO = """
+import smachpy
+from smachpy.states import Pose2D, drive_to
+
+def mission(one: str = "robot_0/", other: str = "robot_1/"):
+    sm = smachpy.Concurrence(["succeeded", "aborted", "preempted"], "aborted", name="TWO",
+        outcome_map={"succeeded": {"A": "succeeded", "B": "succeeded"}})
+    with sm:
+        sm.add("A", drive_to(Pose2D(8.8, 7.6, 0.0), action=f"{one}move_base"))
+        sm.add("B", drive_to(Pose2D(11.5, 8.0, 0.0), action=f"{other}move_base"))
+    return sm
+"""
+ROOM = """
+robots:
+  - {x: 9.8, y: 7.1, yaw: 1.5708}
+  - {x: 11.0, y: 7.1, yaw: 1.5708}
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "works"),
+    [
+        ([], True),
+        (["--", "/robot_0/", "/robot_1/"], True),
+        (["--", "robot_0/", "robot_7/"], False),  # no robot of this world
+        (["--robot", "robot_1"], False),  # asks for /robot_1/robot_0/move_base
+    ],
+)
+def test_a_mission_names_the_robots_of_a_world_itself(tmp_path, capsys, words, works):
+    (tmp_path / "two.py").write_text(TWO)
+    (tmp_path / "room.yaml").write_text(ROOM)
+    options = ["--time", "virtual", "--plain", "--world", str(tmp_path / "room.yaml")]
+
+    code = main(["run", str(tmp_path / "two.py"), *options, *words])
+
+    shown = capsys.readouterr()
+    assert code == (0 if works else 2)
+    assert ("TWO: succeeded" in shown.out) == works
+    assert ("does not serve under that name" in shown.err) != works
+
+
+@pytest.mark.slow
+def test_it_does_so_in_real_time_too(tmp_path):
+    (tmp_path / "two.py").write_text(TWO)
+    (tmp_path / "room.yaml").write_text(ROOM)
+    words = ["run", "two.py", "--start-robot", "--world", "room.yaml", "--plain"]
+
+    done = subprocess.run(
+        [sys.executable, "-m", "smachpy", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert "TWO: succeeded" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["demo_action.client"], "the mission calls ['demo_action'], which nobody in this process"),
+        (
+            ["demo_action.client"],
+            "the mission calls demo_action (mission_msgs/Demo_actionAction), which nobody in this",
+        ),
         (["fleet"], "mission 'fleet' needs real time: its robots are processes of their own"),
         (["patrol", "move_base:=mb"], "which the simulated robot does not serve under that name"),
-        (["patrol", "--view", "--control"], "--control: got it beside --time virtual"),
-        (["patrol", "--ros2", "tcp/127.0.0.1:1"], "--ros2: got it beside --time virtual"),
+        (["patrol", "--view", "--control"], "--control: got --time virtual beside it"),
+        (["patrol", "--ros2", "tcp/127.0.0.1:1"], "--ros2: got --time virtual beside it"),
         (["patrol", "--robot", "robot 7"], "invalid robot name: ' ' is not allowed"),
         (["patrol", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),
         (["patrol", "--map", "nowhere.yaml"], "nowhere.yaml: got"),
@@ -208,7 +277,7 @@ def test_a_mission_that_plays_in_a_world_finds_its_doors(capsys, tmp_path):
     [
         (["--robot", "robot_9"], "--robot: got 'robot_9'; expected one of ['robot_0']"),
         (["--world", "nowhere.yaml"], "nowhere.yaml: got 'No such file"),
-        (["--world", "x.yaml", "--pose", "1", "2", "0"], "--world: got it beside --map"),
+        (["--world", "x.yaml", "--pose", "1", "2", "0"], "--world: got --map"),
     ],
 )
 def test_a_world_or_robot_that_is_not_there(capsys, arguments, text):
@@ -251,8 +320,8 @@ def test_what_has_no_server_is_named_in_full_with_those_that_may_be_meant(missin
 
 
 @pytest.mark.parametrize(("needed", "names", "there"), [
-    ({"move_base": "move_base_msgs/MoveBaseAction"}, ("**",), "action '/move_base' is on the ROS 2"),
-    ({"go": "nav2_msgs/action/NavigateToPose", "x": "actionlib/TestAction"}, (), "action '/go' is on"),
+    ({"move_base": "move_base_msgs/MoveBaseAction"}, ("**",), "goals of action '/move_base' would be sent to the ROS 2"),
+    ({"go": "nav2_msgs/action/NavigateToPose", "x": "actionlib/TestAction"}, (), "goals of action '/go' would be sent"),
     ({"move_base": "move_base_msgs/MoveBaseAction"}, ("red/**",), ""),
     ({"unknown": "no_msgs/NoneAction"}, ("**",), ""),
 ])  # fmt: skip
@@ -266,6 +335,37 @@ def test_a_started_robot_beside_one_of_ros2_that_would_drive_instead(needed, nam
                 return
             with pytest.raises(MissionError, match=there):
                 refuse_ros2(needed)
+
+
+@pytest.mark.parametrize("robot", ["ROS 1", "ROS 2", "neither"])
+@pytest.mark.parametrize("served", [["spin"], []], ids=["one of two", "none"])
+def test_real_robot_that_lacks_an_action_runs_the_rest_of_the_mission(capsys, robot, served):
+    """A ROS 1 robot was refused, where a ROS 2 robot was warned of only."""
+    with VirtualClock() as clock, use_clock(clock):
+        network, config = MemoryNetwork(clock), Config(ros2=(Ros2(),) if robot == "ROS 2" else ())
+        nodes = [
+            Node(name, transport=network.session(), clock=clock, config=config)
+            for name in ("robot", "mission")
+        ]
+        with nodes[0], nodes[1], use_node(nodes[1]), use_shutdown(Shutdown()):
+            spec, name = (Spin, "nav2_msgs/action/Spin")
+            if robot != "ROS 2":
+                spec, name = msg.TestAction, "actionlib/TestAction"
+            for action in served:
+                SimpleActionServer(action, spec, print, auto_start=True, node=nodes[0])
+            url = "http://robot:11311" if robot == "ROS 1" else ""
+            options = RobotOptions(False, Path(), Path(), ros1=url)
+            surroundings = _Network(options, said=False)
+            surroundings.start(StateMachine(["done"]), {"spin": name, "wave": name})
+            if served and robot != "neither":
+                assert surroundings.wait(5.0)
+                said = capsys.readouterr().err
+                assert "/wave': " in said
+                assert "The mission runs without." in said
+            else:
+                with pytest.raises(MissionError, match="/wave'"):
+                    surroundings.wait(5.0)
+            surroundings.close()
 
 
 def test_action_missing_on_a_ros2_robot_is_told_with_what_is_there():

@@ -200,7 +200,7 @@ def test_a_folder_of_runs_that_cannot_be_written_stops_nothing(run, tmp_path):
 
 def test_the_folder_of_runs_keeps_the_newest_and_what_is_not_its_own(tmp_path, monkeypatch):
     monkeypatch.setenv(runs_folder.VARIABLE, str(tmp_path))
-    for number in range(runs_folder.KEPT + 3):
+    for number in range(runs_folder.MAX_KEPT_RECORDINGS + 3):
         path = tmp_path / f"nap-20260101-000000-{number}.jsonl"
         path.write_text("")
         os.utime(path, (number, number))
@@ -209,10 +209,10 @@ def test_the_folder_of_runs_keeps_the_newest_and_what_is_not_its_own(tmp_path, m
     assert new.parent == tmp_path
     assert new.name.startswith(".._a_b-2023111")
     left = {path.name for path in tmp_path.iterdir()}
-    assert len(left) == runs_folder.KEPT  # with mine, and room for the new one
+    assert len(left) == runs_folder.MAX_KEPT_RECORDINGS  # with mine, and room for the new one
     assert "mine.jsonl" in left
     assert "nap-20260101-000000-3.jsonl" not in left
-    assert f"nap-20260101-000000-{runs_folder.KEPT + 2}.jsonl" in left
+    assert f"nap-20260101-000000-{runs_folder.MAX_KEPT_RECORDINGS + 2}.jsonl" in left
 
 
 def test_the_folder_of_runs_goes_by_the_environment():
@@ -228,3 +228,16 @@ def test_a_run_is_not_overwritten_and_a_port_may_be_taken(run, tmp_path):
     assert "the file exists" in process.stdout.read()
     assert process.wait(60) == 2
     assert file.read_text() == "mine"
+
+
+def test_a_user_without_a_home_has_a_folder_for_runs(monkeypatch, tmp_path):
+    """`--view` and `smachpy view` ended with a traceback."""
+
+    def homeless(_self):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "expanduser", homeless)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    folder = runs_folder.runs_folder({})
+    assert folder.parent.parent == tmp_path
+    assert str(os.getuid()) in folder.parent.name

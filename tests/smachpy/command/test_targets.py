@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
@@ -79,16 +80,35 @@ def test_a_file_gives_its_mission(file, text):
     assert machine.execute() == "done"
 
 
+def test_a_file_that_changes_within_a_second_is_read_anew(tmp_path, monkeypatch):
+    """Python took its cached bytecode: a mission with another limit did as before."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    path = tmp_path / "limit.py"
+    for speed in ("1.0", "2.0"):
+        path.write_text(FILE.replace("1.0", speed))
+        os.utime(path, (1_000_000_000, 1_000_000_000))
+        assert load_target(str(path)).build().userdata.speed == float(speed)
+
+
 def test_the_only_marked_function_of_a_file_is_its_mission(tmp_path):
     path = tmp_path / "marked.py"
     marked = "@smachpy.mission\ndef {}():\n    return smachpy.StateMachine(['ok'])\n"
     path.write_text(
-        "import smachpy\nfrom missions.course.countdown import countdown\n" + marked.format("main")
+        "import smachpy\nfrom smachpy_missions.course.countdown import countdown\n"
+        + marked.format("main")
     )
     assert load_target(str(path)).thing.__name__ == "main"
     path.write_text(path.read_text() + marked.format("other"))
     with pytest.raises(TargetError, match="which machine is meant"):
         load_target(str(path))
+
+
+def test_two_machines_of_one_file_have_two_names_for_viewers(file):
+    file.write_text(FILE + "\ndef make_other():\n    return mission()\n")
+    named = load_target(f"{file}:make_other")
+    assert (named.name, named.shown_name) == (file.stem, f"{file.stem}_make_other")
+    for plain in (str(file), f"{file}:mission"):
+        assert load_target(plain).shown_name == ""
 
 
 def test_a_module_gives_the_named_factory(file):
@@ -284,7 +304,7 @@ def test_a_file_may_change_the_folder_and_the_python_path(file, monkeypatch, lin
 
 def test_a_folder_is_not_suggested_as_a_file(tmp_path):
     (tmp_path / "drive.py").mkdir()
-    with pytest.raises(TargetError, match=r"no file .*; expected one of \[\]\.$"):
+    with pytest.raises(TargetError, match=r"no file .*drive\.py'\. Try 'smachpy new drive'\.\n"):
         load_target(str(tmp_path / "drive.py"))
 
 
@@ -329,3 +349,58 @@ def test_two_packages_with_a_mission_of_one_name(monkeypatch):
     assert list_missions()["mine"].startswith("not available: ")
     _install(monkeypatch, one, one)  # the same package, found twice on the Python path
     assert load_target("mine").summary == "Say hello."
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Write a package with a module that holds a mission; return a function that does."""
+    monkeypatch.chdir(tmp_path)
+    before = set(sys.modules)
+
+    def write(line, name="my_robot"):
+        inner = tmp_path / "src" / name / "wards"
+        inner.mkdir(parents=True, exist_ok=True)
+        (inner / "__init__.py").touch()
+        (inner.parent / "__init__.py").touch()
+        (inner.parent / "places.py").write_text("WARD = 'A'\n")
+        file = inner / "hospital.py"
+        file.write_text(f"{line}\n{FILE}")
+        return file
+
+    yield write
+    for module in set(sys.modules) - before:
+        del sys.modules[module]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["from ..places import WARD", "from my_robot.places import WARD", "import my_robot.places"],
+)
+def test_a_file_of_a_package_is_a_module_of_it(package, line):
+    path = package(line)
+    assert list(load_target(str(path)).build().get_children()) == ["GO"]
+    assert load_target(f"{path}:mission").source == "my_robot.wards.hospital:mission"
+
+
+def test_a_module_with_a_dot_needs_no_function(package, monkeypatch, tmp_path):
+    package("from ..places import WARD")
+    monkeypatch.chdir(tmp_path / "src")
+    assert load_target("my_robot.wards.hospital").name == "hospital"
+    with pytest.raises(TargetError, match="no such mission; expected one of"):
+        load_target("my_robot.wards.hospitals")
+
+
+def test_a_file_of_a_package_whose_name_is_taken_is_run_as_a_file(package):
+    path = package("", name="json")
+    assert load_target(str(path)).source == "hospital:mission"
+
+
+def test_a_module_that_lacks_another_one_says_which(package):
+    path = package("import nobody_has_this")
+    with pytest.raises(
+        TargetError, match=r"importing 'my_robot\.wards\.hospital' raised .*nobody_has"
+    ):
+        load_target(str(path))
+    path.write_text("import rospy\n")
+    with pytest.raises(TargetError, match=r"(?s)'rospy' is a module of ROS 1.*--ros1"):
+        load_target(str(path))

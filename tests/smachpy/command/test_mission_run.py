@@ -8,11 +8,17 @@ import pytest
 import smachpy
 from smachpy import events as ev
 from smachpy.command.arguments import Text
-from smachpy.command.runner import RunOptions, build, good_outcomes, needed_servers
+from smachpy.command.mission_run import (
+    RunOptions,
+    build,
+    driven_robot,
+    good_outcomes,
+    needed_servers,
+)
 from smachpy.command.targets import Target
 from smachpy.command.track_recorder import TrackRecorder
 from smachpy.exceptions import MissionError
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.pose import Pose2D
 from smachpy.states import Waypoint, goal_at
 
 
@@ -125,14 +131,49 @@ def test_which_outcomes_are_a_success(outcomes, success, good):
     assert good_outcomes(record, RunOptions(success=success)) == good
 
 
+def test_the_outcomes_that_a_machine_calls_good_are_a_success_unless_the_command_says_more():
+    said = machine(("succeeded", "home", "lost"))
+    smachpy.set_options(said, success=["home", "lost"])
+    record = smachpy.describe(said)
+    assert good_outcomes(record, RunOptions()) == {"home", "lost"}
+    assert good_outcomes(record, RunOptions(success=("succeeded",))) == {"succeeded"}
+
+
+def test_the_outcomes_that_a_mission_calls_good_are_those_of_its_machine():
+    @smachpy.mission(success=["home"])
+    def factory():
+        return machine(("home", "lost"))
+
+    assert smachpy.describe(build(target(factory), {})).success == ("home",)
+
+
 def test_the_needed_servers_are_those_of_the_action_states():
-    from missions.lesson_2_patrol import patrol
+    from smachpy_missions.patrol import patrol
 
     assert needed_servers(smachpy.describe(patrol())) == {
         "move_base": "move_base_msgs/MoveBaseAction",
         "charge": "mission_msgs/ChargeAction",
     }
     assert needed_servers(smachpy.describe(machine())) == {}
+
+
+@pytest.mark.parametrize(
+    ("names", "robot", "expected"),
+    [
+        ([], None, None),
+        (["move_base", "dock"], None, None),
+        (["r1/move_base"], None, "r1"),
+        (["r1/move_base", "r1/arm/grip"], None, "r1"),
+        (["r1/move_base", "lift"], None, "r1"),
+        (["r1/move_base", "r2/move_base"], None, None),
+        (["r1/move_base"], "/r1/", None),
+        (["r1/arm/grip"], "r1", None),
+        (["r2/move_base"], "r1", "r2"),
+        (["r10/move_base"], "r1", "r10"),
+    ],
+)
+def test_the_robot_that_a_mission_drives_by_its_names(names, robot, expected):
+    assert driven_robot(names, robot) == expected
 
 
 def test_the_recorder_names_goals_after_waypoints_else_after_states():
@@ -172,7 +213,7 @@ def test_the_recorder_names_goals_after_waypoints_else_after_states():
 
 def test_the_recorder_keeps_several_robots_apart(office, tmp_path):
     from actionlib_core.interfaces.geometry_msgs.msg import PoseStamped
-    from missions.interfaces import DeliverFeedback, RechargeGoal
+    from smachpy_missions.interfaces import DeliverFeedback, RechargeGoal
 
     recorder = TrackRecorder()
     head = ("/FLEET/ROBOT/DELIVER", 0.0, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import posixpath
 import signal
 import sys
 import traceback
@@ -11,35 +12,36 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, current_clock
-from actionlib_core.names import NameArguments
-from actionlib_core.output import printable, tell
-from smachpy import InvalidUserCodeError, describe
-from smachpy.command.arguments import MisfitError, fit, parameters_of, read_words
+from actionlib_core.names import NameArguments, clean_namespace
+from actionlib_core.process.output import printable, tell
+from smachpy.command.arguments import MisfitError, Text, fit, parameters_of, read_secret, read_words
+from smachpy.command.bag import playing
 from smachpy.command.durable import DurableOptions, journalled
 from smachpy.command.extras import load_view
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
 from smachpy.command.targets import raised_text
 from smachpy.command.watching import Watching, watched
-from smachpy.exceptions import MissionError
-from smachpy.mission_info import mission_info
-from smachpy.outcome_classes import is_good
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.events.introspection import describe
+from smachpy.events.outcome_classes import is_good
+from smachpy.exceptions import InvalidUserCodeError, MissionError
+from smachpy.machines.mission_info import mission_info
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.userdata.secret import Secret, is_secret_name, masked
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
     from typing import TextIO
 
     from smachpy.command.targets import Target
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
     from smachpy.machines.container import Container
 
 EXIT_SUCCESS: Final = 0
 EXIT_OTHER_OUTCOME: Final = 1
 OFFICE: Final = RobotOptions(start=False, map=OFFICE_MAP, config=OFFICE_ROBOT)
 NO_NAMES: Final = NameArguments()
-_SIGNAL_EXIT: Final = 128  # plus the signal's number, as in shells
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,7 @@ class RunOptions:
         names: Remapping from the command line.
         namespace: Prefix of the mission's relative names; "" uses the configuration's.
         out: Folder for events, pictures and summary; None writes none.
+        bag: A bag whose topics are published during the run.
         plain: Only lines, no panel.
         events: Stream for events as lines of JSON, which replace the terminal view.
         success: Outcomes that count as success; empty: 'succeeded', or all that do not look like a
@@ -71,6 +74,7 @@ class RunOptions:
     names: NameArguments = NO_NAMES
     namespace: str = ""
     out: Path | None = None
+    bag: Path | None = None
     plain: bool = False
     events: TextIO | None = None
     success: tuple[str, ...] = ()
@@ -83,8 +87,8 @@ class RunOptions:
 def run_mission(target: Target, options: RunOptions) -> int:
     """Run a mission to its end and return the exit code.
 
-    Ctrl-C and SIGTERM request the shutdown, which preempts the mission; a second Ctrl-C ends the
-    process.
+    Ctrl-C, SIGTERM, a closed terminal and SIGQUIT request the shutdown, which preempts the mission,
+    or suspends a durable one unless it was Ctrl-C; a second one ends the process.
 
     Raises:
         SmachError: the inputs do not fit, a server is missing, or the robot cannot start.
@@ -99,7 +103,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
         )
     if options.pace.virtual and options.watching.view and options.watching.control:
         raise MissionError(
-            f"--control: got it beside --time {options.pace}, where a mission that is paused would "
+            f"--control: got --time {options.pace} beside it, where a mission that is paused would "
             "hold up all time; expected real time. Try without --control."
         )
     with contextlib.ExitStack() as stack:
@@ -107,7 +111,8 @@ def run_mission(target: Target, options: RunOptions) -> int:
         surroundings = stack.enter_context(
             open_surroundings(options.pace, options.robot, options.names, options.namespace)
         )
-        machine = build(target, options.inputs, options.words)
+        kept = options.durable is not None
+        machine = build(target, options.inputs, options.words, kept=kept)
         record = describe(machine)
         _check_success(target, record, options)
         out = None
@@ -123,12 +128,16 @@ def run_mission(target: Target, options: RunOptions) -> int:
         # A stack of its own, closed right after the mission: the journal must be complete before
         # the page lingers, which may take hours.
         journal = stack.enter_context(contextlib.ExitStack())
-        journal.enter_context(journalled(target, machine, options.durable))
-        watch = stack.enter_context(watched(target.name, machine, record.path, options.watching))
+        closing: list[Callable[[], object]] = []
+        journal.enter_context(journalled(target, machine, options.durable, closing))
+        watch = stack.enter_context(
+            watched(target.shown_name or target.name, machine, record.path, options.watching)
+        )
         show = show_run(record, options)
         stack.enter_context(show)
+        closing += [show.close, watch.close]
         stack.callback(machine.subscribe(show.on_event))
-        with journal:
+        with journal, playing(options.bag):
             outcome = _execute(machine, show, options)
         surroundings.over()
         good = outcome in good_outcomes(record, options)
@@ -142,7 +151,7 @@ def run_mission(target: Target, options: RunOptions) -> int:
                 "exit_code": code,
                 "time": str(options.pace),
             }
-            print(f"\nWritten: {', '.join(map(str, out.write(facts)))}")
+            print(printable(f"\nWritten: {', '.join(map(str, out.write(facts)))}"))
         watch.linger(outcome, ending)
     return code
 
@@ -164,18 +173,21 @@ def show_run(record: StateRecord, options: RunOptions) -> Any:
     )
 
 
-def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = ()) -> Container:
+def build(
+    target: Target, inputs: Mapping[str, object], words: Sequence[str] = (), *, kept: bool = False
+) -> Container:
     """Build the machine.
 
     Args:
         target: The mission.
         inputs: Arguments of its function, or values of its userdata keys, by name.
         words: Arguments of its function, the words after `--`.
+        kept: They are kept in a journal or queue, where no secret is to be.
 
     Raises:
         MissionError: an argument does not fit, is missing or unknown.
     """
-    machine = target.build(**read_words(target, words, inputs))
+    machine = target.build(**read_words(target, words, inputs, kept=kept))
     parameters = parameters_of(target.thing)
     keys = machine.get_registered_input_keys()
     known = {*parameters, *keys, *machine.userdata.keys()}
@@ -186,7 +198,7 @@ def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = (
                 f"{sorted(known)}."
             )
         if key not in parameters:
-            machine.userdata[key] = _fit_userdata(machine, key, value)
+            machine.userdata[key] = _fit_userdata(machine, key, value, kept=kept)
     missing = sorted(key for key in keys if key not in machine.userdata)
     if missing:
         raise MissionError(
@@ -196,7 +208,7 @@ def build(target: Target, inputs: Mapping[str, object], words: Sequence[str] = (
     return machine
 
 
-def _fit_userdata(machine: Container, key: str, value: object) -> object:
+def _fit_userdata(machine: Container, key: str, value: object, *, kept: bool) -> object:
     """Return an input with the type of the machine's own value for that key, if there is one."""
     own = machine.userdata[key] if key in machine.userdata else None  # noqa: SIM401  no dict
     hint: Any = Any
@@ -204,13 +216,18 @@ def _fit_userdata(machine: Container, key: str, value: object) -> object:
         hint = type(own)
     elif isinstance(own, int | float):
         hint = int | float
-    elif isinstance(own, list | dict):
+    elif isinstance(own, list | dict | Secret):
         hint = type(own)
     try:
+        if isinstance(value, Text) and (hint is Secret or is_secret_name(key)):
+            secret = str(read_secret(value, f"--input {key}", kept=kept))
+            # What a journal does not keep, each process reads again.
+            return Secret(secret) if kept or hint is Secret else secret
         return fit(value, hint)
     except MisfitError as error:
+        got, mine = str(masked(value, key)), masked(own, key)
         raise MissionError(
-            f"--input {key}: got {value!s:.60}; expected {error}, as the mission's own {own!r}."
+            f"--input {key}: got {got:.60}; expected {error}, as the mission's own {mine!r}."
         ) from error
 
 
@@ -220,13 +237,31 @@ def needed_servers(record: StateRecord) -> dict[str, str]:
     return {detail["action"]: detail["type"] for detail in details if "action" in detail}
 
 
+def driven_robot(names: Iterable[str], robot: str | None) -> str | None:
+    """Return the robot that a mission drives by the names of its actions, if that is not `robot`.
+
+    Args:
+        names: Full names, without a slash in front: "r1/move_base" drives r1, and so do
+            "r1/arm/grip" and "r1/move_base" together.
+        robot: The robot that it was given, or None.
+
+    Returns:
+        None if the names are those of no robot, of several, or of `robot`.
+    """
+    spaces = [name.rpartition("/")[0] for name in names if "/" in name]
+    common = posixpath.commonpath(spaces) if spaces else ""
+    if robot and f"{common}/".startswith(f"{clean_namespace(robot)}/"):
+        return None
+    return common or None
+
+
 def good_outcomes(record: StateRecord, options: RunOptions) -> set[str]:
     """Return the outcomes that count as success."""
     if options.success:
         return set(options.success)
-    if "succeeded" in record.outcomes:
+    if record.success is None and "succeeded" in record.outcomes:
         return {"succeeded"}
-    return {outcome for outcome in record.outcomes if is_good(outcome)}
+    return {outcome for outcome in record.outcomes if is_good(outcome, record.success)}
 
 
 def _check_success(target: Target, record: StateRecord, options: RunOptions) -> None:
@@ -274,4 +309,4 @@ def _stuck(error: BaseException | None) -> str | None:
 def signal_exit(ending: shutdown.Shutdown) -> int:
     """Return the exit code of a program that was ended by a signal."""
     members = signal.Signals.__members__
-    return _SIGNAL_EXIT + members.get(ending.reason or "", signal.SIGINT)
+    return shutdown.EXIT_SIGNAL + members.get(ending.reason or "", signal.SIGINT)

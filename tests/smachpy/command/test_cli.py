@@ -65,7 +65,9 @@ def test_an_error_is_one_screen_on_stderr_and_exit_code_2(capsys):
     assert smachpy.command.main(["bad"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err == "smachpy: /PATROL: broken: got 'x'; expected 'y'.\n"
+    text, more = captured.err.splitlines()
+    assert text == "smachpy: /PATROL: broken: got 'x'; expected 'y'."
+    assert more.startswith("More: https://")
 
 
 def test_an_unknown_option_is_told_by_the_subcommand(capsys):
