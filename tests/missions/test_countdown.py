@@ -6,11 +6,12 @@ from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.presence import Kind, list_endpoints
-from missions.course.countdown import CountdownServer, countdown, main
-from missions.interfaces import CountdownAction, CountdownGoal
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
 from smachpy.exceptions import MissionError
+from smachpy_missions.course.countdown import CountdownServer, countdown, main
+from smachpy_missions.interfaces import CountdownAction, CountdownGoal
 
 
 @pytest.fixture

@@ -12,13 +12,13 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.delivery.delivery import delivery
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import MissionError
-from smachpy.sim.exceptions import InputFileError
-from smachpy.sim.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.exceptions import InputFileError
+from smachpy.places.maps import OFFICE_DOORS, OFFICE_MAP, OFFICE_ROBOT
 from smachpy.sim.simulation import simulation
+from smachpy_missions.delivery.delivery import delivery
 
 LAB, WAIT, HOME = (17.9, 5.4), (18.0, 7.7), (9.8, 7.1)
 

@@ -7,14 +7,21 @@ from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.presence import Kind, list_endpoints
-from missions.course.demo_action import NAME, SEVERAL, DemoActionServer, SeveralServer, demo_action
-from missions.course.demo_action import client as client_machine
-from missions.course.demo_action import server as server_machine
-from missions.interfaces import Demo_actionAction, Demo_actionGoal
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import MissionError
+from smachpy_missions.course.demo_action import (
+    NAME,
+    SEVERAL,
+    DemoActionServer,
+    SeveralServer,
+    demo_action,
+)
+from smachpy_missions.course.demo_action import client as client_machine
+from smachpy_missions.course.demo_action import server as server_machine
+from smachpy_missions.interfaces import Demo_actionAction, Demo_actionGoal
 
 
 @pytest.fixture

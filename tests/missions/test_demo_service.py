@@ -8,12 +8,12 @@ from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.presence import list_endpoints
-from missions.course.demo_service import NAME, TOPIC, client, demo_service, server
-from missions.interfaces import DemoMsg
-from missions.interfaces.srv import DemoSrv
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import MissionError
+from smachpy_missions.course.demo_service import NAME, TOPIC, client, demo_service, server
+from smachpy_missions.interfaces import DemoMsg
+from smachpy_missions.interfaces.srv import DemoSrv
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from smachpy.durable.mission import kept_mission, new_mission
 from smachpy.durable.store import open_store
-from smachpy.mission_info import mission_info
+from smachpy.machines.mission_info import mission_info
 from tests.missions.test_twice import (
     OTHERS,
     OUTCOMES,

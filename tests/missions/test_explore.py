@@ -8,13 +8,13 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.time import Time
-from missions.explore.explore import IN_VAIN, explore, pose_at
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import MissionError
-from smachpy.sim.geometry import quaternion_of
-from smachpy.sim.occupancy import FREE, load_map
+from smachpy.places.occupancy import FREE, load_map
+from smachpy.places.pose import quaternion_of
 from smachpy.testing import mission_kit
+from smachpy_missions.explore.explore import IN_VAIN, explore, pose_at
 
 RAYS = 180
 

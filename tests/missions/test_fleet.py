@@ -22,22 +22,22 @@ from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.transport.faulty import DELIVERED, FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.presence import list_endpoints
-from missions.fleet.coordinator import coordinator, fleet, make_orders, pose_message
-from missions.fleet.dispatcher import Dispatcher, Robot
-from missions.fleet.order_book import Order, Stage
-from missions.fleet.processes import world_text
-from missions.fleet.robot import FleetRobot, deliver, recharge
-from missions.fleet.robot import main as robot_main
-from missions.fleet.site import load_site
-from missions.interfaces.srv import PermitRequest
 from smachpy.checks import check
 from smachpy.exceptions import MissionError
-from smachpy.sim.exceptions import InputFileError
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.exceptions import InputFileError
+from smachpy.places.maps import OFFICE_FLEET
+from smachpy.places.pose import Pose2D
 from smachpy.sim.interfaces import ChargeAction
-from smachpy.sim.maps import OFFICE_FLEET
 from smachpy.sim.world_file import load_world
 from smachpy.states import Waypoint, pose_of, serve_during
+from smachpy_missions.fleet.coordinator import coordinator, fleet, make_orders, pose_message
+from smachpy_missions.fleet.dispatcher import Dispatcher, Robot
+from smachpy_missions.fleet.order_book import Order, Stage
+from smachpy_missions.fleet.processes import world_text
+from smachpy_missions.fleet.robot import FleetRobot, deliver, recharge
+from smachpy_missions.fleet.robot import main as robot_main
+from smachpy_missions.fleet.site import load_site
+from smachpy_missions.interfaces.srv import PermitRequest
 
 SPEED = 1.0  # [m/s]
 STEP = 2.0  # [s] between two reports of a drive
@@ -461,10 +461,10 @@ def many(clock, floor_of, *, robots, orders, kills, seed):
 
 @pytest.mark.slow
 def test_fifty_robots(clock, floor_of):
-    floor, outcome = many(clock, floor_of, robots=50, orders=200, kills=0, seed=1)
+    floor, outcome = many(clock, floor_of, robots=50, orders=100, kills=0, seed=1)
     assert outcome == "succeeded"
-    assert floor.stages() == {Stage.DELIVERED: 200}
-    assert sum(floor.yard.given.values()) == 200
+    assert floor.stages() == {Stage.DELIVERED: 100}
+    assert sum(floor.yard.given.values()) == 100
     assert len({entry.robot for entry in floor.dispatcher.book.entries.values()}) == 50
     floor.close()
     assert list_endpoints(floor.network.session()) == []

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from missions.fleet.order_book import FINAL, MAX_ATTEMPTS, DockBook, Order, OrderBook, Stage
-from missions.interfaces.srv import PermitRequest
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.pose import Pose2D
 from smachpy.states import Waypoint
+from smachpy_missions.fleet.order_book import FINAL, MAX_ATTEMPTS, DockBook, Order, OrderBook, Stage
+from smachpy_missions.interfaces.srv import PermitRequest
 
 PICK_UP, DRIVE_OFF, HAND_OVER = (
     PermitRequest.PICK_UP,

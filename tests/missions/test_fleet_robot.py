@@ -7,12 +7,12 @@ import sys
 import pytest
 
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
-from missions.fleet.coordinator import fleet
-from missions.fleet.robot import GentleHands, deliver, main, recharge
-from missions.interfaces import DeliverAction, DeliverGoal, RechargeAction, RechargeGoal
-from missions.interfaces.srv import Permit, PermitRequest
 from smachpy.sim.interfaces import ChargeAction
 from smachpy.testing import mission_kit
+from smachpy_missions.fleet.coordinator import fleet
+from smachpy_missions.fleet.robot import GentleHands, deliver, main, recharge
+from smachpy_missions.interfaces import DeliverAction, DeliverGoal, RechargeAction, RechargeGoal
+from smachpy_missions.interfaces.srv import Permit, PermitRequest
 
 YES, NO = {"granted": True}, {"granted": False, "reason": "it is no longer yours"}
 

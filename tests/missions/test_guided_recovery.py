@@ -6,9 +6,9 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Empty
-from missions.lesson_3_ask import guided_recovery
 from smachpy.checks import check
-from smachpy.sim.geometry import Pose2D
+from smachpy.places.pose import Pose2D
+from smachpy_missions.guided_recovery import guided_recovery
 
 GOAL, HOME = 17.9, 9.8
 
@@ -17,7 +17,7 @@ GOAL, HOME = 17.9, 9.8
 def robot(mission):
     """A robot at home whose way to the goal is blocked at first; a drive or a turn takes 10 s."""
     here = Odometry()
-    here.pose.pose.position.x = HOME
+    here.pose.pose.position.x, here.pose.pose.orientation.w = HOME, 1.0
     mission.topic("odom", Odometry).publish(here, latch=True)
     server = mission.action_server("move_base", MoveBaseAction)
     server.default_result(duration=10)

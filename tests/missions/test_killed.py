@@ -11,8 +11,8 @@ from smachpy.testing import explore
 from tests.missions.test_twice import ARGUMENTS, listed
 
 # Missions whose runs are too many for all of them: so many are tried, `make soak-durable` tries more.
-LARGE = ("delivery", "fleet", "guided_recovery", "inspect", "patrol", "waypoints")
-RUNS = int(os.environ.get("RUNS", "60"))
+LARGE = ("delivery", "fleet", "guided_recovery", "inspect", "patrol", "rp_action", "waypoints")
+RUNS = int(os.environ.get("RUNS", "40"))
 # Not among these: servers, which never end; goals that plain code sends, which are sent again
 # (shuttle); robots whose parcels depend on who asks first (fleet); times in the userdata
 # (demo_service); states that give their doubles too little (explore, there_and_back); a state that

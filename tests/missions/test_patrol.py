@@ -5,12 +5,12 @@ import itertools
 import pytest
 
 from actionlib_core.clock import VirtualClock, use_clock
-from missions.lesson_2_patrol import patrol
 from smachpy import events as ev
 from smachpy.exceptions import MissionError
-from smachpy.sim.exceptions import InputFileError
-from smachpy.sim.maps import OFFICE_WAYPOINTS
+from smachpy.places.exceptions import InputFileError
+from smachpy.places.maps import OFFICE_WAYPOINTS
 from smachpy.states import load_route
+from smachpy_missions.patrol import patrol
 
 
 def record(machine):

@@ -1,26 +1,26 @@
-"""The plans of missions/pnp: loaded, checked, and driven on the simulated robot."""
+"""The plans of missions/smachpy_missions/pnp: loaded, checked, and driven on the simulated robot."""
 
 import contextlib
 from pathlib import Path
 
 import pytest
 
-import missions.pnp
 import smachpy
+import smachpy_missions.pnp
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.pnp.robot import look, say
 from smachpy import State, events
 from smachpy.command import main
-from smachpy.command.surroundings import _robots_of
+from smachpy.command.surroundings import ROBOT_ACTIONS, _robots_of
 from smachpy.exceptions import MissionError
+from smachpy.places.pose import Pose2D
 from smachpy.pnp import load, load_plan
 from smachpy.pnp.mapping import read_mapping
-from smachpy.sim.geometry import Pose2D
 from smachpy.sim.server import RobotServer
 from smachpy.sim.world import Robot, World
+from smachpy_missions.pnp.robot import look, say
 
-FOLDER = Path(missions.pnp.__file__).parent
+FOLDER = Path(smachpy_missions.pnp.__file__).parent
 PLANS = ["rounds", "look", "together", "avoid", "errand", "meet"]
 
 
@@ -126,6 +126,11 @@ def test_two_robots_meet_by_the_command_line_alone(capsys):
     assert "meet: goal after" in capsys.readouterr().out
 
 
+def calls(*names):
+    """Return name -> type of actions, with the types of the simulated robot."""
+    return {name: ROBOT_ACTIONS.get(name.rpartition("/")[2], "") for name in names}
+
+
 @pytest.mark.parametrize(
     ("names", "robots"),
     [
@@ -136,9 +141,14 @@ def test_two_robots_meet_by_the_command_line_alone(capsys):
     ],
 )
 def test_which_robots_a_mission_needs(names, robots):
-    assert _robots_of(dict.fromkeys(names, "")) == robots
+    assert _robots_of(calls(*names)) == robots
 
 
 def test_robots_of_other_names_are_not_brought():
     with pytest.raises(MissionError):
-        _robots_of(dict.fromkeys(["/left/move_base", "/right/move_base"], ""))
+        _robots_of(calls("/left/move_base", "/right/move_base"))
+
+
+def test_actions_of_other_types_need_no_robot():
+    needed = {"/robot_0/move_base": "mbf_msgs/MoveBaseAction", "/robot_1/charge": "my/ChargeAction"}
+    assert _robots_of(needed) == ("", 1)

@@ -13,15 +13,16 @@ from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
-from actionlib_core.wire.presence import Kind, list_endpoints
-from missions.course.rp_action import gotopose, rp_action, stopmove, turn
-from missions.course.turn_server import TurnServer
-from missions.interfaces import TurnAction, TurnGoal
+from actionlib_core.transport.tokens import Kind
+from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import MissionError, SmachError
-from smachpy.sim.geometry import Pose2D, wrap_angle
+from smachpy.places.pose import Pose2D, wrap_angle
 from smachpy.states import goal_at
+from smachpy_missions.course.rp_action import gotopose, rp_action, stopmove, turn
+from smachpy_missions.course.turn_server import TurnServer
+from smachpy_missions.interfaces import TurnAction, TurnGoal
 
 DEGREE = math.radians(1.0)
 

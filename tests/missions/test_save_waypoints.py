@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import os
 import select
 import signal
@@ -10,13 +11,20 @@ import pytest
 
 from actionlib_core.exceptions import WaitTimeoutError
 from actionlib_core.interfaces.geometry_msgs.msg import Twist, Vector3
-from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.interfaces.nav_msgs.msg import Odometry
+from actionlib_core.interfaces.std_msgs.msg import Header, String
 from actionlib_core.pubsub.topic import Publisher
-from missions.tour.save_waypoints import TOPIC, WaypointSaver, waypoints_text
-from missions.tour.tour_file import Stop, load_tour
 from smachpy.exceptions import MissionError
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_TOUR
+from smachpy.places.maps import OFFICE_MAP, OFFICE_TOUR
+from smachpy.places.pose import Pose2D
+from smachpy_missions.tour.save_waypoints import TOPIC, WaypointSaver, waypoints_text
+from smachpy_missions.tour.tour_file import Stop, load_tour
+
+
+def localised(x, frame):
+    message = Odometry(header=Header(frame_id=frame))
+    message.pose.pose.position.x, message.pose.pose.orientation.w = x, 1.0
+    return message
 
 
 @pytest.fixture
@@ -80,10 +88,32 @@ def test_the_name_of_the_file_says_its_form(simulation, said, tmp_path):
 def test_without_a_robot_nothing_is_saved(mission, tmp_path, said):
     saver = WaypointSaver(tmp_path / "w.csv", mission.node, said.append)
     saver.save("here")
-    with pytest.raises(WaitTimeoutError, match="topic 'odom': got nothing within 5 s"):
+    with pytest.raises(
+        WaitTimeoutError, match="topic 'odom': got no pose in the map within 5 s: no odometry"
+    ):
         saver.wait_for_robot()
     saver.close()
     assert said == ["not saved: no odometry has arrived yet"]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("odometry", "why"),
+    [
+        (Odometry(), "orientation 0 0 0 0"),
+        (Odometry(header=Header(frame_id="odom")), "orientation 0 0 0 0"),
+        (localised(math.nan, "map"), "got x nan"),
+        (localised(1.0, "odom"), "in frame 'odom', and no transform from 'map' to it is known"),
+    ],
+)
+def test_before_the_robot_is_localised_nothing_is_saved(mission, tmp_path, said, odometry, why):
+    mission.topic("odom", Odometry).publish(odometry, latch=True)
+    saver = WaypointSaver(tmp_path / "w.yaml", mission.node, said.append)
+    with pytest.raises(WaitTimeoutError, match=why):
+        saver.wait_for_robot()
+    saver.save("here")
+    saver.close()
+    assert why in said[0]
     assert not list(tmp_path.iterdir())
 
 
@@ -119,9 +149,9 @@ def test_as_a_program_enter_saves_a_waypoint(tmp_path):
             [sys.executable, "-m", *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
 
-    robot = start("smachpy.sim", "--child")
+    robot = start("smachpy", "robot", "--child")
     read_until(robot, "ready")  # the program waits 5 s for it, a busy computer starts it in more
-    saver = start("missions.tour.save_waypoints", str(path))
+    saver = start("smachpy_missions.tour.save_waypoints", str(path))
     try:
         read_until(saver, "Enter saves")
         saver.stdin.write(b"home\n")

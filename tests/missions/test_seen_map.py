@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
-from missions.explore.map_file import write_map
-from missions.explore.scans import rays_of
-from missions.explore.seen_map import Frontier, SeenMap
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.occupancy import FREE, OCCUPIED, UNKNOWN, load_map
+from smachpy.places.occupancy import FREE, OCCUPIED, UNKNOWN, load_map
+from smachpy.places.pose import Pose2D
 from smachpy.sim.raycast import Raycaster
+from smachpy_missions.explore.map_file import write_map
+from smachpy_missions.explore.scans import rays_of
+from smachpy_missions.explore.seen_map import Frontier, SeenMap
 
 
 def flat(*ranges, range_max=5.0):

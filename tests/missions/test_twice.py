@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import math
 import tomllib
-from pathlib import Path
 
 import pytest
 
@@ -15,14 +14,15 @@ from actionlib_core.interfaces.sensor_msgs.msg import BatteryState, LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Bool, String
 from actionlib_core.interfaces.std_srvs.srv import Empty, SetBool, SetBoolResponse
 from actionlib_core.node import Node
-from missions.course.demo_action import DemoActionServer
-from missions.course.demo_service import server_maker
-from missions.interfaces import DeliverResult, RechargeResult
 from smachpy import describe
 from smachpy import events as ev
-from smachpy.mission_info import mission_info
+from smachpy.machines.mission_info import mission_info
 from smachpy.sim.server import RobotServer
 from smachpy.sim.world import Robot, World
+from smachpy_missions.course.demo_action import DemoActionServer
+from smachpy_missions.course.demo_service import server_maker
+from smachpy_missions.interfaces import DeliverResult, RechargeResult
+from tests.places import ROOT
 
 ARGUMENTS = {
     "fleet": {"robots": 2, "orders": 3, "start": False},
@@ -34,9 +34,11 @@ ROBOT = {"move_base", "charge", "deliver", "recharge", "turn"}  # what the serve
 OTHERS = {"demo_action.client": DemoActionServer, "demo_service.client": server_maker()}
 RESULTS = {"deliver": DeliverResult(charge=1.0), "recharge": RechargeResult(charge=1.0, left=True)}
 OUTCOMES = {
+    "move_cup": "held",
+    "shuttle": "arrived",
+    "take_cup": "held",
     "demo_action.server": "preempted",
     "demo_service.server": "preempted",
-    "look_at.server": "preempted",
     "fleet": "undelivered",  # robots that ask the dispatcher for nothing
 }
 # Missions that drive the robot although no state of theirs says so.
@@ -45,7 +47,7 @@ DRIVE_S = 10.0
 
 
 def listed():
-    with (Path(__file__).parents[2] / "pyproject.toml").open("rb") as file:
+    with (ROOT / "pyproject.toml").open("rb") as file:
         return dict(tomllib.load(file)["project"]["entry-points"]["smachpy.missions"])
 
 

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from missions.tour.tour_file import Task, load_tour
-from smachpy.sim.config import load_config
-from smachpy.sim.exceptions import InputFileError
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT, OFFICE_TOUR, OFFICE_WAYPOINTS
+from smachpy.places.exceptions import InputFileError
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT, OFFICE_TOUR, OFFICE_WAYPOINTS
+from smachpy.places.robot_file import load_config
 from smachpy.states import load_route
+from smachpy_missions.tour.tour_file import Task, load_tour
 
 
 def test_the_office_route_lies_on_the_office_floor():

@@ -10,14 +10,14 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBas
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.std_srvs.srv import Trigger
-from missions.tour.waypoints import waypoints
 from smachpy import events as ev
 from smachpy.checks import check
 from smachpy.exceptions import MissionError
-from smachpy.sim.exceptions import InputFileError
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import OFFICE_TOUR
+from smachpy.places.exceptions import InputFileError
+from smachpy.places.maps import OFFICE_TOUR
+from smachpy.places.pose import Pose2D
 from smachpy.states import goal_at
+from smachpy_missions.tour.waypoints import waypoints
 
 LINE = "name,x,y,yaw,dwell,task,angle,service\n"
 THREE = LINE + "a,1,0\nb,2,0\nc,3,0\n"

@@ -5,24 +5,24 @@ from __future__ import annotations
 import importlib
 import random
 import tomllib
-from pathlib import Path
 
 import pytest
 
-from actionlib_core.interfaces.geometry_msgs.msg import Pose
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
-from missions.course.countdown import countdown
-from missions.lesson_1_errand import there_and_back
-from missions.lesson_2_patrol import patrol
 from smachpy.checks import check
 from smachpy.sim.interfaces import ChargeAction
+from smachpy.states import Pose2D
 from smachpy.testing import mission_kit
 from smachpy.testing.coverage import Coverage
-from smachpy.testing.exploring.exploration import Runner
+from smachpy.testing.exploring.exploration import RepeatedRun
 from smachpy.testing.exploring.explorer import Explorer
-from smachpy.testing.exploring.search import Choice
+from smachpy.testing.exploring.search import ScheduleChoice
+from smachpy_missions.course.countdown import countdown
+from smachpy_missions.lesson_06_drive import there_and_back
+from smachpy_missions.patrol import patrol
+from tests.places import ROOT
 
 PATROL = patrol()  # reading the waypoints takes longer than a run
 FULL, EMPTY = {"percentage": 1.0}, {"percentage": 0.05}
@@ -43,7 +43,9 @@ def run_there_and_back(mission):
     server = mission.action_server("move_base", MoveBaseAction)
     server.reply(duration=60)
     server.reply(duration=4)
-    mission.topic("odom", Odometry).publish(latch=True)
+    here = Odometry()
+    here.pose.pose.orientation.w = 1.0
+    mission.topic("odom", Odometry).publish(here, latch=True)
     return mission(there_and_back())
 
 
@@ -91,7 +93,7 @@ def test_a_hundred_seeds_give_the_same_verdict_twice(name):
 
 def listed():
     """Return name -> place of the missions that `smachpy list` shows, as the project has them."""
-    with (Path(__file__).parents[2] / "pyproject.toml").open("rb") as file:
+    with (ROOT / "pyproject.toml").open("rb") as file:
         points = tomllib.load(file)["project"]["entry-points"]["smachpy.missions"]
     return dict(points)
 
@@ -116,7 +118,9 @@ def dice(seed):
     pick = random.Random(seed).randrange
 
     def choose(self, where, options, _situation=None, _key=None):
-        self.choices.append(Choice(where, tuple(options), picked := pick(len(options)), None))
+        self.choices.append(
+            ScheduleChoice(where, tuple(options), picked := pick(len(options)), None)
+        )
         return picked
 
     return choose
@@ -133,7 +137,7 @@ def test_a_hundred_dice_give_the_same_run_of_every_mission_twice(name, monkeypat
         run, error = runner.run(())
         return run.outcome, repr(error), [repr(event) for event in run.events]
 
-    with Runner("explore", machine, {}) as runner:
+    with RepeatedRun("explore", machine, {}) as runner:
         first = [verdict(seed) for seed in range(100)]
         assert [verdict(seed) for seed in range(100)] == first
     assert len({str(events) for _, _, events in first}) > 1
@@ -160,7 +164,7 @@ def test_whatever_servers_do_the_patrol_ends(mission):
 
 def test_whatever_happens_the_way_there_and_back_ends(mission):
     mission.explore(there_and_back, max_time=40).assert_ok()
-    home = {"/THERE_AND_BACK/REMEMBER": {"home": Pose()}}
+    home = {"/THERE_AND_BACK/REMEMBER": {"home": Pose2D(0.0, 0.0, 0.0)}}
     found = mission.explore(there_and_back, real_actions=True, writes=home, max_runs=60)
     found.assert_ok()
 
