@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import pytest
 
-from smachpy.introspection import RuleRecord, StateRecord, TransitionRecord
+from smachpy.events.introspection import RuleRecord, StateRecord, TransitionRecord
+from smachpy_viz.pictures import graphviz_process
 
 STANDARD = ("succeeded", "aborted", "preempted")
 
@@ -172,3 +173,15 @@ def build():
     for function in (leaf, machine, concurrence, rooted):
         setattr(Build, function.__name__, staticmethod(function))
     return Build
+
+
+@pytest.fixture(params=["found", "bundled"])
+def any_dot(request, monkeypatch, tmp_path):
+    """The `dot` that is found here, and then the library of pygraphviz alone."""
+    if request.param == "bundled":
+        pytest.importorskip("pygraphviz", exc_type=ImportError)  # without its libraries, too
+        monkeypatch.delenv(graphviz_process.DOT_VARIABLE, raising=False)
+        monkeypatch.setenv("PATH", str(tmp_path))
+        assert "bundled_dot.py" in graphviz_process.find_dot()[-1]
+    else:
+        graphviz_process.find_dot()

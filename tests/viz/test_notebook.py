@@ -10,9 +10,8 @@ import time
 
 import pytest
 
-import viz
-from smachpy import CBState, State, StateMachine
-from viz.pictures.drawing import PictureError
+from smachpy import CBState, State, StateMachine, viz
+from smachpy_viz.pictures.drawing import PictureError
 
 pytest.importorskip("anywidget")
 
@@ -83,7 +82,7 @@ def test_a_picture_that_cannot_be_drawn_stops_no_machine(machine, widget, monkey
     def fails(*_args, **_options):
         raise PictureError("no dot any more")
 
-    monkeypatch.setattr("viz.notebook.picture", fails)
+    monkeypatch.setattr("smachpy_viz.notebook.picture", fails)
     machine["HELD"].go_on.set()
     assert machine.execute() == "done"
     wait_for(lambda: widget.status == "no dot any more")

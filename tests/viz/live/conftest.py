@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from smachpy import CBState, StateMachine
-from smachpy.introspection import describe
+from smachpy.events.introspection import describe
 
 HERE = Path(__file__).parent
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -65,7 +65,7 @@ def start_robot(*arguments):
 
 
 def start_simulation():
-    child = Child("-m", "smachpy.sim", "--child")
+    child = Child("-m", "smachpy", "robot", "--child")
     assert "ready" in child.said
     return child
 
@@ -93,7 +93,7 @@ class Served:
     """The page of machines that this process makes up: no mission, no network."""
 
     def __init__(self):
-        from viz.live.machines import Machines
+        from smachpy_viz.live.machines import Machines
 
         self.machines = Machines()
         self.commands = []
@@ -124,8 +124,8 @@ class Served:
         return made
 
     def start(self, **viewer):
-        from viz.live.app import Viewer
-        from viz.live.server import PageServer
+        from smachpy_viz.live.app import Viewer
+        from smachpy_viz.live.server import PageServer
 
         self._server = PageServer(Viewer(self.machines, send=self._send, **viewer), "127.0.0.1", 0)
         self._thread = threading.Thread(target=self._server.serve_here)
@@ -176,6 +176,10 @@ def start(domain):
 
         def simulation(self):
             self.children.append(start_simulation())
+            return self.children[-1]
+
+        def program(self, code):
+            self.children.append(Child("-c", code))
             return self.children[-1]
 
         def view(self, *arguments, port=0):

@@ -98,12 +98,12 @@ def small(pace, args):
 def hostile(pace, args):
     """Names and values that want to break the page."""
     script = "<script>document.title='broken'</script>"
-    names = [
-        script,
+    names = [  # labels; outcomes and values may have slashes
+        "<script>document.title='broken'",
         "A" * 10_000,
         "\u202e\u65e5\u672c\u8a9e \U0001f916",
         "\"quotes'`&amp;",
-        "</title><img src=x onerror=alert(1)>",
+        "<title><img src=x onerror=alert(1)>",
     ]
     sm = StateMachine(outcomes=["succeeded", script], name="HOSTILE")
 
@@ -112,7 +112,7 @@ def hostile(pace, args):
             raise RuntimeError("no")
 
     def write(userdata):
-        userdata.secret = Mute()
+        userdata.mute = Mute()
         userdata.big = list(range(100_000))
         userdata.markup = script
         userdata.lock = threading.Lock()
@@ -123,7 +123,7 @@ def hostile(pace, args):
             after = names[(i + 1) % len(names)]
             if i == 0:
                 state = CBState(
-                    write, outcomes=["succeeded"], output_keys=["secret", "big", "markup", "lock"]
+                    write, outcomes=["succeeded"], output_keys=["mute", "big", "markup", "lock"]
                 )
                 StateMachine.add(name, state, {"succeeded": after})
             else:

@@ -182,3 +182,37 @@ def test_with_the_keyboard_alone_and_with_names_for_all(action_page):
     k = page.evaluate("() => smachpy.page.view.k")
     page.keyboard.press("+")
     assert page.evaluate("() => smachpy.page.view.k") == k
+
+
+SENDER = """
+from actionlib_core.action.simple_client import SimpleActionClient
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from actionlib_core.node import Node
+import sys
+client = SimpleActionClient("move_base", MoveBaseAction, node=Node("planner"))
+assert client.wait_for_server(20.0)
+goal = MoveBaseGoal()
+goal.target_pose.header.frame_id = "map"
+position, orientation = goal.target_pose.pose.position, goal.target_pose.pose.orientation
+position.x, position.y, orientation.w = 3.5, 2.0, 1.0
+client.send_goal(goal)
+assert not client.wait_for_result(1.0)
+print("sent", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_goal_of_a_killed_program_is_shown_and_cancelled(start, look, monkeypatch):
+    """Nobody else can stop that robot."""
+    monkeypatch.setenv("SMACHPY_DOMAIN", str(1 + (os.getpid() * 3) % 9998))  # no other robot
+    start.simulation()
+    page = look(start.view("--control").address.replace("/#", "/?actions#"), drawn=False)
+    page.click(".action:has(b:text-is('/move_base'))")
+    sender = start.program(SENDER)
+    assert sender.said == "sent"
+    sender.kill()
+    page.wait_for_selector(".sent:has-text('node /planner'):has-text('its client is gone')")
+    page.click(".sent:has-text('node /planner') button:text-is('Cancel')")
+    assert "Cancel the goal of node /planner to /move_base?" in page.text_content(".confirm")
+    page.click(".confirm .warn")
+    page.wait_for_selector(".sent:has-text('node /planner')", state="detached")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.config import Config, Ros2
 from actionlib_core.interfaces import define_action, get_action
@@ -11,8 +12,11 @@ from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.nav2_msgs.action import NavigateToPose
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.transport.tokens import Endpoint, Kind, token_key
+from smachpy_viz.live import actions as actions_module
+from smachpy_viz.live.actions import MAX_KEPT_GOALS, MAX_RUNNING_GOALS, Actions, GoalRefusedError
+from smachpy_viz.live.server_goals import GoalsError
 from tests.ros2_server import Ros2Server
-from viz.live.actions import KEPT_GOALS, MOST_RUNNING, Actions, GoalRefusedError
 
 
 class World:
@@ -79,8 +83,34 @@ def test_actions_are_found_and_forgotten(world):
     assert world.changes
     server.action_server.stop()
     world.clock.sleep(0.5)
-    assert world.actions.summary()["actions"] == []
+    assert world.actions.summary() == {"actions": [], "gone": [], "goals": []}
+
+
+def test_action_that_a_page_has_used_is_named_when_its_server_has_gone(world):
+    server = world.serve()
+    world.actions.definition("count")
+    server.action_server.stop()
+    world.clock.sleep(0.5)
     assert world.actions.summary()["gone"] == ["count"]
+
+
+def test_flood_of_invented_action_servers_leaves_nothing_behind(world, monkeypatch, caplog):
+    monkeypatch.setattr(actions_module, "MAX_ACTIONS", 20)
+    transport = world.robot.transport
+    ends = [
+        Endpoint(Kind.ACTION_SERVER, f"a{i}", "actionlib/TestAction", "x", "s", "evil", i)
+        for i in range(50)
+    ]
+    tokens = [transport.declare_alive(token_key(end)) for end in ends]
+    world.clock.sleep(0.5)
+    assert len(world.actions.summary()["actions"]) == 20
+    assert len([one for one in caplog.records if one.levelname == "ERROR"]) == 1
+    for token in tokens:
+        token.close()
+    world.clock.sleep(0.5)
+    assert world.actions.summary() == {"actions": [], "gone": [], "goals": []}
+    assert not world.actions._servers
+    assert not world.actions._nodes
 
 
 def test_a_form_is_told_of_the_fields(world):
@@ -182,7 +212,7 @@ def test_installed_packages_make_their_definitions_known(world, monkeypatch):
         def load(self):
             raise RuntimeError("broken package")
 
-    monkeypatch.setattr("viz.live.actions.entry_points", lambda group: [Broken(), Point()])
+    monkeypatch.setattr("smachpy_viz.live.actions.entry_points", lambda group: [Broken(), Point()])
     world.serve()
     end = world.actions._server("count")
     other = get_action("actionlib/Test")
@@ -197,17 +227,17 @@ def test_installed_packages_make_their_definitions_known(world, monkeypatch):
 
 def test_ended_goals_are_forgotten_and_running_ones_are_limited(world):
     world.serve()
-    for _ in range(KEPT_GOALS + 5):
+    for _ in range(MAX_KEPT_GOALS + 5):
         world.actions.send("count", "{goal: 0}")
         world.clock.sleep(0.2)
-    assert len(world.actions.summary()["goals"]) == KEPT_GOALS
+    assert len(world.actions.summary()["goals"]) == MAX_KEPT_GOALS
     from actionlib_core.action.server import ActionServer
 
     ActionServer("many", msg.TestAction, lambda handle: handle.set_accepted(), node=world.robot)
     world.clock.sleep(0.5)
-    for _ in range(MOST_RUNNING):
+    for _ in range(MAX_RUNNING_GOALS):
         world.actions.send("many", "{goal: 1}")
-    with pytest.raises(GoalRefusedError, match=f"expected fewer than {MOST_RUNNING}"):
+    with pytest.raises(GoalRefusedError, match=f"expected fewer than {MAX_RUNNING_GOALS}"):
         world.actions.send("many", "{goal: 1}")
 
 
@@ -265,3 +295,27 @@ def test_actions_of_a_ros2_robot(clock):
     viewer.close()
     for session in sessions:
         session.close()
+
+
+def test_a_goal_of_a_client_that_is_gone_can_be_cancelled(world):
+    """Its own program can no longer do it, and the robot drives on."""
+    server = counting(world)
+    planner = Node("planner", transport=world.network.session(), clock=world.clock)
+    client = SimpleActionClient("count", msg.TestAction, node=planner)
+    assert client.wait_for_server(5.0)
+    client.send_goal(msg.TestGoal(50))
+    world.clock.sleep(1.0)
+    (goal,) = world.actions.server_goals("count")
+    assert (goal["sender"], goal["gone"], goal["status"]) == ("planner", False, "ACTIVE")
+    client.stop()
+    planner.close()
+    planner.transport.close()
+    world.clock.sleep(1.0)
+    (goal,) = world.actions.server_goals("count")
+    assert goal["gone"]
+    with pytest.raises(GoalsError, match="not running"):
+        world.actions.cancel_any("count", "planner-9-1.0")
+    world.actions.cancel_any("count", goal["id"])
+    world.clock.sleep(3.0)
+    assert not server.is_active()
+    assert world.actions.server_goals("count") == []

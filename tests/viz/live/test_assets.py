@@ -1,62 +1,66 @@
-"""What the page is made of: each module is found by the name that others import, and is in the wheel."""
+"""The page's files: built from the sources in the tree, served by name, and put into one file."""
 
 from __future__ import annotations
 
-import fnmatch
+import base64
+import hashlib
+import json
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from viz.live import assets
+from smachpy_viz.live import assets
 
-ROOT = Path(__file__).parents[3]
-
-
-def settings():
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)["tool"]["setuptools"]
+SOURCES = Path(__file__).parents[3] / "viz" / "web"
+BUILT = json.loads((assets.WEB / "built.json").read_text(encoding="utf-8"))
 
 
-def test_every_module_that_is_imported_is_in_the_import_map():
-    imported = set()
-    for name in assets.SCRIPTS:
-        text = (assets.WEB / name).read_text(encoding="utf-8")
-        imported |= set(re.findall(r'^(?:import|export) (?:[^"]* from )?"([^"]+)";', text, re.M))
-    assert "#core/fold.js" in imported
-    assert imported <= set(assets.MODULES)
+def test_the_page_is_built_from_the_sources_in_the_tree():
+    """`.ci/web lint` builds it and compares the bytes; this needs no Node.js."""
+    files = [path for top in ("src", "styles") for path in (SOURCES / top).rglob("*")]
+    names = {path.relative_to(SOURCES).as_posix() for path in files if path.is_file()}
+    digest = hashlib.sha256()
+    for name in sorted({*names, "build.mjs", "package-lock.json"}):
+        digest.update(f"{name}\n".encode() + (SOURCES / name).read_bytes())
+    assert BUILT["sources"] == digest.hexdigest(), "viz/web was changed. Try make web"
 
 
-def test_every_file_of_the_page_is_served_and_in_the_wheel():
-    patterns = settings()["package-data"]["viz.web"]
-    for name in assets.FILES:
-        assert assets.read(name) == (assets.WEB / name).read_bytes()
-        assert any(
-            fnmatch.fnmatch(name, one) and name.count("/") == one.count("/") for one in patterns
-        ), name
+def test_no_built_file_was_changed():
+    hashes = {name: hashlib.sha256(assets.read(name)).hexdigest() for name in assets.FILES}
+    assert hashes == BUILT["built"]
 
 
-def test_the_development_tools_are_not_in_the_wheel():
-    excluded = settings()["packages"]["find"]["exclude"]
-    for folder in ("viz.web.node_modules.typescript", "viz.web.js.test"):
-        assert any(fnmatch.fnmatch(folder, one) for one in excluded)
+def test_the_page_is_small():
+    import gzip
+
+    own = [name for name in assets.FILES if name != "elk-worker.js"]
+    assert sum(len(gzip.compress(assets.read(name))) for name in own) < 400_000
+
+
+def test_every_package_has_a_licence_beside_it():
+    for package in BUILT["packages"]:
+        short = package["name"].rpartition("/")[2]
+        assert assets.read(f"licences/{short}.LICENSE.txt"), package
+        assert re.fullmatch(r"[\d.]+", package["version"])
 
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "package.json", "types.d.ts", "js/test/fold.test.js", "js/test/fixtures.js", "index.html",
-        "node_modules/preact/dist/preact.js", "../live/app.py", "js/../app.css", "js", "", "\0",
-    ],
+    ["index.html", "built.json", "__init__.py", "../live/app.py", "licences/../page.css", "licences", "", "\0"],
 )  # fmt: skip
 def test_nothing_else_is_served(name):
     assert assets.read(name) is None
 
 
-def test_one_file_holds_every_module():
+def test_one_file_holds_everything_and_lets_nothing_else_run():
     page = assets.standalone({"snap": {}, "model": {}}, "a <run>")
     assert "a &lt;run&gt;" in page
-    for name in assets.MODULES:
-        assert f'"{name}": "data:text/javascript;base64,' in page
-    assert "/js/" not in page.partition("<body")[0]
+    head = page.partition("<body")[0]
+    assert not re.findall(r"""(?:src|href)=["']/|url\(["']?/""", head.partition("<script")[0])
+    scripts = re.findall(r'<script type="module">(.*?)</script>', head, re.DOTALL)
+    assert len(scripts) == 1
+    digest = base64.b64encode(hashlib.sha256(scripts[0].encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}' blob:;" in head
+    for name in ("elk", "film", "run"):
+        assert f'id="{name}-data"' in head

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from actionlib_core.exceptions import FieldError
 from actionlib_core.interfaces import define_action, get_message
-from viz.live.forms import fields_of, problems_of, sensible, values_of, yaml_of
+from smachpy_viz.live.forms import fields_of, problems_of, sensible, values_of, yaml_of
 
 define_action(
     "form_msgs/Paint",

@@ -8,13 +8,14 @@ from dataclasses import asdict
 import pytest
 
 from actionlib_core.node import Node
+from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import IntrospectionServer, State, StateMachine
 from smachpy.events import buffer
-from smachpy.introspection import describe
+from smachpy.events.introspection import describe
 from smachpy.network import feed
-from viz.live.machines import Machine, Machines
-from viz.live.network import Network
+from smachpy_viz.live.machines import Machine, Machines
+from smachpy_viz.live.network import Network
 
 
 class Spin(State):
@@ -109,7 +110,7 @@ def test_a_viewer_knows_how_far_a_robots_clock_is_off(clock, watch, monkeypatch)
 
 
 def test_who_comes_late_is_told_what_the_kept_events_do_not_tell(clock, watch, monkeypatch):
-    monkeypatch.setattr(feed, "KEPT_BYTES", 1000)
+    monkeypatch.setattr(feed, "MAX_KEPT_BYTES", 1000)
     job = spinning(500)
     seen = watch(job)
     assert job.execute() == "done"
@@ -167,7 +168,7 @@ def test_a_machine_that_obeys_nobody_tells_nobody(clock, watch):
 
 
 def test_a_network_that_takes_nothing_does_not_hold_up_the_end(clock, watch, monkeypatch):
-    monkeypatch.setattr(feed, "KEPT_EVENTS", 300)
+    monkeypatch.setattr(feed, "MAX_KEPT_EVENTS", 300)
     job = spinning(2000)
     watch(job)
     sent = []
@@ -232,7 +233,7 @@ def test_an_answer_that_is_read_late_does_not_undo_what_was_told_since(clock, wa
     mission = clock.spawn(job.execute, name="mission")
     clock.sleep(1.0)
     assert seen.facts()["control"]["paused"]
-    client = watch.viewer._links["robot"]._client
+    client = watch.viewer._links["robot"].client
     send = client.send
 
     def slowly(command):
@@ -273,3 +274,26 @@ def test_machines_of_two_networks_are_told_apart(clock, watch):
     server.stop()
     desk.close()
     robot.close()
+
+
+def test_the_end_of_a_run_that_arrives_after_its_program_has_gone_is_shown(clock):
+    """A machine whose program ended with it stayed "stale": the end of its token came first."""
+    network = MemoryNetwork(clock)
+    late = FaultyTransport(network.session(), lambda key, _: (0.1 if "events" in key else 0.0,))
+    machines = Machines()
+    with (
+        Node("robot", transport=late, clock=clock) as robot,
+        Node("desk", transport=network.session(), clock=clock) as desk,
+    ):
+        viewer = Network(desk, machines)
+        job = spinning(1)
+        server = IntrospectionServer("robot", job, "/JOB", node=robot)
+        server.start()
+        clock.sleep(2.0)
+        job.execute()
+        server.stop()
+        clock.sleep(2.0)
+        seen = machines.get("robot")
+        assert seen.stale is not None
+        assert seen.summary()["outcome"] == "done"
+        viewer.close()

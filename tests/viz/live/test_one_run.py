@@ -12,10 +12,11 @@ import pytest
 from smachpy.command import main
 from smachpy.durable.store import open_store
 from smachpy.exceptions import SmachError
-from viz.live import journals as journals_module
-from viz.live.journals import Journals
-from viz.live.machines import Machines
-from viz.live.runs import Runs, with_missions
+from smachpy_viz.live import journals as journals_module
+from smachpy_viz.live.journals import Journals
+from smachpy_viz.live.machines import Machines
+from smachpy_viz.live.runs import Runs, with_missions
+from tests.places import DATA
 
 MISSION = """
 from pathlib import Path
@@ -43,7 +44,7 @@ def carry(userdata):
         raise KeyboardInterrupt
     return "done"
 """
-FOLDS = Path(__file__).parents[2] / "data" / "folds.json"
+FOLDS = DATA / "folds.json"
 
 
 @pytest.fixture
@@ -82,7 +83,10 @@ def test_a_mission_is_resumed_by_a_process_of_its_own(interrupted, monkeypatch, 
             started.append(self)
 
     monkeypatch.setattr(journals_module.subprocess, "Popen", Popen)
-    journals = Journals([interrupted], logs=tmp_path / "logs")
+    runs = Runs(Machines(), [Path("runs")], Journals([interrupted]))
+    with pytest.raises(SmachError, match="--allow"):
+        runs.command({"journal": "j.db", "id": "m", "command": "resume"})
+    journals = Journals([interrupted], logs=tmp_path / "logs", allow=[str(tmp_path)])
     runs = Runs(Machines(), [Path("runs")], journals)
     Path("go").touch()
     assert runs.command({"journal": "j.db", "id": "m", "command": "resume"})

@@ -113,7 +113,8 @@ def test_a_question_is_seen_though_the_details_are_hidden(served, look):
     page.wait_for_selector("html[data-drawn]")
     assert page.evaluate(WORD) == ["tree", "", "time"]
     machine.add(served.events([("QuestionAsked", "/JOB/A", asked)], after=2))
-    page.wait_for_selector(".dock.right .question")
+    with page.expect_response("**/api/control*"):
+        page.click(".question .answer:text-is('Yes')")
 
 
 def test_a_phone_shows_one_part_at_a_time(page):
@@ -123,7 +124,7 @@ def test_a_phone_shows_one_part_at_a_time(page):
         "Machine", "Map", "Time", "Log",
     ]  # fmt: skip
     seen = {
-        "Machine": ".diagram", "Map": ".map-view canvas", "Time": ".timeline canvas", "Log": ".log",
+        "Machine": ".diagram", "Map": ".map-view canvas", "Time": ".timeline canvas[role=slider]", "Log": ".log",
     }  # fmt: skip
     for title, selector in seen.items():
         page.click(f".parts button:has-text('{title}')")

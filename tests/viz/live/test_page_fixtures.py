@@ -1,9 +1,8 @@
-"""What the page computes as well, on data that the tests of its JavaScript share (viz/web/js/test)."""
+"""What the page computes as well, on data that its own tests share (viz/web/test)."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -11,15 +10,14 @@ from actionlib_core.exceptions import FieldError
 from actionlib_core.interfaces import define_action, get_message
 from smachpy import CBState, Concurrence, StateMachine
 from smachpy.events import SOURCES, asker_text, span_text
+from smachpy.events.introspection import describe
+from smachpy.events.outcome_classes import FAILURE, PREEMPTED_PREFIXES, SUCCESS, outcome_class
 from smachpy.events.run_state import RunState
-from smachpy.introspection import describe
-from smachpy.outcome_classes import FAILURE, PREEMPTED_PREFIXES, SUCCESS, outcome_class
-from viz.live import assets
-from viz.live.forms import fields_of, problems_of, sensible, values_of
-from viz.model.labels import shorten
-from viz.runs.statistics import Statistics, never_taken
-
-DATA = Path(__file__).parents[2] / "data"
+from smachpy_viz.live import assets
+from smachpy_viz.live.forms import fields_of, problems_of, sensible, values_of
+from smachpy_viz.model.labels import shorten
+from smachpy_viz.runs.statistics import Statistics, never_taken
+from tests.places import DATA
 
 define_action(
     "page_msgs/Paint",

@@ -8,7 +8,7 @@ import pytest
 
 from smachpy import CBState, StateMachine, describe
 from smachpy.events.recording import recording_lines
-from viz.live.runs import Runs
+from smachpy_viz.live.runs import Runs
 
 pytestmark = pytest.mark.browser
 
@@ -70,6 +70,15 @@ def test_the_page_begins_with_the_runs_and_opens_one(home, look):
     page.wait_for_selector(".home")
     page.keyboard.press("Escape")
     page.wait_for_selector(".home", state="detached")
+
+
+def test_the_list_of_runs_and_its_header_fill_a_phone_held_sideways(home, look):
+    page = look(home.address)
+    page.set_viewport_size({"width": 844, "height": 390})
+    page.wait_for_selector(".home .runs")
+    for part in (".top", ".home"):
+        box = page.locator(part).bounding_box()
+        assert (box["x"], box["width"]) == (0, 844), part
 
 
 def test_filters_search_and_pins(home, look):
@@ -177,6 +186,7 @@ def test_a_durable_mission_is_resumed_with_the_token_alone(served, look):
     assert page.locator(".runs button.small").count() == 0
     page = look(served.address + "#token=right", drawn=False)
     page.click("button[aria-label='resume <b>m</b>']")
+    page.click(".confirm .warn")
     page.wait_for_selector("text=it is resumed")
     assert missions.told == [("j.db", "<b>m</b>", "resume", "")]
     answer = page.evaluate(
@@ -196,6 +206,21 @@ def test_the_timeline_has_a_gap_where_no_process_ran_the_mission(served, look):
     assert page.evaluate("() => smachpy.store.run.now.outages.length") == 1
     assert page.evaluate("() => smachpy.page.timeline.gaps.length") == 1
     assert page.locator(".log >> text=resumed after an outage of 10 s").count() == 1
+
+
+def test_a_large_fleet_is_shown_in_parts(served, look):
+    for number in range(40):
+        served.add(f"r{number:02}", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look(served.start(home=True), drawn=False)
+    page.click("button:has-text('Fleet')")
+    page.wait_for_selector(".fleet header:has-text('1 to 32 of 40 live runs')")
+    assert page.locator(".fleet .cards button").count() == 32
+    page.click("button:has-text('Later')")
+    page.wait_for_selector(".fleet header:has-text('33 to 40 of 40 live runs')")
+    assert page.locator(".fleet .cards button").count() == 8
+    assert page.locator("button:has-text('Later')").is_disabled()
+    page.click("button:has-text('Earlier')")
+    page.wait_for_selector(".fleet header:has-text('1 to 32')")
 
 
 def test_live_runs_together_have_cards_lanes_and_one_map(served, look):

@@ -64,6 +64,53 @@ def test_a_long_chain_is_folded(served, look):
     assert shown["k"] > 0.5
 
 
+def recovery():
+    """What drives, chooses what to do when it fails, and goes back: arrows over several lines."""
+    turn = chain(["HALF", "OTHER_HALF"])
+    turn.register_outcomes(["aborted"])
+    ways = {
+        "REMEMBER": {"valid": "DRIVE", "invalid": "aborted"},
+        "DRIVE": {"succeeded": "succeeded", "aborted": "CHOOSE"},
+        "CHOOSE": {"clear": "CLEAR", "rotate": "ROTATE", "ask": "ASK"},
+        "CLEAR": {"succeeded": "DRIVE", "aborted": "CHOOSE"},
+        "ROTATE": {"done": "DRIVE", "aborted": "CHOOSE"},
+        "ASK": {
+            "retry": "CLEAR",
+            "home": "COME_BACK",
+            "give_up": "aborted",
+            "no_answer": "COME_BACK",
+        },
+        "COME_BACK": {"succeeded": "returned"},
+    }
+    sm = StateMachine(outcomes=["succeeded", "returned", "aborted"], name="RECOVERY")
+    with sm:
+        for name, way in ways.items():
+            state = turn if name == "ROTATE" else CBState(lambda _: "x", outcomes=list(way))
+            StateMachine.add(name, state, way)
+    return sm
+
+
+ROOTS = """() => {
+    const { view, layout } = smachpy.page;
+    const roots = [...layout.cache.values()].filter((one) => one.node.parent === null);
+    const arrows = roots.flatMap((root) => root.edges.map((edge) => edge.points));
+    const isStraight = (points) => points.every((p, i) =>
+        i === 0 || Math.min(Math.abs(p.x - points[i - 1].x), Math.abs(p.y - points[i - 1].y)) < 1);
+    return { scales: roots.map((one) => view.scaleFor(one)), straight: arrows.every(isStraight) };
+}"""
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844)])
+def test_of_the_layouts_the_one_with_about_the_largest_scale_is_shown(served, look, size):
+    served.add("recovery", sm=recovery())
+    page = look(served.start())
+    page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+    shown = all_levels(page)
+    tried = page.evaluate(ROOTS)
+    assert tried["straight"]
+    assert shown["k"] >= 0.85 * min(1.5, max(tried["scales"]))
+
+
 def test_a_chain_in_a_machine_is_folded_though_nothing_leads_to_one_of_its_outcomes(served, look):
     work = chain([f"STEP_{n}" for n in range(24)])
     work.register_outcomes(["preempted"])
@@ -260,6 +307,28 @@ def test_there_is_no_minimap_of_no_machine(served, look):
     page = look(served.start(), drawn=False)
     page.wait_for_selector("text=No machine on the network yet")
     wait_for(page, "getComputedStyle(document.querySelector('.minimap')).opacity === '0'")
+
+
+def left_and_width(page, selector):
+    box = page.locator(selector).bounding_box()
+    return box["x"], box["width"]
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (900, 900), (844, 390), (390, 844)])
+def test_nothing_stands_beside_the_words_that_a_machine_is_missing(served, look, width, height):
+    served.add("one", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look(f"{served.start()}?machine=nobody", drawn=False)
+    page.set_viewport_size({"width": width, "height": height})
+    page.wait_for_selector("text=No machine is called")
+    wait_for(page, "!document.querySelector('.dock').checkVisibility()")
+    assert left_and_width(page, ".stage") == (0, width)
+    for other in (".dock", ".parts", ".play", ".strip", ".time-tools"):
+        assert not [one for one in page.locator(other).all() if one.is_visible()], other
+    page.click(".empty button:has-text('one')")
+    page.wait_for_selector("html[data-drawn]")
+    page.wait_for_selector(".diagram", state="visible")
+    assert page.is_visible(".parts") == (width == 390 or height == 390)
+    assert page.is_visible(".dock.bottom") == page.is_hidden(".parts")
 
 
 def test_titles_that_are_enlarged_stay_inside_their_containers(served, look):

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 
 import pytest
 
-from viz.live import machines
+from smachpy_viz.live import machines
+from tests.places import DATA
 
 pytestmark = pytest.mark.browser
-
-DATA = Path(__file__).parents[2] / "data"
 
 
 def stamped(x, y):
@@ -166,7 +164,7 @@ def test_a_page_hears_of_the_robot_while_it_moves(office, look, monkeypatch):
     for record in told:
         machine.observe([record])
     page.wait_for_function("() => smachpy.store.scene.robots.get('')?.poses.length === 81")
-    monkeypatch.setattr(machines, "KEPT_OBSERVED", 50)
+    monkeypatch.setattr(machines, "MAX_KEPT_OBSERVATIONS", 50)
     last = told[-1]
     machine.observe(
         [*told, *({**last, "n": last["n"] + n} for n in range(1, 33))]

@@ -174,7 +174,8 @@ def test_the_tree_opens_on_a_small_screen(served, look):
     page = look(served.start())
     page.set_viewport_size({"width": 390, "height": 844})
     assert not page.is_visible(".tree")
-    page.click(".states-button")
+    page.click(".menu > button")
+    page.click(".sheet button:text-is('States')")
     page.click("[role=treeitem][title='/JOB/B']")
     wait_for(page, "smachpy.store.selected.value === '/JOB/B'")
     assert not page.is_visible(".tree")
@@ -229,7 +230,7 @@ def test_goals_that_have_ended_are_a_line_each(served, look):
     )
     page.click("button:text-is('2 earlier')")
     wait_for(page, "document.querySelectorAll('.ended-goal').length === 5")
-    lines.nth(0).locator("summary .what").click()
+    lines.nth(0).locator(".what").click()
     wait_for(page, "document.querySelector('.ended-goal pre')?.textContent.includes('goal')")
 
 
@@ -264,7 +265,8 @@ def test_names_carry_their_parent_where_they_repeat(served, look):
 
 
 def test_values_are_trees_and_rounded(served, look):
-    value = "Waypoint(name='dock 2', pose=Pose2D(x=9.8, yaw=1.5708000000000002))"
+    pose = {"$object": "Pose2D", "fields": {"x": 9.8, "yaw": 1.5708000000000002}}
+    value = {"$object": "Waypoint", "fields": {"name": "dock 2", "pose": pose}}
     wrote = ("UserdataWritten", "/JOB/A", {"key": "task", "value": value, "at": 2.0})
     served.add("one", events=[*BEGUN, wrote])
     page = look(served.start())
@@ -298,9 +300,9 @@ def test_why_it_ended_so_and_a_step_goes_there(served, look):
     page.wait_for_selector(".why li")
     said = [text.split() for text in page.locator(".why .step").all_text_contents()]
     assert [(words[0], words[-1]) for words in said] == [
-        ("A", "33.00"),
-        ("A", "33.00"),
-        ("JOB", "33.00"),
+        ("A", "00:33.00"),
+        ("A", "00:33.00"),
+        ("JOB", "00:33.00"),
     ]
     assert page.text_content(".why pre") == "job.py:7 in go: x"
     page.click(".why .step")
@@ -409,10 +411,10 @@ def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
     served.add("one", events=BEGUN)
     page = look(served.start())
     page.evaluate(
-        "() => { smachpy.store.homeOpen.value = true; smachpy.store.simulateOpen.value = true; }"
+        "() => { smachpy.store.pageShown.value = 'runs'; smachpy.store.simulateOpen.value = true; }"
     )
     page.wait_for_selector(".simulate")
     page.keyboard.press("h")  # keys are for the dialog
     page.keyboard.press("Escape")
     wait_for(page, "!document.querySelector('.simulate')")
-    assert page.evaluate("() => smachpy.store.homeOpen.value")
+    assert page.evaluate("() => smachpy.store.pageShown.value === 'runs'")

@@ -101,6 +101,6 @@ def test_an_operator_fires_a_transition(plan, start, look):
     wait_for(page, first, "begun is false")
     page.click(f'g[data-path="{first}"]')
     page.get_by_role("button", name="Fire", exact=True).click()
-    page.get_by_role("button", name="Yes", exact=True).click()
+    page.click(".confirm .warn")
     wait_for(page, second, "seen is false, close is false")
     assert plan.marking() == {path_of(plan, "there").rpartition("/")[2]: 1}

@@ -279,6 +279,22 @@ def test_the_last_seconds_are_saved_as_a_gif_without_moving_anything(served, loo
     assert page.evaluate(SHOWN).startswith("00:3")
 
 
+def test_a_film_can_be_stopped_and_freezes_nothing(served, look):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate(
+        "() => { const { store } = smachpy; store.selectStretch(store.run.first(), store.run.last()); }"
+    )
+    downloads = []
+    page.on("download", lambda one: downloads.append(one))
+    page.click(".share button:has-text('GIF')")
+    page.wait_for_selector(".share button:has-text('%')")
+    page.click(".share button:has-text('%')")  # it takes clicks while it encodes
+    page.wait_for_selector(".share button:text-is('GIF')")
+    assert page.evaluate("() => smachpy.store.filmed.value") is None
+    assert downloads == []
+
+
 def test_what_is_typed_stays_while_a_run_goes_on(served, look):
     served.add("one", events=run()[:1])
     page = look(served.start())

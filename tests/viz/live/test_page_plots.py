@@ -7,6 +7,10 @@ import pytest
 pytestmark = pytest.mark.browser
 
 
+def pose(x):
+    return {"$object": "Pose2D", "fields": {"x": x, "y": 2.0}}
+
+
 def feedback(x, at, left):
     message = {
         "$msg": "nav/Feedback",
@@ -21,12 +25,12 @@ def run():
     return [
         ("Started", "/JOB", {"at": 0.0}),
         ("Entered", "/JOB/A", {"at": 0.0}),
-        ("UserdataWritten", "/JOB/A", {"key": "pose", "value": "Pose2D(x=1.5, y=2.0)", "at": 1.0}),
+        ("UserdataWritten", "/JOB/A", {"key": "pose", "value": pose(1.5), "at": 1.0}),
         ("GoalSent", "/JOB/A", {"action": "go", "goal_id": "1", "goal": None, "at": 2.0}),
         feedback(10, 3.0, 6.0),
         feedback(20, 5.0, 4.0),
         feedback(30, 7.0, 2.0),
-        ("UserdataWritten", "/JOB/A", {"key": "pose", "value": "Pose2D(x=4.5, y=2.0)", "at": 8.0}),
+        ("UserdataWritten", "/JOB/A", {"key": "pose", "value": pose(4.5), "at": 8.0}),
         ("Left", "/JOB/A", {"outcome": "ok", "at": 9.0}),
         ("Finished", "/JOB", {"outcome": "done", "at": 10.0}),
     ]

@@ -120,8 +120,8 @@ def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
     page.evaluate("() => smachpy.store.seek(smachpy.store.run.first())")
     page.click(f"{OPEN} .answer:text('Back to live to answer')")
     wait_for(page, "smachpy.store.cursor.value === null")
-    page.click(f"{OPEN} .answer.primary")
-    page.wait_for_selector(".notice.info")
+    with page.expect_response("**/api/control*"):
+        page.click(f"{OPEN} .answer.primary")
     (sent,) = served.commands
     assert (sent["command"], sent["path"], sent["answer"]) == ("answer", "/JOB/A", "yes")
     assert sent["by"].startswith("page at ")

@@ -12,9 +12,9 @@ from dataclasses import asdict
 import pytest
 
 from smachpy import CBState, Concurrence, ConditionState, StateMachine
+from smachpy_viz.live import app, streams
+from smachpy_viz.live.machines import MAX_KEPT_RUNS
 from tests.browser import wait_for
-from viz.live import app
-from viz.live.machines import KEPT_RUNS
 
 pytestmark = pytest.mark.browser
 
@@ -80,13 +80,13 @@ def test_a_restart_keeps_the_run_before_to_look_at(served, look):
 def test_so_many_runs_before_are_kept(served):
     machine = served.add("one", events=run())
     history = {"problems": [], "base": None, "control": None, "description": asdict(machine.record)}
-    for number in range(KEPT_RUNS + 2):
+    for number in range(MAX_KEPT_RUNS + 2):
         machine.reset({**history, "epoch": str(number), "events": served.events(run())})
         machine.reset({**history, "epoch": str(number), "events": served.events(run())})
     machine.reset({**history, "epoch": "not begun", "events": []})
     machine.reset({**history, "epoch": "begun", "events": served.events(run())})
     kept = [one for one in served.machines.summaries() if one["after"] == "one"]
-    assert len(kept) == KEPT_RUNS
+    assert len(kept) == MAX_KEPT_RUNS
     assert all(one["outcome"] == "done" and one["recorded"] for one in kept)
     assert machine.before in [one["name"] for one in kept]
     assert machine.summary()["outcome"] == "done"
@@ -230,11 +230,11 @@ def test_a_row_of_userdata_by_keyboard(served, look):
     served.add("one", events=[*run()[:2], written])
     page = look(served.start())
     page.wait_for_selector(".userdata tr")
-    page.focus(".userdata tr")
+    page.focus(".userdata th button")
     page.keyboard.press("Enter")
-    page.wait_for_selector(".userdata pre")
+    page.wait_for_selector(".userdata .value-tree")
     page.keyboard.press("Space")
-    wait_for(page, "!document.querySelector('.userdata pre')")
+    wait_for(page, "!document.querySelector('.userdata .value-tree')")
 
 
 def test_a_server_that_says_nothing_is_lost_and_found_again(start, look):
@@ -254,19 +254,20 @@ def test_a_message_that_comes_slowly_is_waited_for(served, look, monkeypatch):
     """What a slow link brings is no message before its end, and looks as if nothing came."""
     beat, slow = 0.05, 0.6
     opened = []
-    stream = app.Viewer._stream
+    messages = streams.Streams._messages
 
-    async def slowly(viewer, one):
+    async def slowly(viewer, one, stranger):
         opened.append(one)
-        async for text in stream(viewer, one):
+        async for text in messages(viewer, one, stranger):
             if text.startswith("event: snap"):
                 yield text[:40]
                 await asyncio.sleep(slow)
                 text = text[40:]
             yield text
 
-    monkeypatch.setattr(app, "BEAT_S", beat)
-    monkeypatch.setattr(app.Viewer, "_stream", slowly)
+    for module in (app, streams):
+        monkeypatch.setattr(module, "BEAT_S", beat)
+    monkeypatch.setattr(streams.Streams, "_messages", slowly)
     served.add("one", events=run())
     page = look(served.start())
     assert len(opened) > 1  # it was cut at first
@@ -277,7 +278,7 @@ def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
     machine = served.add("one", events=run()[:2])
     page = look(served.start())
     page.keyboard.press(",")
-    page.evaluate("async () => (await import('#core/connection.js')).reconnect()")
+    page.evaluate("() => smachpy.reconnect()")
     wait_for(page, "smachpy.store.connection.value === 'live'")
     machine.add(served.events(run()[2:4], after=2))
     wait_for(page, "smachpy.store.run.events.length === 4")
@@ -303,7 +304,7 @@ def test_the_machine_chosen_last_is_shown_however_late_the_first_answers(served,
     page = look(served.start())
     held = []
     page.route("**/api/model?machine=one*", lambda route: held.append(route))
-    choose = "async (name) => (await import('#core/connection.js')).choose(name)"
+    choose = "(name) => smachpy.choose(name)"
     page.evaluate(choose, "two")
     page.wait_for_selector('g[data-path="/TWO/Z"]')
     page.evaluate(choose, "one")
@@ -332,7 +333,7 @@ def test_a_page_without_its_layout_worker_says_so(served, look):
     served.add("one")
     address = served.start()
     page = look("about:blank", drawn=False)
-    page.route("**/elk-worker.min.js", lambda route: route.abort())
+    page.route("**/elk-worker.js", lambda route: route.abort())
     page.goto(address)
     page.wait_for_selector("text=could not be laid out")
 
@@ -340,11 +341,10 @@ def test_a_page_without_its_layout_worker_says_so(served, look):
 def test_what_the_server_answers_is_told_as_it_is(served, look):
     served.add("one")
     page = look(served.start())
-    ask = "async (address) => (await import('#core/connection.js')).ask(address)"
+    ask = "(address) => smachpy.ask(address)"
     gone = page.evaluate(ask, "/api/compare?machine=one&with=gone")
     assert gone["ok"] is False
-    assert "404" in gone["text"]
-    assert "nothing there: machine=one&with=gone" in gone["text"]
+    assert gone["text"] == "with: got 'gone'; expected one of /api/machines."
     page.route("**/api/compare?*", lambda route: route.fulfill(status=500, body="Internal"))
     assert "500 Internal Server Error: Internal" in page.evaluate(ask, "/api/compare?")["text"]
     page.route("**/api/compare?*", lambda route: route.abort())
@@ -480,9 +480,8 @@ def test_what_the_page_keeps_has_an_end(served, look):
         ]
     )
     kept = page.evaluate(
-        """async (events) => {
-          const { Run } = await import('#core/run.js');
-          const run = new Run(null, []);
+        """(events) => {
+          const run = new smachpy.store.run.constructor(null, []);
           let gone = 0;
           for (let i = 0; i < events.length; i += 10) {
             run.push(events.slice(i, i + 10));
@@ -549,7 +548,7 @@ def test_what_comes_just_before_one_looks_back_does_not_flash_later(served, look
 
 
 class Network:
-    """The actions of a network, as `viz.live.actions.Actions` tells them."""
+    """The actions of a network, as `smachpy_viz.live.actions.Actions` tells them."""
 
     revision = 0
 
@@ -651,7 +650,7 @@ def test_a_log_that_is_cut_goes_further_back_when_it_is_asked_to(served, look):
 
 
 def test_the_arrows_of_the_search_stay_on_what_it_shows(served, look):
-    from smachpy.introspection import StateRecord
+    from smachpy.events.introspection import StateRecord
 
     leaves = tuple(
         StateRecord(f"/JOB/STEP_{n:02}", f"STEP_{n:02}", "state", "State", ("done",))
@@ -691,7 +690,7 @@ def test_breakpoints_after_an_outcome_and_a_pause_that_stops_what_runs(served, l
     ].items()
     page.click("#pause-now")
     assert len(served.commands) == 2  # it asks first
-    page.click(".confirm >> text=Yes")
+    page.click(".confirm .warn")
     wait_for(page, "document.querySelector('.notice')?.textContent.includes('pause')")
     assert {"command": "pause", "running": "cancel"}.items() <= served.commands[-1].items()
 

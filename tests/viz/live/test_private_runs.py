@@ -9,8 +9,8 @@ import pytest
 from actionlib_core.clock import RealClock
 from actionlib_core.config import DOMAIN_VARIABLE, Config
 from actionlib_core.node import Node
-from actionlib_core.private_network import private_network
-from viz.live.cli import private_runs
+from actionlib_core.wire.private_network import private_network
+from smachpy_viz.live.cli import private_runs
 
 pytestmark = pytest.mark.zenoh
 

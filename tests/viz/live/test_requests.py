@@ -16,11 +16,12 @@ import pytest
 import segno
 
 from smachpy.command import main
-from viz.live.app import Viewer
-from viz.live.cli import print_qr
-from viz.live.machines import Machines
-from viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
-from viz.runs import html
+from smachpy_viz.live import server as server_module
+from smachpy_viz.live.app import Viewer
+from smachpy_viz.live.cli import print_qr
+from smachpy_viz.live.machines import Machines
+from smachpy_viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
+from smachpy_viz.runs import html
 
 
 @pytest.mark.parametrize("last", ["x:²", "x:٣", "x:-1", "x", "x:", f"x:{'9' * 5000}", "x:1.0"])
@@ -74,6 +75,67 @@ def test_a_page_that_goes_while_it_sends_a_command_leaves_no_traceback(served, c
                 pass
     served.end()
     assert "Traceback" not in capfd.readouterr().err
+
+
+HEAD = b"POST /api/mission HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
+WITH_TOKEN = HEAD + b"x-smachpy-token: t\r\nContent-Length: 50\r\n\r\n"
+
+
+def ends(link, seconds=10.0):
+    """Whether the server closes a connection."""
+    link.settimeout(seconds)
+    try:
+        while link.recv(1000):
+            pass
+    except ConnectionResetError:
+        pass
+    except TimeoutError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET", HEAD, WITH_TOKEN, WITH_TOKEN + b'{"a'])
+def test_request_that_does_not_end_is_given_up(served, monkeypatch, sent):
+    monkeypatch.setattr(server_module, "REQUEST_S", 0.2)
+    base = urllib.parse.urlsplit(served.start(token="t"))
+    with socket.create_connection((base.hostname, base.port), 10) as link:
+        link.sendall(sent)
+        assert ends(link)
+
+
+def test_request_that_arrives_byte_by_byte_has_no_more_time(served, monkeypatch):
+    monkeypatch.setattr(server_module, "REQUEST_S", 0.2)
+    base = urllib.parse.urlsplit(served.start(token="t"))
+    with socket.create_connection((base.hostname, base.port), 10) as link:
+        for byte in b"GET / HTTP/1.1\r\nx: " + b"y" * 10_000:
+            try:
+                link.sendall(bytes([byte]))
+            except OSError:
+                return
+            if ends(link, 0.01):
+                return
+    pytest.fail("it had all the time")
+
+
+def test_stream_of_events_outlasts_the_time_for_a_request(served, monkeypatch):
+    monkeypatch.setattr(server_module, "REQUEST_S", 0.1)
+    served.add("one")
+    base = urllib.parse.urlsplit(served.start())
+    with socket.create_connection((base.hostname, base.port), 10) as link:
+        link.sendall(b"GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert not ends(link, 0.5)
+
+
+def test_connections_above_the_limit_are_closed(served, monkeypatch):
+    monkeypatch.setattr(server_module, "MAX_CONNECTIONS", 3)
+    base = urllib.parse.urlsplit(served.start())
+    links = [socket.create_connection((base.hostname, base.port), 10) for _ in range(3)]
+    try:
+        with socket.create_connection((base.hostname, base.port), 10) as link:
+            assert ends(link)
+    finally:
+        for link in links:
+            link.close()
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])

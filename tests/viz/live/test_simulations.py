@@ -10,7 +10,7 @@ import urllib.request
 
 import pytest
 
-from viz.live.simulations import SimulationError, Simulations
+from smachpy_viz.live.simulations import SimulationError, Simulations
 
 MISSION = """
 import smachpy
@@ -115,7 +115,7 @@ def test_a_batch_that_cannot_run_says_why(simulations, job, key):
 
 def test_a_batch_that_loses_the_interrupt_is_killed(simulations, tmp_path, job, monkeypatch):
     """An interrupt in a destructor, or in a callback of the import system, is printed and lost."""
-    monkeypatch.setattr("viz.live.simulations.STOP_S", 0.2)
+    monkeypatch.setattr("smachpy_viz.live.simulations.STOP_S", 0.2)
     deaf = tmp_path / "deaf.py"
     deaf.write_text("import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + MISSION)
     simulations._own.append(str(deaf))

@@ -10,9 +10,9 @@ from textual.widgets import DataTable, RichLog, Static, Tree
 from smachpy import CBState, StateMachine
 from smachpy.events.recording import Recorder, read_recording
 from smachpy.events.run_state import RunState
-from viz.live import tui
-from viz.live.machines import Machine, Machines
-from viz.live.tui import MissionApp
+from smachpy_viz.live import tui
+from smachpy_viz.live.machines import Machine, Machines
+from smachpy_viz.live.tui import MissionApp
 
 
 def recorded(tmp_path):
@@ -168,7 +168,7 @@ def test_values_are_shown_whatever_they_spell(tmp_path, clock):
         1, "UserdataWritten", path="/JOB/IN/DEEP[b]", key="k[/x]", value="goal [/red] done"
     )
     machine = watched(tmp_path, [wrote])
-    assert seen(machine)["values"] == [["k[/x]", "goal [/red] done", "DEEP[b]"]]
+    assert seen(machine)["values"] == [["k[/x]", "'goal [/red] done'", "DEEP[b]"]]
 
 
 def test_what_is_told_anew_is_shown_anew(tmp_path, clock):

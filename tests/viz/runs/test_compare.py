@@ -9,11 +9,11 @@ import pytest
 
 from smachpy import CBState, StateMachine
 from smachpy.command import main
+from smachpy.events.introspection import RuleRecord, StateRecord, TransitionRecord
 from smachpy.events.recording import Recorder
-from smachpy.introspection import RuleRecord, StateRecord, TransitionRecord
-from viz.pictures.drawing import draw, picture
-from viz.runs.compare import Side, drawing, unite
-from viz.runs.statistics import StateStatistics, Statistics, marks_of
+from smachpy_viz.pictures.drawing import draw, picture
+from smachpy_viz.runs.compare import ComparedRun, drawing, unite
+from smachpy_viz.runs.statistics import StateStatistics, Statistics, marks_of
 
 
 def leaf(label, outcomes=("done",), **more):
@@ -58,7 +58,9 @@ NEW = rooted(
 
 
 def both(old=OLD, new=NEW, **more):
-    return unite(Side("old", old, more.get("before")), Side("new", new, more.get("after")))
+    return unite(
+        ComparedRun("old", old, more.get("before")), ComparedRun("new", new, more.get("after"))
+    )
 
 
 def test_states_and_transitions_of_both_under_the_paths_of_the_second():
@@ -137,7 +139,7 @@ def test_numbers_per_run_only_where_they_differ_notably():
 
 
 def test_a_difference_is_never_told_by_colour_alone():
-    old, new = Side("old", OLD), Side("new", NEW)
+    old, new = ComparedRun("old", OLD), ComparedRun("new", NEW)
     diagram = drawing(unite(old, new), old, new)
     text = draw(diagram, "dot").decode()
     for sign in ("+", "\u2212", "\u2260"):
@@ -216,7 +218,7 @@ def test_render_with_recorded_runs(recorded, tmp_path, capsys):
     recorded("1.jsonl")
     recorded("2.jsonl")
     target = tmp_path / "job.json"
-    from smachpy.introspection import describe
+    from smachpy.events.introspection import describe
 
     target.write_text(describe(make_machine(extra=False)).to_json())
     out = tmp_path / "job.dot"

@@ -12,9 +12,9 @@ import pytest
 from mcap.reader import make_reader
 
 from actionlib_core.interfaces import define_action, get_message
+from smachpy.events.introspection import StateRecord, TransitionRecord
 from smachpy.events.recording import interface_texts, read_recording
-from smachpy.introspection import StateRecord, TransitionRecord
-from viz.runs.mcap import write_mcap
+from smachpy_viz.runs.mcap import write_mcap
 
 KNOWN = {  # md5 sums of ROS Noetic, by which Foxglove and rviz know the types
     "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
@@ -58,7 +58,7 @@ EVENTS = [
 def goal_sent(kind, fields):
     goal = {"$msg": kind, "fields": fields}
     return {
-        "kind": "GoalSent", "path": "/JOB/A", "t": 0.0, "action": "work", "goal_id": "g", "goal": goal,
+        "kind": "GoalSent", "path": "/JOB/A", "t": 0.0, "action": "weld", "goal_id": "g", "goal": goal,
     }  # fmt: skip
 
 
@@ -162,7 +162,7 @@ def test_own_types_come_from_the_recording(tmp_path):
             goal_sent("elsewhere_msgs/BadGoal", {}),
         ],
     )
-    goals = [(schema.name, m) for schema, topic, m in found if topic == "/work/goal"]
+    goals = [(schema.name, m) for schema, topic, m in found if topic == "/weld/goal"]
     assert [name for name, _ in goals] == ["elsewhere_msgs/WeldActionGoal"]
     assert goals[0][1].goal.seams[0].long == 1.5
 

@@ -16,14 +16,14 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-import viz.runs.simulate
+import smachpy_viz.runs.simulate
 from smachpy.command import main
+from smachpy.events.introspection import StateRecord
 from smachpy.events.recording import each_recording
 from smachpy.exceptions import MissionError, SmachError
-from smachpy.introspection import StateRecord
-from viz.runs.report import Runs, by_quarter, collect, report
-from viz.runs.simulate import Plan, Vary, simulate
-from viz.runs.statistics import StateStatistics
+from smachpy_viz.runs.report import MachineRuns, by_quarter, collect, report
+from smachpy_viz.runs.simulate import SimulationPlan, Vary, simulate
+from smachpy_viz.runs.statistics import StateStatistics
 
 MISSION = """
 import smachpy
@@ -67,7 +67,7 @@ def job(tmp_path):
 
 
 def plan(job, tmp_path, runs, *vary, seed=1):
-    return Plan(job, runs, tmp_path / "runs", [Vary.read(text) for text in vary], seed)
+    return SimulationPlan(job, runs, tmp_path / "runs", [Vary.read(text) for text in vary], seed)
 
 
 def test_runs_vary_over_the_whole_range_and_end_differently(job, tmp_path, capsys):
@@ -120,7 +120,7 @@ def mission():
 
     def draw(seed, folder):
         (tmp_path / folder).mkdir()
-        runs = simulate(Plan(str(dice), 3, tmp_path / folder, [], seed), Here())
+        runs = simulate(SimulationPlan(str(dice), 3, tmp_path / folder, [], seed), Here())
         return [run.outcome for run in runs]
 
     drawn = draw(1, "a")
@@ -145,7 +145,7 @@ def test_a_run_without_the_packages_of_the_robot_says_what_to_install(job, tmp_p
     def fail(*_):
         raise ModuleNotFoundError("No module named 'scipy'", name="scipy")
 
-    monkeypatch.setattr(viz.runs.simulate, "open_surroundings", fail)
+    monkeypatch.setattr(smachpy_viz.runs.simulate, "open_surroundings", fail)
     (result,) = simulate(plan(job, tmp_path, 1), Here())
     assert result.error == "package 'scipy' is missing. Try: pip install 'smachpy[sim]'"
 
@@ -173,13 +173,14 @@ def mission():
 
 def test_a_key_of_the_mission_comes_before_a_short_name_of_the_robots_parameters(tmp_path):
     (tmp_path / "charged.py").write_text(CHARGED)
-    plan = Plan(str(tmp_path / "charged.py"), 2, tmp_path, [Vary.read("battery=0.2,0.8")])
+    plan = SimulationPlan(str(tmp_path / "charged.py"), 2, tmp_path, [Vary.read("battery=0.2,0.8")])
     assert [one.outcome for one in simulate(plan, Here())] == ["failed", "done"]
 
 
 def test_parameters_of_the_robot_can_vary(tmp_path):
     results = simulate(
-        Plan("there_and_back", 2, tmp_path, [Vary.read("robot.max_speed=0.5..0.9")]), Here()
+        SimulationPlan("there_and_back", 2, tmp_path, [Vary.read("robot.max_speed=0.5..0.9")]),
+        Here(),
     )
     assert {result.error for result in results} == {""}
     assert not list(tmp_path.glob("*.yaml"))
@@ -187,7 +188,7 @@ def test_parameters_of_the_robot_can_vary(tmp_path):
 
 def test_a_parameter_of_the_robot_that_is_no_number_is_named(tmp_path):
     vary = Vary.read("robot.max_speed=slow,fast")
-    [result] = simulate(Plan("there_and_back", 1, tmp_path, [vary]), Here())
+    [result] = simulate(SimulationPlan("there_and_back", 1, tmp_path, [vary]), Here())
     assert "robot.max_speed: got 'slow'; expected a number" in result.error
 
 
@@ -208,7 +209,7 @@ def test_an_unknown_key_names_the_known_ones(job, tmp_path, key):
 
 def test_the_robot_of_a_world_is_the_worlds(tmp_path):
     with pytest.raises(SmachError, match="runs in its own world"):
-        Plan("delivery", 2, tmp_path, [Vary.read("battery=0..1")]).tasks()
+        SimulationPlan("delivery", 2, tmp_path, [Vary.read("battery=0..1")]).tasks()
 
 
 def test_the_report_shows_all_and_runs_nothing(job, tmp_path):
@@ -240,7 +241,7 @@ def test_the_report_shows_what_a_monitor_finds_as_no_failure():
         StateRecord("/JOB/WATCH", "WATCH", "monitor", "MonitorState", ("invalid",)),
         StateRecord("/JOB/TRY", "TRY", "state", "State", ("invalid",)),
     ))  # fmt: skip
-    runs = Runs(record)
+    runs = MachineRuns(record)
     for path, kind in (("/JOB/WATCH", "monitor"), ("/JOB/TRY", "state")):
         runs.statistics.states[path] = StateStatistics(1, [1.0], {"invalid": 1}, kind=kind)
     page = report(runs)
@@ -325,7 +326,7 @@ def test_a_mission_that_never_ends_is_named(tmp_path, seconds):
     (tmp_path / "endless.py").write_text(ENDLESS)
     (tmp_path / "runs").mkdir()
     vary = [Vary.read(f"seconds={seconds}")]
-    endless = Plan(str(tmp_path / "endless.py"), 1, tmp_path / "runs", vary, limit=60.0)
+    endless = SimulationPlan(str(tmp_path / "endless.py"), 1, tmp_path / "runs", vary, limit=60.0)
     [result] = simulate(endless, Here())
     assert result.outcome is None
     assert "WAIT" in result.error
@@ -374,26 +375,28 @@ def test_recordings_come_back_from_where_the_folder_is_not(job, tmp_path):
     assert len(list(each_recording([tmp_path / "runs"]))) == 1
 
 
-INTERRUPT = """
-import os, signal, sys
-if "--multiprocessing-fork" in sys.orig_argv:
-    os.kill(os.getpid(), signal.SIGINT)
+DIES = """
+import os, smachpy
+
+def mission(kind: str = "good"):
+    sm = smachpy.StateMachine(["done"], name="SIM")
+    end = lambda userdata: os._exit(3) if kind == "crash" else "done"
+    sm.add("WORK", smachpy.CBState(end, outcomes=["done"]))
+    return sm
 """
 
 
 @pytest.mark.slow
-def test_ctrl_c_is_not_for_the_processes_that_run_however_early_it_comes(job, tmp_path):
-    (tmp_path / "sitecustomize.py").write_text(INTERRUPT)  # as the terminal does to all processes
-    done = subprocess.run(
-        [sys.executable, "-m", "smachpy.command", "simulate", job, "--runs", "1", "--json"],
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert "Traceback" not in done.stderr
-    assert json.loads(done.stdout)["outcome"] == "succeeded"
+def test_a_run_whose_process_dies_is_named_and_the_others_end(tmp_path, capsys, monkeypatch):
+    (tmp_path / "dies.py").write_text(DIES)
+    (tmp_path / "signal.py").write_text("RED = 1")  # a pool of `concurrent.futures` imported it
+    monkeypatch.chdir(tmp_path)
+    words = ["simulate", "dies.py", "--runs", "6", "--vary", "kind=good,good,crash"]
+    assert main(words) == 1
+    printed = capsys.readouterr().out
+    assert "done x4" in printed
+    assert "run 3: its process died: exit code 3 (kind=crash)" in printed
+    assert "run 6: its process died: exit code 3 (kind=crash)" in printed
 
 
 STAYS = """

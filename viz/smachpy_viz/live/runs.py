@@ -1,0 +1,283 @@
+"""Lists the runs for the home page: those of known machines, in folders and in journals."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.events.recording import RecordingError, read_recording
+from smachpy.exceptions import MissionError
+from smachpy_viz.runs.listing import run_row
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from smachpy_viz.live.journals import Journals
+    from smachpy_viz.live.machines import Machines
+
+MAX_FILES: Final = 500
+"""Recordings in the folders that are listed: the newest ones."""
+
+MAX_OPEN_RECORDINGS: Final = 20
+"""Recordings opened from the list that stay in memory."""
+
+DAY_NS: Final = 86_400_000_000_000
+"""A machine's clock that differs by more than a day is taken for virtual time."""
+
+MAX_FLEET_RUNS: Final = 32
+"""Live runs that are shown together."""
+
+MAX_POSES: Final = 200
+"""Newest poses of each of them."""
+
+MAX_GOALS: Final = 100
+"""Newest events about goals of each of them."""
+
+SAME_NS: Final = 5_000_000
+"""Runs of one machine that began within this time are one run, live and in a file."""
+
+LARGEST: Final = 200_000_000
+"""Largest recording that is read [bytes]."""
+
+
+class Runs:
+    """Lists runs and opens recordings.
+
+    Args:
+        machines: The known machines; an opened recording becomes one of them.
+        folders: Folders of recordings; they need not exist.
+        journals: Journals of durable missions; None for none.
+
+    Threads: every method may be called from any thread; all read files.
+    """
+
+    def __init__(
+        self,
+        machines: Machines,
+        folders: Iterable[Path] = (),
+        journals: Journals | None = None,
+    ) -> None:
+        self._machines = machines
+        self._journals = journals
+        self._folders = list(dict.fromkeys(folders))
+        self._lock = threading.Lock()
+        # Rows of files, with the time and size by which a change is noticed.
+        self._rows: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
+        self._opened: dict[str, None] = {}  # names of machines, in the order of their opening
+
+    def rows(self) -> dict[str, Any]:
+        """Return `runs`, newest first, `folders`, and `journals` (`Journals.places`).
+
+        A row has the keys of `run_row` and: `id`; `name` of the machine, None for a file that is
+        not open; `live`; `file`, "" for none; `problem`, why a file cannot be read; `run`, the id
+        of a durable mission's run, otherwise ""; `stamp`, the beginning by the mission's own time,
+        which may be virtual; `asks`, whether a question is open; `mission`, None or as in
+        `Journals.rows`. A run on the network, in files and in a journal is one row.
+        """
+        missions = [] if self._journals is None else self._journals.rows()
+        with self._lock:
+            rows = [
+                self._row_of(name)
+                for name in (one["name"] for one in self._machines.summaries())
+                if name not in self._opened
+            ]
+            files = self._files()
+            # Reading a recording takes long: rows of unchanged files are kept, others dropped.
+            self._rows = {path: self._rows[path] for path in files if path in self._rows}
+            recorded = [self._row_of_file(path) for path in files]
+            # A live run is usually recorded as well: the live row stays.
+            rows += [row for row in recorded if not any(_is_same(row, one) for one in rows)]
+            rows = with_missions(rows, missions)
+        rows.sort(key=lambda row: (row["live"], row["began"] or 0), reverse=True)
+        return {
+            "runs": rows,
+            "folders": [str(folder) for folder in self._folders],
+            "journals": [] if self._journals is None else self._journals.places(),
+        }
+
+    def fleet(self, skip: int = 0) -> dict[str, Any]:
+        """Return `MAX_FLEET_RUNS` of the live runs as rows with the data for a common map.
+
+        Args:
+            skip: So many runs are left out before those, by name.
+
+        Returns:
+            `rows`; `skip`, and `total`, the number of live runs. A row has the newest map and the
+            newest poses of the robot in `observed`, and the newest events about goals in `events`.
+            Recordings and machines whose program is gone are left out.
+        """
+        names = [
+            one["name"]
+            for one in self._machines.summaries()
+            if one["stale"] is None and not one["recorded"] and one["ended"] is None
+        ]
+        skip = max(0, min(skip, len(names) - 1))
+        found = []
+        for name in names[skip : skip + MAX_FLEET_RUNS]:
+            machine = self._machines.get(name)
+            if machine is None or not (row := self._row_of(name))["live"]:
+                continue
+            maps = machine.newest_observed("map", 1)
+            poses = machine.newest_observed("pose", MAX_POSES)
+            goals = machine.newest_events("Goal", MAX_GOALS)
+            found.append({**row, "observed": maps + poses, "events": goals})
+        return {"rows": found, "skip": skip, "total": len(names)}
+
+    def command(self, mission: dict[str, Any]) -> str:
+        """Resume or cancel a durable mission; return a text that says what happens now.
+
+        Args:
+            mission: The texts `journal`, `id` and `command`.
+
+        Raises:
+            SmachError: a text is missing, or as for `Journals.command`.
+        """
+        words = [mission.get(name) for name in ("journal", "id", "command")]
+        if self._journals is None or not all(isinstance(word, str) for word in words):
+            raise MissionError(
+                f"mission: got {sorted(mission)}; expected the texts journal, id and command of a "
+                "mission that is listed."
+            )
+        journal, name, command = map(str, words)
+        # A resumed run continues its recording, so that it stays one run in one file.
+        listed = self.rows()["runs"]
+        file = next((one["file"] for one in listed if _is_mission(one, journal, name)), "")
+        return self._journals.command(journal, name, command, file)
+
+    def open(self, run: str) -> str:
+        """Return the name of the machine that shows a run; read its file if necessary.
+
+        Args:
+            run: The `id` of a row.
+
+        Raises:
+            RecordingError: there is no such run, or its file cannot be read.
+        """
+        kind, _, name = run.partition(" ")
+        if kind == "machine" and self._machines.get(name) is not None:
+            return name
+        path = Path(name)
+        with self._lock:
+            # Only files that are listed: a page must not read any other file of this computer.
+            if kind != "file" or path not in self._files():
+                raise RecordingError(name, "no such run; expected one in the list.")
+            machine = self._machines.obtain(f"run {path.name}")
+            if machine.name not in self._opened or machine.file != str(path):
+                machine.load(read_recording(path))
+            self._opened.pop(machine.name, None)  # moved to the end: the most recently used
+            self._opened[machine.name] = None
+            while len(self._opened) > MAX_OPEN_RECORDINGS:
+                oldest = next(iter(self._opened))
+                del self._opened[oldest]
+                self._machines.forget(oldest)
+        return machine.name
+
+    def _files(self) -> list[Path]:
+        found: list[tuple[int, Path]] = []
+        for folder in self._folders:
+            for path in folder.glob("*.jsonl") if folder.is_dir() else ():
+                try:
+                    found.append((path.stat().st_mtime_ns, path))
+                except OSError:  # removed since `glob` listed it
+                    continue
+        return [path for _, path in sorted(found, reverse=True)[:MAX_FILES]]
+
+    def _row_of(self, name: str) -> dict[str, Any]:
+        machine = self._machines.get(name)
+        assert machine is not None
+        assert machine.record is not None
+        row = machine.row()
+        live = not machine.recorded and machine.stale is None
+        behind = machine.behind or 0
+        # A recording says when it was made; of a live machine only the difference of clocks shows
+        # that its time is virtual.
+        virtual = machine.date_shift or (behind if abs(behind) > DAY_NS else 0)
+        return {
+            **_dated(row, virtual),
+            "id": f"machine {name}",
+            "name": name,
+            "live": live and row["outcome"] is None and row["began"] is not None,
+            "file": machine.file,
+            "problem": "",
+            "run": machine.run,
+            "asks": live and bool(machine.questions()),
+            "mission": None,
+        }
+
+    def _row_of_file(self, path: Path) -> dict[str, Any]:
+        try:
+            facts = path.stat()
+            stamp = facts.st_mtime_ns, facts.st_size
+        except OSError:
+            stamp = (0, 0)
+        known = self._rows.get(path)
+        if known is None or known[0] != stamp:
+            known = self._rows[path] = stamp, _read_row(path, stamp[1])
+        return known[1]
+
+
+def with_missions(
+    rows: list[dict[str, Any]], missions: Iterable[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Join rows of runs with their missions; missions without a run get a row of their own."""
+    of_run = {one["run"]: one for one in missions}
+    joined: dict[str, dict[str, Any]] = {}  # by run; a live row comes before its recording's
+    found = []
+    for row in rows:
+        mission = of_run.get(row["run"]) if row["run"] else None
+        if mission is None:
+            found.append(row)
+        elif row["run"] not in joined:
+            known = joined[row["run"]] = {**row, "mission": mission["mission"]}
+            if not known["live"]:  # the journal is newer than any file
+                known |= {one: mission[one] for one in ("outcome", "ended", "began", "outages")}
+                known["reason"] = (row if mission["outcome"] else mission)["reason"]
+            found.append(known)
+        elif not joined[row["run"]]["file"]:  # the recording of a live run is dropped but for this
+            joined[row["run"]]["file"] = row["file"]
+    empty = {"stamp": None, "name": None, "live": False, "asks": False, "file": "", "problem": ""}
+    return found + [{**empty, **one} for one in of_run.values() if one["run"] not in joined]
+
+
+def _is_mission(row: dict[str, Any], journal: str, name: str) -> bool:
+    mission = row["mission"]
+    return mission is not None and (mission["journal"], mission["id"]) == (journal, name)
+
+
+def _is_same(file: dict[str, Any], row: dict[str, Any]) -> bool:
+    """Return whether a file has a machine's run: it was opened from it, or is being written."""
+    if file["file"] == row["file"]:
+        return True
+    if file["stamp"] is None or row["stamp"] is None or file["machine"] != row["machine"]:
+        return False
+    return bool(abs(file["stamp"] - row["stamp"]) < SAME_NS)
+
+
+def _dated(row: dict[str, Any], shift: int) -> dict[str, Any]:
+    """Shift a row's times to the real date, in case the mission's own time was virtual.
+
+    `stamp` keeps the beginning by the mission's own time, by which a run is recognised.
+    """
+    times = {name: row[name] for name in ("began", "ended", "last")}
+    real = {name: None if at is None else at + shift for name, at in times.items()}
+    return {**row, **real, "stamp": row["began"]}
+
+
+def _read_row(path: Path, size: int) -> dict[str, Any]:
+    row: dict[str, Any] = {"id": f"file {path}", "name": None, "live": False, "file": str(path)}
+    row |= {"run": "", "mission": None, "asks": False}
+    problem = f"got {size} bytes; expected at most {LARGEST}" if size > LARGEST else ""
+    if not problem:
+        try:
+            recording = read_recording(path)
+        except RecordingError as error:
+            problem = str(error)
+        else:
+            row["run"] = recording.run
+            listed = run_row(recording.record, recording.events)
+            shift = recording.made_ns - recording.stamp_ns
+            return {**row, **_dated(listed, shift), "problem": ""}
+    row |= dict.fromkeys(("began", "ended", "last", "stamp", "outcome"))
+    row |= {"machine": path.stem, "robots": [], "reason": "", "strip": [], "outages": []}
+    return {**row, "problem": problem}

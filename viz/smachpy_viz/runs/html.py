@@ -1,0 +1,51 @@
+"""A recorded run as one HTML file that opens without a server."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from smachpy_viz.live import assets
+from smachpy_viz.live.machines import Machine
+from smachpy_viz.model.why import why
+from smachpy_viz.runs.floor import read_floor
+from smachpy_viz.runs.statistics import StatisticsOfFiles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from smachpy.events.introspection import StateRecord
+    from smachpy.events.recording import Recording
+
+
+def standalone_page(
+    recording: Recording, runs: Iterable[str | Path] = (), floor: Path | None = None
+) -> str:
+    """Return the page.
+
+    Args:
+        recording: The run.
+        runs: Recorded runs for the statistics in the diagram.
+        floor: A map_server YAML file, used if the recording has no map.
+
+    Raises:
+        RecordingError: a file of `runs` cannot be read.
+        InputFileError: `floor` is not a valid map.
+    """
+    map_of_file = None if floor is None else read_floor(floor)
+    machine = Machine(recording.path.name, lambda _machine: None, floor=map_of_file)
+    machine.load(recording)
+    return page_of(machine, recording.record, StatisticsOfFiles(runs).of(recording.record))
+
+
+def page_of(machine: Machine, record: StateRecord, statistics: dict[str, Any] | None = None) -> str:
+    """Return the page of a machine as it is now."""
+    run = {
+        "model": assets.model(record),
+        "snap": json.loads(machine.snapshot()[1]),
+        "observed": machine.observed(),
+        "statistics": statistics,
+        "why": why(record, machine.events()).to_json(),
+    }
+    return assets.standalone(run, record.label)

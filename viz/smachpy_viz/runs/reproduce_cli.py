@@ -1,0 +1,171 @@
+"""`smachpy runs reproduce`: runs recorded missions again, and says what differs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actionlib_core.process.output import printable
+from smachpy.command import UsageError
+from smachpy.command.queued import add_allow
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smachpy.reproduce.report import Verdict
+    from smachpy.reproduce.task import Options
+
+EXAMPLES = """examples:
+  smachpy runs reproduce incident.jsonl                       is it the same with today's code?
+  smachpy runs reproduce incident.jsonl --tolerate started_at --tolerate CHARGE
+  smachpy runs reproduce incident.jsonl -o test_incident.py   write a test
+  smachpy runs reproduce incident.jsonl -o test_incident.py --expect succeeded
+  smachpy runs reproduce night/ --junit report.xml            in continuous integration
+"""
+
+
+def add(actions: Any) -> None:
+    """Add the action to `smachpy runs`."""
+    parser = actions.add_parser(
+        "reproduce",
+        help="run a recorded mission again, and find the first difference",
+        description="Run the missions of recordings again: today's code, in virtual time, with the "
+        "servers, topics and operators that were recorded. Exit codes: 0 all are the same, 1 one "
+        "differs, 2 one cannot be reproduced, or bad input.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("places", nargs="+", metavar="FILE|DIR")
+    parser.add_argument(
+        "--mission",
+        default="",
+        help="the mission (default: the one that the recording names, installed or allowed)",
+    )
+    add_allow(parser, "the recording may name a mission of this place")
+    parser.add_argument(
+        "--tolerate",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="what may differ: userdata, goals, errors, a key of userdata, or a state with all in "
+        "it; may be repeated",
+    )
+    parser.add_argument("--seed", type=int, help="another order of what happens at one moment")
+    parser.add_argument(
+        "--jobs", type=int, metavar="N", help="at the same time (default: all cores)"
+    )
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write a report for CI")
+    parser.add_argument("--json", action="store_true", help="one JSON object per recording")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write a test of the run: test_NAME.py"
+    )
+    parser.add_argument(
+        "--expect",
+        default="",
+        metavar="OUTCOME",
+        help="with -o: the test wants this outcome, and fails until the mission is mended",
+    )
+    parser.set_defaults(run=_run)
+
+
+def _write(args: argparse.Namespace) -> int:
+    from smachpy.events.recording import read_recording
+    from smachpy.reproduce.task import quiet
+    from smachpy.reproduce.written import write_test
+
+    where = "smachpy runs reproduce: -o"
+    if len(args.places) != 1 or Path(args.places[0]).is_dir():
+        raise UsageError(f"{where}: got {len(args.places)} places; expected one recording.")
+    if args.output.suffix != ".py":
+        raise UsageError(f"{where} {str(args.output)!r}: expected a name that ends with .py.")
+    with quiet():
+        written = write_test(
+            read_recording(args.places[0]),
+            mission=args.mission,
+            allow=args.allow,
+            expect=args.expect,
+        )
+    try:
+        with args.output.open("x", encoding="utf-8") as file:
+            file.write(written.text)
+    except OSError as error:
+        raise UsageError(
+            f"{where} {str(args.output)!r}: cannot write: {error.strerror or error}."
+        ) from error
+    print(printable(f"{args.output}: shortened in {written.runs} runs"))
+    for note in written.notes:
+        print(printable(f"  note: {note}"))
+    return 0
+
+
+def _run(args: argparse.Namespace) -> int:
+    if args.output is not None:
+        return _write(args)
+    if args.expect:
+        raise UsageError("smachpy runs reproduce: --expect: got it without -o; expected both.")
+    from smachpy.events.recording import find_recordings
+    from smachpy.reproduce.report import junit, summary
+    from smachpy.reproduce.task import Options
+
+    if args.jobs is not None and args.jobs < 1:
+        raise UsageError(f"smachpy runs reproduce: --jobs: got {args.jobs}; expected 1 or more.")
+    paths = [str(path) for path in find_recordings(args.places)]
+    if not paths:
+        raise UsageError(
+            f"smachpy runs reproduce: {' '.join(args.places)}: got no recordings; expected *.jsonl "
+            "files."
+        )
+    options = Options(args.mission, tuple(args.allow), args.seed, tuple(args.tolerate))
+    verdicts = []
+    for verdict in _verdicts(paths, options, args.jobs or os.cpu_count() or 1):
+        verdicts.append(verdict)
+        _show(verdict, many=len(paths) > 1, as_json=args.json)
+    if len(paths) > 1 and not args.json:
+        print(printable(summary(verdicts)))
+    if args.junit is not None:
+        try:
+            args.junit.write_text(junit(verdicts), encoding="utf-8")
+        except OSError as error:
+            raise UsageError(
+                f"smachpy runs reproduce: --junit {str(args.junit)!r}: cannot write: "
+                f"{error.strerror or error}."
+            ) from error
+    kinds = {verdict.kind for verdict in verdicts}
+    return 2 if "failed" in kinds else 1 if "differs" in kinds else 0
+
+
+def _show(verdict: Verdict, *, many: bool, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(verdict.to_json()))
+        return
+    head = f"{verdict.path}: " if many and verdict.kind != "failed" else ""
+    for number, line in enumerate(verdict.lines):
+        print(printable(line if number else f"{head}{line}"))
+
+
+def _verdicts(paths: list[str], options: Options, jobs: int) -> Iterator[Verdict]:
+    """Yield the verdicts in the order of the files, whatever the number of processes."""
+    from smachpy.reproduce.report import Verdict
+    from smachpy.reproduce.task import reproduce_file
+
+    if len(paths) == 1:
+        yield reproduce_file(paths[0], options)
+        return
+    from smachpy_viz.runs.workers import WorkerError, Workers
+
+    workers = Workers(min(jobs, len(paths)))
+    try:
+        futures = [workers.submit(reproduce_file, path, options) for path in paths]
+        for path, future in zip(paths, futures, strict=True):
+            try:
+                yield future.result()
+            except (WorkerError, RuntimeError) as error:
+                yield Verdict(path, "failed", (f"{path}: {error}",))
+    except BaseException:  # such as Ctrl-C
+        workers.kill()
+        raise
+    finally:
+        workers.shutdown(cancel_futures=True)

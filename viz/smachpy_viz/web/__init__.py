@@ -1,0 +1,1 @@
+"""The page's files, built from `viz/web` by `make web`; `built.json` lists them."""
