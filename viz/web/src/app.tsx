@@ -1,0 +1,198 @@
+// Puts the page together. The diagram, timeline and map draw themselves outside the virtual DOM; the panels are Preact
+// components.
+import type { PanelName } from "#core/arrangement.ts";
+import "@preact/signals";
+import { type ComponentChildren, render } from "preact";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
+import { DOCKS } from "#core/arrangement.ts";
+import { control } from "#core/commands.ts";
+import { ask, choose, messageOf, reconnect } from "#core/connection.ts";
+import * as store from "#core/store.ts";
+import { Page } from "#drawing/page.ts";
+import { el } from "#drawing/svg.ts";
+import { applyTheme } from "#drawing/theme.ts";
+import { ActionsPage } from "#panels/actions.tsx";
+import { fieldValue } from "#panels/components.tsx";
+import { ConfirmationSheet, OperatorBar } from "#panels/controls.tsx";
+import { Dock, Parts } from "#panels/docks.tsx";
+import { FleetPage } from "#panels/fleet.tsx";
+import { HomePage } from "#panels/home.tsx";
+import { Inspector } from "#panels/inspector.tsx";
+import { listenToKeys } from "#panels/keys.tsx";
+import { MapPanel } from "#panels/map.tsx";
+import { Help, Laying, Legend, Notice, Overlay, TokenDialog } from "#panels/messages.tsx";
+import { NoteDialog, ShareButtons } from "#panels/notes.tsx";
+import { Palette } from "#panels/palette.tsx";
+import { PlayBar } from "#panels/play.tsx";
+import { AddLine, PlotsPanel } from "#panels/plots.tsx";
+import { Questions } from "#panels/questions.tsx";
+import { SimulateDialog } from "#panels/simulate.tsx";
+import { TopBar } from "#panels/top_bar.tsx";
+import { Tree } from "#panels/tree.tsx";
+
+const svg = el("svg", { class: "diagram", role: "application", "aria-label": "state machine", tabindex: 0 });
+const minimap = el("svg", { class: "minimap", "aria-hidden": "true" });
+const canvas = document.createElement("canvas");
+canvas.tabIndex = 0;
+canvas.setAttribute("role", "slider");
+canvas.setAttribute("aria-label", "time; arrow keys go from event to event");
+
+const whole = document.createElement("canvas");
+whole.setAttribute("role", "img");
+whole.setAttribute("aria-label", "the whole run, with failures; the keys of the timeline do the same");
+
+const floor = document.createElement("canvas");
+floor.tabIndex = 0;
+floor.setAttribute("role", "img");
+
+/** Holds an element from outside the virtual DOM. */
+function Mounted({ element }: { element: Element }) {
+  const place = useRef<HTMLDivElement | null>(null);
+  useLayoutEffect(() => place.current?.replaceChildren(element), [element]);
+  return <div class="mounted" ref={place} />;
+}
+
+/** Which clock tells instants, and the lanes to show. */
+function StripTools() {
+  return (
+    <div class="strip-tools">
+      <select
+        aria-label="clock"
+        title="how instants are told everywhere (c)"
+        value={store.clock.value}
+        onChange={(e: Event) => store.setClock(fieldValue(e) as store.ClockName)}
+      >
+        <option value="run">run time</option>
+        <option value="wall">wall clock</option>
+        <option value="relative">relative</option>
+      </select>
+      <input
+        class="lane-filter"
+        aria-label="lanes to show, by their names"
+        placeholder="lanes"
+        value={store.laneFilter.value}
+        onInput={(e: Event) => {
+          store.laneFilter.value = fieldValue(e);
+        }}
+      />
+    </div>
+  );
+}
+
+function TimeTools() {
+  const { timeline } = page;
+  const showAll = () => {
+    timeline.fitAll();
+    timeline.draw();
+  };
+  const addPlot = (id: string) => store.setPlots([...store.plotsShown.value, [id]]);
+  return (
+    <div class="time-tools">
+      <button title="show the whole run" onClick={showAll}>
+        All
+      </button>
+      <AddLine label="plot a number of the run" text="Plot" onPick={addPlot} />
+    </div>
+  );
+}
+
+function ZoomButtons() {
+  return (
+    <span class="zoom">
+      <button title="smaller (-)" aria-label="zoom out" onClick={() => page.view.zoom(0.8)}>
+        −
+      </button>
+      <button title="larger (+)" aria-label="zoom in" onClick={() => page.view.zoom(1.25)}>
+        +
+      </button>
+      <button title="show everything (0)" onClick={() => page.refit()}>
+        Fit
+      </button>
+    </span>
+  );
+}
+
+const panels: Record<PanelName, () => ComponentChildren> = {
+  tree: () => <Tree page={page} />,
+  map: () => (
+    <MapPanel page={page}>
+      <Mounted element={floor} />
+    </MapPanel>
+  ),
+  details: () => <Inspector page={page} />,
+  time: () => (
+    <div class="timeline">
+      <Mounted element={whole} />
+      <StripTools />
+      <Mounted element={canvas} />
+      <TimeTools />
+    </div>
+  ),
+  plots: () => <PlotsPanel page={page} />,
+};
+
+function App() {
+  const paused = store.facts.value?.control?.paused && store.cursor.value === null;
+  useEffect(() => {
+    page.start().catch((error) => {
+      store.failure.value = `The viewer could not start: ${messageOf(error)}`;
+    });
+  }, []);
+  const classes = [
+    "app",
+    paused && "paused",
+    store.cursor.value !== null && "past",
+    store.treeOpen.value && "with-tree",
+    store.isMissing.value && "without-machine",
+    control() && store.pageShown.value === "machine" && "operated",
+    `part-${store.part.value}`,
+    `on-${store.pageShown.value}`,
+  ];
+  return (
+    <div class={classes.filter(Boolean).join(" ")}>
+      <TopBar page={page} />
+      <OperatorBar />
+      <Questions page={page} />
+      {DOCKS.map((name) => (
+        <Dock key={name} name={name} panels={panels} />
+      ))}
+      <main class="stage">
+        <Mounted element={svg} />
+        <Overlay page={page} />
+        <Laying />
+        <Mounted element={minimap} />
+        <div class="strip">
+          <Legend />
+          <ShareButtons page={page} />
+          <ZoomButtons />
+        </div>
+      </main>
+      <PlayBar page={page} />
+      <Parts />
+      <HomePage />
+      <FleetPage />
+      <ActionsPage />
+      <div id="announced" class="hidden" aria-live="polite" />
+      <ConfirmationSheet />
+      <Notice />
+      <Help />
+      <Palette page={page} />
+      <TokenDialog />
+      <NoteDialog />
+      <SimulateDialog />
+    </div>
+  );
+}
+
+declare global {
+  interface Window {
+    smachpy: object;
+  }
+}
+
+applyTheme();
+const page = new Page(svg as SVGSVGElement, minimap as SVGSVGElement, canvas, floor, whole);
+listenToKeys(page);
+window.smachpy = { page, store, ask, choose, reconnect }; // for tests, and for looking around in the browser's console
+render(<App />, document.getElementById("app") as HTMLElement);
+document.querySelector(".boot")?.remove();

@@ -1,0 +1,20 @@
+// Searches in lists.
+
+/**
+ * The number of entries at the beginning of a list for which a condition holds, by binary search: it must hold for no
+ * entry behind one for which it does not.
+ */
+export function countWhile<T>(list: T[], holds: (entry: T) => boolean) {
+  let low = 0;
+  let high = list.length;
+  while (low < high) {
+    const mid = (low + high) >> 1;
+    if (holds(list[mid])) low = mid + 1;
+    else high = mid;
+  }
+  return low;
+}
+
+/** The entries whose path contains the path of no other entry. */
+export const innermost = <T>(list: T[], pathOf: (entry: T) => string) =>
+  list.filter((one) => !list.some((other) => pathOf(other).startsWith(`${pathOf(one)}/`)));

@@ -1,0 +1,139 @@
+// Several live runs together: a card and a lane for each, and a common map.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { askFleet, openRun } from "#core/connection.ts";
+import { lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
+import { showPage } from "#core/pages.ts";
+import type { Scene } from "#core/scene.ts";
+import * as store from "#core/store.ts";
+import { duration, shorten } from "#core/text.ts";
+import type { FleetRuns } from "#core/types.ts";
+import { MapView } from "#drawing/map.ts";
+import { isDark } from "#drawing/theme.ts";
+
+const REFRESH_MS = 1000;
+const MOST_ROWS = 32; // as the viewer sends them
+
+export const FleetPage = () => (store.pageShown.value === "fleet" ? <OpenFleet /> : null);
+
+function OpenFleet() {
+  const [skip, setSkip] = useState(0);
+  const [found, setFound] = useState<FleetRuns>({ rows: [], skip: 0, total: 0 });
+  const heading = useRef<HTMLHeadingElement | null>(null);
+  useEffect(() => heading.current?.focus(), []);
+  useEffect(() => {
+    let open = true;
+    const read = async () => {
+      const answer = await askFleet(skip);
+      if (answer && open) setFound(answer);
+    };
+    read();
+    const timer = setInterval(read, REFRESH_MS);
+    return () => {
+      open = false;
+      clearInterval(timer);
+    };
+  }, [skip]);
+  const { rows, total } = found;
+  const last = Math.min(found.skip + MOST_ROWS, total);
+  const { scene, now } = sceneOf(rows);
+  const { seconds, lanes } = lanesOf(rows, now);
+  return (
+    <section class="fleet" aria-labelledby="fleet-title">
+      <header>
+        <h2 id="fleet-title" tabindex={-1} ref={heading}>
+          Fleet
+        </h2>
+        <span class="hint">
+          {total > MOST_ROWS ? `${found.skip + 1} to ${last} of ${total.toLocaleString("en")}` : rows.length} live runs
+        </span>
+        <span class="spread" />
+        {total > MOST_ROWS && (
+          <>
+            <button disabled={found.skip === 0} onClick={() => setSkip(Math.max(0, found.skip - MOST_ROWS))}>
+              Earlier
+            </button>
+            <button disabled={last >= total} onClick={() => setSkip(found.skip + MOST_ROWS)}>
+              Later
+            </button>
+          </>
+        )}
+        <button onClick={() => showPage("runs")}>Close</button>
+      </header>
+      <div class="fleet-top">
+        <div class="cards">
+          {rows.map((row) => (
+            <button key={row.id} onClick={() => openRun(row.id)}>
+              <b>{shorten(nameOfRow(row), 26)}</b>
+              <span class={`pill-text ${row.asks ? "waiting" : "active"}`}>
+                {row.asks
+                  ? "? asks you"
+                  : `\u25cf ${shorten(row.strip.findLast((one) => one[3] === null)?.[1] ?? "running", 20)}`}
+              </span>
+              <small title={row.reason}>
+                {shorten(row.machine, 20)}: {shorten(row.reason, 60)}
+              </small>
+            </button>
+          ))}
+        </div>
+        {!scene.isEmpty && (
+          <div class="fleet-map">
+            <FleetMap scene={scene} now={now} />
+          </div>
+        )}
+      </div>
+      <div class="lanes" role="list" aria-label={`the last ${duration(seconds)}`}>
+        {lanes.map((lane) => (
+          <>
+            <span title={lane.name}>{shorten(lane.name, 24)}</span>
+            <Lane lane={lane} seconds={seconds} />
+          </>
+        ))}
+      </div>
+    </section>
+  );
+}
+
+function FleetMap(props: { scene: Scene; now: number }) {
+  const canvas = useRef<HTMLCanvasElement | null>(null);
+  const view = useRef<MapView | null>(null);
+  const dark = isDark();
+  useEffect(() => {
+    if (canvas.current && !view.current) view.current = new MapView(canvas.current);
+    if (!view.current) return;
+    view.current.given = props;
+    view.current.draw();
+  });
+  useEffect(() => {
+    view.current?.restyle();
+    view.current?.draw();
+  }, [dark]);
+  return <canvas ref={canvas} tabindex={0} role="img" />;
+}
+
+function Lane({ lane, seconds }: { lane: ReturnType<typeof lanesOf>["lanes"][0]; seconds: number }) {
+  const percent = (s: number) => `${(100 * s) / seconds}%`;
+  return (
+    <svg
+      class="run-strip"
+      height="20"
+      role="listitem"
+      aria-label={`${lane.name}: ${lane.bars.map((bar) => bar.name).join(", ")}`}
+    >
+      {lane.bars.map(({ name, kind, from, to }) => (
+        <rect
+          class={kind}
+          x={percent(from)}
+          y="1"
+          height="18"
+          rx="3"
+          width={percent(Math.max(to - from, 0.004 * seconds))}
+        >
+          <title>
+            {name}: {duration(to - from)}
+          </title>
+        </rect>
+      ))}
+    </svg>
+  );
+}

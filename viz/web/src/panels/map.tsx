@@ -1,0 +1,75 @@
+// The map beside the diagram, shown if the pose of any robot is known, with the facts of the visit at the pointer.
+
+import type { ComponentChildren } from "preact";
+import * as store from "#core/store.ts";
+import { shorten } from "#core/text.ts";
+import type { Page } from "#drawing/page.ts";
+
+const NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the topic map.";
+const MOST_ROBOTS = 5; // robots with a button of their own
+
+export function MapPanel({ page, children }: { page: Page; children?: ComponentChildren }) {
+  store.tick.value;
+  const { map } = page;
+  const names = [...store.scene.robots]
+    .filter(([, robot]) => robot.poses.length)
+    .map(([name]) => name)
+    .sort();
+  const noMap = !store.scene.maps.length;
+  return (
+    <section class="map-panel" aria-label="map">
+      <header>
+        <h2>Map</h2>
+        {noMap && (
+          <span class="hint" title={NO_MAP}>
+            {NO_MAP}
+          </span>
+        )}
+        <span class="spread" />
+        <span class="group">
+          <button
+            class={map.followed === null ? "on small" : "small"}
+            title="the whole map (double-click)"
+            onClick={() => map.show(null)}
+          >
+            Whole
+          </button>
+          {names.slice(0, MOST_ROBOTS).map((name) => (
+            <button
+              class={map.followed === name ? "on small" : "small"}
+              title="keep it in the middle"
+              onClick={() => map.show(name)}
+            >
+              {shorten(name || "Robot", 16)}
+            </button>
+          ))}
+        </span>
+      </header>
+      <div class="map-view">
+        {children}
+        <Tip />
+      </div>
+    </section>
+  );
+}
+
+/** The visit that the pointer is on: state, place, outcome and times. */
+function Tip() {
+  const visit = store.hovered.value;
+  if (!visit) return null;
+  const goal = store.scene.goalOf(visit.path, visit.from);
+  const span = store.run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
+  const to = span?.to ?? null;
+  const place = goal ? store.scene.placeName(goal) : "";
+  const times = [visit.from, to].map((t) => (t === null ? "now" : store.instantText(t))).join(" \u2013 ");
+  const took = ((to ?? store.nowMs()) - visit.from) / 1000;
+  const title = store.nameOf(visit.path) + (place && ` \u2192 ${shorten(place, 30)}`);
+  return (
+    <div class="tip" role="status">
+      <b>{title}</b>
+      <span>
+        {span?.outcome ? shorten(span.outcome, 30) : "runs"} {times}, {took.toFixed(1)} s
+      </span>
+    </div>
+  );
+}

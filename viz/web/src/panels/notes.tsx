@@ -1,0 +1,107 @@
+// Notes at instants of the run, and the link that shows this view to somebody else.
+
+import { useState } from "preact/hooks";
+import { isFile } from "#core/connection.ts";
+import * as store from "#core/store.ts";
+import { saveFilm } from "#drawing/film.ts";
+import type { Page } from "#drawing/page.ts";
+import { Dialog, fieldValue, Section } from "#panels/components.tsx";
+
+export function ShareButtons({ page }: { page: Page }) {
+  const copy = async () => {
+    const address = page.address();
+    try {
+      await navigator.clipboard.writeText(address);
+      store.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
+    } catch {
+      store.notify("This browser lets no page copy here: the address bar shows the link", "error");
+    }
+  };
+  const done = store.filmed.value;
+  const stop = () => {
+    store.filmed.value = null;
+  };
+  return (
+    <span class="share">
+      {done === null ? (
+        <button
+          title="GIF of the selected stretch, or of the 20 s before the instant shown"
+          onClick={() => saveFilm(page)}
+        >
+          GIF
+        </button>
+      ) : (
+        <button class="on" title="stop" onClick={stop}>
+          GIF {done} % ✕
+        </button>
+      )}
+      <button title="note at the instant shown (n)" onClick={() => store.askForNote()}>
+        Note
+      </button>
+      <button title="copy the address of this view: instant, selection, open containers, notes" onClick={copy}>
+        Link
+      </button>
+    </span>
+  );
+}
+
+export function NoteDialog() {
+  const [text, setText] = useState("");
+  const at = store.noteAt.value;
+  if (at === null) return null;
+  const close = () => {
+    store.noteAt.value = null;
+    setText("");
+  };
+  const onSubmit = (e: Event) => {
+    e.preventDefault();
+    store.addNotes([{ at, text }]);
+    close();
+  };
+  return (
+    <Dialog label="note" class="note-form" onClose={close}>
+      <form onSubmit={onSubmit}>
+        <h2>Note at {store.instantText(at)}</h2>
+        <input
+          aria-label="note"
+          maxlength={300}
+          autocomplete="off"
+          value={text}
+          autofocus
+          onInput={(e: Event) => setText(fieldValue(e))}
+        />
+        <p>
+          <button class="primary" type="submit" disabled={!text.trim()}>
+            Pin it
+          </button>{" "}
+          <button type="button" onClick={close}>
+            Cancel
+          </button>
+        </p>
+      </form>
+    </Dialog>
+  );
+}
+
+/** The notes of the run; a click on one goes to its instant. */
+export function Notes() {
+  const notes = store.notes.value;
+  if (!notes.length) return null;
+  return (
+    <Section title="Notes" count={notes.length}>
+      <ul class="notes">
+        {notes.map((note) => (
+          <li key={`${note.at} ${note.text}`}>
+            <button class="link" onClick={() => store.seek(note.at)}>
+              <time>{store.instantText(note.at)}</time>
+            </button>
+            <span>{note.text}</span>
+            <button class="small" aria-label={`remove the note ${note.text}`} onClick={() => store.removeNote(note)}>
+              ✕
+            </button>
+          </li>
+        ))}
+      </ul>
+    </Section>
+  );
+}

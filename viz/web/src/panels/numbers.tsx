@@ -1,0 +1,41 @@
+// The totals of the numbers in the diagram.
+import { outcomeClass } from "#core/outcomes.ts";
+import { coverage } from "#core/statistics.ts";
+import * as store from "#core/store.ts";
+import { duration } from "#core/text.ts";
+import { Pill, Section } from "#panels/components.tsx";
+
+export function Numbers() {
+  store.slowTick.value;
+  if (store.numbers.value === "none") return null;
+  const { taken, all } = coverage(store.model.value, store.shown().states);
+  const recorded = store.statistics.value;
+  return (
+    <Section title="Numbers">
+      <dl class="facts">
+        <dt>transitions taken</dt>
+        <dd>
+          {taken} of {all} ({all ? Math.round((taken / all) * 100) : 0} %)
+        </dd>
+        {recorded && (
+          <>
+            <dt>recorded runs</dt>
+            <dd>
+              {recorded.runs}, median {duration(recorded.median ?? 0)}
+            </dd>
+            <dt>they ended</dt>
+            <dd>
+              {Object.entries(recorded.outcomes).map(([outcome, times]) => (
+                <>
+                  <Pill kind={outcomeClass(outcome)}>
+                    {outcome} ×{times}
+                  </Pill>{" "}
+                </>
+              ))}
+            </dd>
+          </>
+        )}
+      </dl>
+    </Section>
+  );
+}

@@ -1,0 +1,225 @@
+// The bar above the diagram: machine, status, breadcrumb, search and view.
+
+import { useEffect, useState } from "preact/hooks";
+import { choose, isFile, showWhy } from "#core/connection.ts";
+import { KIND_NAMES } from "#core/model.ts";
+import { showPage } from "#core/pages.ts";
+import * as store from "#core/store.ts";
+import { shorten } from "#core/text.ts";
+import type { MachineSummary, StateNode } from "#core/types.ts";
+import type { Page } from "#drawing/page.ts";
+import { ActionsButton } from "#panels/actions.tsx";
+import { CompareChip } from "#panels/comparison.tsx";
+import { fieldValue } from "#panels/components.tsx";
+import { togglePage } from "#panels/keys.tsx";
+import { FollowButton, toggleTree, ViewMenu } from "#panels/view_menu.tsx";
+
+const MOST_FOUND = 12;
+export function TopBar({ page }: { page: Page }) {
+  if (store.pageShown.value !== "machine")
+    return (
+      <header class="top">
+        <RunsButton />
+        {store.model.value && (
+          <button class="back" title="back to this machine (Esc)" onClick={() => showPage("machine")}>
+            ← {shorten(store.facts.value?.label ?? "", 40)}
+          </button>
+        )}
+        <span class="spread" />
+        <ViewMenu page={page} />
+        <ActionsButton id="actions" />
+      </header>
+    );
+  const status = store.runStatus.value;
+  const problems = store.problems.value.length;
+  return (
+    <header class="top">
+      <button
+        class="states-button"
+        aria-expanded={store.treeOpen.value}
+        title="the states as a tree (t)"
+        onClick={toggleTree}
+      >
+        States
+      </button>
+      <RunsButton />
+      <Chooser />
+      <span class={`status ${status.kind}`} role="status" data-testid="status">
+        {status.word}
+      </span>
+      {canAskWhy() && (
+        <button
+          class={`why-button ${store.why.value ? "on" : ""}`}
+          aria-pressed={store.why.value !== null}
+          title="from the first cause to the outcome (w)"
+          onClick={() => showWhy()}
+        >
+          Why?
+        </button>
+      )}
+      {problems > 0 && (
+        <span class="chip" title="problems of the machine's structure; see the inspector">
+          ⚠ {problems}
+        </span>
+      )}
+      <CompareChip page={page} />
+      <Crumbs page={page} />
+      <span class="spread" />
+      <Search page={page} />
+      <span class="wide">
+        <FollowButton page={page} />
+      </span>
+      <ViewMenu page={page} />
+      <span class="wide">
+        <ActionsButton id="actions" />
+      </span>
+    </header>
+  );
+}
+
+function RunsButton() {
+  if (isFile()) return null;
+  const open = store.pageShown.value === "runs";
+  return (
+    <button
+      id="runs"
+      class={open ? "on" : ""}
+      aria-pressed={open}
+      title="live and past runs (h)"
+      onClick={() => togglePage("runs")}
+    >
+      Runs
+    </button>
+  );
+}
+
+/** Whether the run is over: it has ended, or its program is gone. */
+function canAskWhy() {
+  store.tick.value;
+  const { now } = store.run;
+  const about = store.facts.value;
+  return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
+}
+
+function Chooser() {
+  const facts = store.facts.value;
+  const list = store.machines.value;
+  const name = facts ? shorten(facts.label, 60) : "no machine yet";
+  const others = list.some((machine) => machine.name !== facts?.name);
+  if (isFile() || !others) return <h1 title={facts?.name}>{name}</h1>;
+  const choice = (machine: MachineSummary) => {
+    const title = machine.node ? `in node ${machine.node}` : "";
+    return (
+      <option value={machine.name} title={title}>
+        {machine.name} – {statusOf(machine)}
+      </option>
+    );
+  };
+  return (
+    <label class="chooser">
+      <span class="hidden">machine</span>
+      <select value={facts?.name ?? ""} onChange={(e: Event) => choose(fieldValue(e))}>
+        {!facts && (
+          <option value="" disabled>
+            {shorten(store.wanted.value || "choose a machine", 60)}
+          </option>
+        )}
+        {list.map(choice)}
+      </select>
+    </label>
+  );
+}
+
+function statusOf({ recorded, stale, ended, outcome, questions }: MachineSummary) {
+  if (questions && stale == null && !recorded) return "asks you";
+  if (ended != null) return `${recorded ? "recorded" : "ended"}: ${outcome}`;
+  if (recorded) return "recording, without an end";
+  return stale != null ? "stale" : "running";
+}
+
+/** The breadcrumb of the selected state, otherwise of the running one. */
+function Crumbs({ page }: { page: Page }) {
+  const model = store.model.value;
+  const selected = store.selected.value;
+  const leaves = store.activeLeaves.value;
+  const node = model?.get(selected ?? leaves[0]);
+  if (!model || !node) return null;
+  const more = selected ? 0 : leaves.length - 1;
+  const crumb = (one: StateNode, i: number) => (
+    <>
+      {i > 0 && <i>›</i>}
+      <button onClick={() => page.goTo(one.path)}>{one.name}</button>
+    </>
+  );
+  return (
+    <nav class="crumbs" aria-label={`path of the ${selected ? "selected" : "active"} state`}>
+      {[...model.ancestors(node.path), node].map(crumb)}
+      {more > 0 && (
+        <span class="chip" title={leaves.join("\n")}>
+          +{more} active
+        </span>
+      )}
+    </nav>
+  );
+}
+
+function Search({ page }: { page: Page }) {
+  const [at, setAt] = useState(0);
+  const text = store.query.value;
+  const found = text ? (store.model.value?.search(text) ?? []) : [];
+  const shown = found.slice(0, MOST_FOUND);
+  const pick = (node: StateNode | undefined) => {
+    if (!node) return;
+    page.goTo(node.path);
+    store.query.value = "";
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+  };
+  const onKeyDown = (e: KeyboardEvent) => {
+    if (e.key === "Enter") pick(shown[Math.min(at, shown.length - 1)]);
+    else if (e.key === "Escape") {
+      store.query.value = "";
+      (e.target as HTMLElement).blur();
+    } else if (e.key === "ArrowDown" || e.key === "ArrowUp") {
+      const to = e.key === "ArrowDown" ? Math.min(at + 1, shown.length - 1) : at - 1;
+      setAt(Math.max(to, 0));
+      e.preventDefault();
+    } else return;
+    e.stopPropagation();
+  };
+  const onInput = (e: Event) => {
+    store.query.value = fieldValue(e);
+    setAt(0);
+  };
+  useEffect(() => page.markHits(found.map((node) => node.path)), [text]);
+  return (
+    <div class="search">
+      <input
+        id="search"
+        placeholder="Search states"
+        aria-label="Search states"
+        value={text}
+        autocomplete="off"
+        spellcheck={false}
+        onInput={onInput}
+        onKeyDown={onKeyDown}
+      />
+      {!text && <kbd>/</kbd>}
+      {text && (
+        <ul class="results" role="listbox">
+          {shown.map((node, i) => (
+            <Found key={node.path} node={node} chosen={i === at} onPick={pick} />
+          ))}
+          {!found.length && <li class="none">no state of this name</li>}
+          {found.length > shown.length && <li class="none">and {found.length - shown.length} more</li>}
+        </ul>
+      )}
+    </div>
+  );
+}
+
+const Found = ({ node, chosen, onPick }: { node: StateNode; chosen: boolean; onPick: (node: StateNode) => void }) => (
+  <li role="option" aria-selected={chosen} class={chosen ? "at" : ""} onPointerDown={() => onPick(node)}>
+    <b>{node.name}</b>
+    <small>{node.parent ? node.parent.path : KIND_NAMES[node.kind]}</small>
+  </li>
+);

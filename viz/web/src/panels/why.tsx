@@ -1,0 +1,63 @@
+// The causes of the run's end, from the first one to the outcome; a click on a step goes to its instant.
+
+import { showWhy } from "#core/connection.ts";
+import * as store from "#core/store.ts";
+import type { Cause } from "#core/types.ts";
+import type { Page } from "#drawing/page.ts";
+import { Section } from "#panels/components.tsx";
+
+export function WhyPanel({ page }: { page: Page }) {
+  const why = store.why.value;
+  if (!why) return null;
+  const copy = async () => {
+    try {
+      await navigator.clipboard.writeText(why.text);
+      store.notify("Copied");
+    } catch {
+      store.notify("This browser lets no page copy here: mark the text and copy it", "error");
+    }
+  };
+  const title = why.outcome === null ? "Why has it no end?" : "Why did it end so?";
+  return (
+    <Section title={title}>
+      <div class="why">
+        <span class="why-tools">
+          <button class="small" onClick={copy}>
+            Copy as text
+          </button>
+          <button class="small" aria-label="close" onClick={() => showWhy(false)}>
+            ✕
+          </button>
+        </span>
+        {!why.steps.length && <p class="hint">the causes are unknown</p>}
+        <ol>
+          {why.steps.map((step, i) => (
+            <Step step={step} first={i === 0} page={page} />
+          ))}
+        </ol>
+      </div>
+    </Section>
+  );
+}
+
+function Step({ step, first, page }: { step: Cause; first: boolean; page: Page }) {
+  const goThere = () => {
+    store.seek(step.stamp_ns / 1e6);
+    page.goTo(step.path);
+  };
+  return (
+    <li class={`${step.kind} ${first ? "first" : ""}`}>
+      <button class="step" title={step.path} onClick={goThere}>
+        <b>{store.nameOf(step.path)}</b> <span class={`word ${step.kind}`}>{step.what}</span>{" "}
+        <time>{store.instantText(step.stamp_ns / 1e6, 2)}</time>
+      </button>
+      {step.reason && <p>{step.reason}</p>}
+      {step.detail && <pre>{step.detail}</pre>}
+      {step.written.map(([key, value, before]) => (
+        <p>
+          wrote <b>{key}</b> {value} {before && <small>(was {before})</small>}
+        </p>
+      ))}
+    </li>
+  );
+}
