@@ -23,9 +23,9 @@ from actionlib_core.goal.client import GIVES_WAY_S
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.time import Duration
+from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire.actions import pack_statuses
 from actionlib_core.wire.encoding import encoding_of
-from actionlib_core.wire.presence import Endpoint, Kind
 
 S = GoalStatus
 C = CommState

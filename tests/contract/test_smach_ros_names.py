@@ -62,7 +62,7 @@ SIGNATURES = {
         "output_keys": E,
         "outcomes": E,
         "exec_timeout": N,
-        "preempt_timeout": 60.0,
+        "preempt_timeout": "inherit",  # 60 s, unless a container gives less
         "server_wait_timeout": 60.0,
     },
     "ServiceState": {

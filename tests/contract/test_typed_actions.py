@@ -163,6 +163,94 @@ def test_async_timeout_and_many_at_once(world, client):
     assert world.clock.run_async(main()) == [0, 1, 2]
 
 
+# -- async servers -----------------------------------------------------------------------------
+
+
+@server("wait", msg.TestAction)
+async def wait(goal: msg.TestGoal, ctx: GoalContext[msg.TestFeedback]) -> msg.TestResult:
+    """Wait for as many seconds as the goal says; odd things happen at certain numbers."""
+    if goal.goal < 0:
+        raise Reject("only forward")
+    ctx.feedback(msg.TestFeedback(1))
+    if goal.goal == 99:
+        raise RuntimeError("broke")
+    if goal.goal == 98:
+        raise asyncio.CancelledError
+    try:
+        await asyncio.sleep(goal.goal)
+    except asyncio.CancelledError:
+        if goal.goal < 1000:
+            raise
+        await asyncio.sleep(0.01)  # its clean-up, which no second request cuts short
+        if goal.goal == 2000:
+            return msg.TestResult(-2)
+        raise Preempted("tidied up", msg.TestResult(-1)) from None
+    return msg.TestResult(goal.goal)
+
+
+@pytest.fixture
+def waiter(world):
+    with wait.start(node=world.node("server")) as running:
+        client = ActionClient("wait", msg.TestAction, node=world.node("client"))
+        assert client.wait_for_server(LONG_S)
+        yield client
+    assert running.wait(LONG_S)
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "text"),
+    [
+        (0, "SUCCEEDED", ""),
+        (-1, "REJECTED", "only forward"),
+        (99, "ABORTED", "Exception in execute callback: broke"),
+        (98, "ABORTED", "Exception in execute callback: its task was cancelled, but not by"),
+    ],
+)
+@pytest.mark.usefixtures("caplog")
+def test_async_function_ends_its_goal(waiter, number, status, text):
+    with waiter.send(msg.TestGoal(number), timeout=LONG_S) as handle:
+        assert handle.wait(LONG_S)
+    assert handle.status.name == status
+    assert handle.text.startswith(text)
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "text", "result"),
+    [
+        (500, "PREEMPTED", "its task was cancelled", 0),
+        (1000, "PREEMPTED", "tidied up", -1),
+        (2000, "SUCCEEDED", "", -2),
+    ],
+)
+def test_cancel_cancels_the_task_of_an_async_function(waiter, number, status, text, result):
+    handle = waiter.send(msg.TestGoal(number))
+    assert handle.next_feedback() == msg.TestFeedback(1)
+    for _ in range(3):
+        handle.cancel()
+    assert handle.wait(LONG_S)
+    found = handle.status.name, handle.text, handle.get_result()
+    assert found == (status, text, msg.TestResult(result))
+
+
+def test_newer_goal_cancels_the_task_of_the_older_one_and_runs(waiter):
+    older = waiter.send(msg.TestGoal(500))
+    assert older.next_feedback() == msg.TestFeedback(1)
+    newer = waiter.send(msg.TestGoal(0))
+    assert newer.result(LONG_S) == msg.TestResult(0)
+    assert older.wait(LONG_S)
+    assert older.status.name == "PREEMPTED"
+
+
+def test_stop_cancels_the_task_of_an_async_function(world):
+    running = wait.start(node=world.node("server"))
+    client = ActionClient("wait", msg.TestAction, node=world.node("client"))
+    handle = client.send(msg.TestGoal(500))
+    assert handle.next_feedback() == msg.TestFeedback(1)
+    running.stop()
+    assert handle.wait(LONG_S)
+    assert handle.status in world.stopped
+
+
 def test_function_can_be_called_by_itself():
     with pytest.raises(Reject):
         count(msg.TestGoal(-1), None)

@@ -25,6 +25,7 @@ from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.time import Time
+from actionlib_core.transport.tokens import Kind, token_key
 from actionlib_core.wire import actions
 from actionlib_core.wire.actions import (
     pack_report,
@@ -33,7 +34,7 @@ from actionlib_core.wire.actions import (
     unpack_goal,
 )
 from actionlib_core.wire.encoding import encoding_of
-from actionlib_core.wire.presence import Kind, token_key, with_age
+from actionlib_core.wire.presence import with_age
 from tests.two_nodes import TwoNodes
 
 LONG_S = 20.0
@@ -271,7 +272,7 @@ def wrong_token(world):
     """Show the token of a server with another checksum, which came now."""
     node = world.node("other")
     endpoint = node.endpoint(Kind.ACTION_SERVER, "do", Action._type, "0" * 32)
-    endpoint = with_age(endpoint, world.clock.time_ns())
+    endpoint = with_age(endpoint, node)
     return node.transport.declare_alive(token_key(endpoint))
 
 

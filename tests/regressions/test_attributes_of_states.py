@@ -211,16 +211,42 @@ def test_hooks_are_methods_that_take_what_hooks_take():
             return "done"
 
     class Free(Hooked):
-        def on_enter(self, userdata=None):
-            heard.append("not called")
+        def on_enter(self, userdata, again=False, *more, **named):
+            heard.append("enter, too")
 
-        async def on_exit(self, userdata, outcome):
+        async def on_exit(self, userdata):
             heard.append("not called")
 
     machine_of(Own(["done"]), Hooked(["done"]), Free(["done"])).execute()
-    assert heard == ["own enter", "enter", "done"]
+    assert heard == ["own enter", "enter", "done", "enter, too"]
     assert smachpy.get_options(Own(["done"])).on_enter is None
     assert smachpy.get_options(Hooked(["done"])).on_exit is not None
+
+
+@pytest.mark.parametrize("container", [False, True], ids=["state", "root"])
+@pytest.mark.parametrize("kind", ["async", "generator"])
+@pytest.mark.parametrize("hook", ["on_enter", "on_exit", "resume", "on_resume"])
+def test_a_hook_whose_body_nothing_would_run_is_refused(hook, kind, container):
+    """It was skipped without a word: the brake stayed off."""
+    words = "(self, userdata, outcome)" if hook == "on_exit" else "(self, userdata)"
+    body = "def {}{}: {}".format(hook, words, "yield" if kind == "generator" else "pass")
+    names = {}
+    exec(f"async {body}" if kind == "async" else body, names)
+    base = smachpy.StateMachine if container else smachpy.State
+    made = type("Brake", (base,), {hook: names[hook], "execute": base.execute})(["done"])
+
+    def use():
+        if container:
+            made.add("A", smachpy.CBState(lambda _: "done", outcomes=["done"]))
+            made.execute()
+        else:
+            machine_of(made)
+
+    with pytest.raises(smachpy.SmachError, match=f"{hook}: got the {kind} {hook}; expected a"):
+        use()
+    smachpy.set_options(made, **{hook: lambda *_: None})  # the option comes first
+    if not container:
+        machine_of(made)
 
 
 def test_options_are_read_and_changed_by_functions(clock):

@@ -18,8 +18,8 @@ from actionlib_core.node import use_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
 from smachpy import actions  # noqa: F401
+from smachpy.engine.options import NAMES as OPTIONS
 from smachpy.machines.state import FunctionState
-from smachpy.run.options import NAMES as OPTIONS
 from smachpy.states import AskOperator, AwaitMessage, Serve, Wait
 from tests.regressions.test_attributes_of_states import NAMES, VALUES
 from tests.two_nodes import TwoNodes

@@ -9,27 +9,27 @@ import re
 import pytest
 
 import smachpy.command
+from actionlib_core.action.tools import yaml_msgs_str
 from actionlib_core.cli import main as actionlib
 from actionlib_core.config import load_config
 from actionlib_core.exceptions import ConfigError, FieldError
+from actionlib_core.inputs.yaml_text import YamlTextError, load_yaml
 from actionlib_core.interfaces.std_msgs.msg import String
-from actionlib_core.tools import yaml_msgs_str
-from actionlib_core.yaml_text import YamlTextError, load_yaml
-from missions.delivery.places import load_places
-from missions.fleet.site import load_site
-from missions.tour.tour_file import load_tour
 from smachpy import CBState, StateMachine
 from smachpy.checks import IgnoreError
 from smachpy.checks.suppression import read_settings
 from smachpy.events.recording import Recorder, RecordingError, read_recording
+from smachpy.places.exceptions import InputFileError
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import load_map
+from smachpy.places.robot_file import load_config as load_robot
 from smachpy.pnp.mapping import read_mapping
 from smachpy.pnp.problems import PlanError
-from smachpy.sim.config import load_config as load_robot
-from smachpy.sim.exceptions import InputFileError
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.occupancy import load_map
 from smachpy.sim.world_file import load_world
 from smachpy.states import load_route
+from smachpy_missions.delivery.places import load_places
+from smachpy_missions.fleet.site import load_site
+from smachpy_missions.tour.tour_file import load_tour
 
 DEEP = "[" * 3000
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -313,15 +313,15 @@ def test_a_number_that_no_float_holds_is_refused(value, tmp_path):
         load_tour(tmp_path / "file.csv")
 
 
-def test_the_commands_end_with_2_and_one_line(tmp_path, capsys):
+def test_the_commands_end_with_2_and_one_line_and_an_address(tmp_path, capsys):
     bad = tmp_path / "bad.yaml"
     bad.write_text("lease: !!float x\n")
     assert actionlib(["--config", str(bad), "topic", "list"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert capsys.readouterr().err.count("\n") == 2
     for option in ("--map", "--config", "--world"):
         run = ["run", "there_and_back", "--time", "virtual", option, str(bad)]
         assert smachpy.command.main(run) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        assert capsys.readouterr().err.count("\n") == 2
 
 
 # -- recordings ------------------------------------------------------------------------------------

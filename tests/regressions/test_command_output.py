@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from actionlib_core.output import printable, run_program
+from actionlib_core.process.output import printable, run_program
 
 FULL = "/dev/full"
 RUN = ("run", "countdown", "--time", "virtual")

@@ -12,7 +12,7 @@ from rich.console import Console
 
 import smachpy.command
 from smachpy import CBState, InvalidUserCodeError, StateMachine, describe
-from viz import TerminalView
+from smachpy_viz import TerminalView
 
 BAD = "\x1b[31mred\x07\x9b2J\u202e"
 MISSION = f"""

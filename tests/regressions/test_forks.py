@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -9,8 +10,12 @@ import sys
 import pytest
 
 from actionlib_core import shutdown
+from actionlib_core.clock import RealClock, SerialExecutor
+from actionlib_core.clock.forks import end_copy
 from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.shutdown.child_process import ChildProcess
 from smachpy import CBState, Concurrence, StateMachine
+from smachpy.durable.store import StoreError, open_store
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork"),
@@ -120,3 +125,103 @@ def test_signals_are_not_blocked_in_a_child_where_a_restorer_has_raised(monkeypa
 
     monkeypatch.setattr(shutdown, "restorers", [fail, *shutdown.restorers])
     assert end_of_child(signal.SIGTERM) == signal.SIGTERM
+
+
+# -- what a copy of a process must not do: wait for threads, write, end what is its parent's ---------
+
+
+def in_copy(check):
+    """Return whether `check` returns True in a forked process, within a few seconds."""
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)  # it ends the process
+        code = 1
+        try:
+            code = 0 if check() is True else 2
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def test_a_copy_waits_for_no_thread_of_its_parent():
+    """Leaving a durable or recorded mission in a copy waited for ever, or for seconds."""
+    clock = RealClock()
+    over, ran = clock.event(), []
+    task = clock.spawn(over.wait, name="of the parent")
+    executor = SerialExecutor(clock, "of the parent")
+    executor.submit(over.wait)
+
+    def check():
+        executor.submit(lambda: ran.append("in the copy"))
+        ended = task.join() and executor.join() and not task.is_alive()
+        clock.spawn(lambda: ran.append("own"), name="of the copy").join()
+        return ended and ran == ["own"]
+
+    try:
+        assert in_copy(check)
+        assert task.is_alive()
+    finally:
+        over.set()
+        assert task.join(20)
+        assert executor.join(20)
+
+
+def test_a_copy_that_a_callback_has_forked_ends_with_the_callback():
+    """It became a thread of the cache, which ended after five seconds."""
+    clock = RealClock()
+    children = []
+
+    def fork():
+        child = os.fork()
+        if child == 0:
+            sys.exit(IGNORED)
+        children.append(child)
+
+    executor = SerialExecutor(clock, "callbacks")
+    executor.submit(fork)
+    assert executor.join(20)
+    assert os.waitstatus_to_exitcode(os.waitpid(children[0], 0)[1]) == IGNORED
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "printed"),
+    [
+        (None, 0, b""),
+        (SystemExit(), 0, b""),
+        (SystemExit(IGNORED), IGNORED, b""),
+        (SystemExit("gone"), 1, b"gone\n"),
+        (ValueError("wrong"), 1, b"ValueError: wrong\n"),
+    ],
+)
+def test_a_copy_ends_with_the_exit_code_of_a_program(error, code, printed, capfd):
+    child = os.fork()
+    if child == 0:
+        sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115  pytest's is not a file
+        end_copy(error)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == code
+    assert capfd.readouterr().err.encode() == printed
+
+
+def test_a_copy_does_not_use_the_store_of_its_parent(tmp_path):
+    with contextlib.closing(open_store(tmp_path / "journal.db")) as store:
+
+        def check():
+            store.close()  # does nothing
+            try:
+                store.missions()
+            except StoreError as error:
+                return "forked" in str(error)
+            return False
+
+        assert in_copy(check)
+        assert store.missions() == []
+
+
+def test_a_copy_does_not_end_a_process_of_its_parent(tmp_path):
+    """With --start-robot, a copy that left the mission killed the robot."""
+    (tmp_path / "waits.py").write_text("import sys; print('ready', flush=True); sys.stdin.read()")
+    with ChildProcess("waits", environment={"PYTHONPATH": str(tmp_path)}) as robot:
+        assert robot.wait_ready(60)
+        assert in_copy(lambda: robot.stop() is None)
+        os.kill(robot.pid, 0)
+        assert robot.exit_code is None

@@ -18,6 +18,7 @@ from actionlib_core.node import Node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import Concurrence, Iterator, State, StateMachine
+from smachpy.engine.preempt import on_preempt
 from smachpy.events import (
     Abandoned,
     CallbackFailed,
@@ -27,7 +28,6 @@ from smachpy.events import (
     Resumed,
 )
 from smachpy.network.server import IntrospectionServer
-from smachpy.run.grace import on_preempt
 
 LONG_S = 20.0
 
@@ -347,20 +347,8 @@ def first_handler(machine):
     return lambda *_: machine.request_preempt()
 
 
-def handler_that_leaves(machine):
-    def handle(number, _frame):
-        signal.signal(number, signal.SIG_IGN)  # the second one is not to disturb
-        machine.request_preempt()
-
-    return handle
-
-
-def handler_object(machine):
-    class Handler:
-        def __call__(self, _number, _frame):
-            machine.request_preempt()
-
-    return Handler()
+def handler_that_says_so(machine):
+    return lambda number, _: machine.request_preempt(by=signal.Signals(number).name)
 
 
 class ListenerWithLock:
@@ -378,8 +366,8 @@ LOCKS = {
     "buffer that is thinned": lambda m: m.buffer._cut,
     "buffer that is read": lambda m: m.buffer._lock,
     "control": lambda m: m.machine.control._lock,
-    "container": lambda m: m.machine._smachpy.frame.run.lock,
-    "child": lambda m: m.machine["S0"]._smachpy.frame.run.lock,
+    "container": lambda m: m.machine._smachpy.live.frame.run.lock,
+    "child": lambda m: m.machine["S0"]._smachpy.live.frame.run.lock,
     "feed": lambda m: m.server._feed._lock,
     "network": lambda m: m.network.lock,
     "log": lambda m: m.log.lock,
@@ -424,11 +412,10 @@ class Heard:
         logging.getLogger("smachpy").removeHandler(self.log)
 
 
-@pytest.mark.parametrize("make", [first_handler, handler_that_leaves, handler_object])
 @pytest.mark.parametrize("lock", LOCKS)
-def test_a_signal_handler_may_ask_whatever_lock_it_interrupts(lock, make):
+def test_a_signal_handler_may_ask_whatever_lock_it_interrupts(lock):
     with Heard() as heard:
-        before = signal.signal(signal.SIGUSR1, make(heard.machine))
+        before = signal.signal(signal.SIGUSR1, handler_that_says_so(heard.machine))
         try:
             with LOCKS[lock](heard):
                 signal.raise_signal(signal.SIGUSR1)
@@ -436,7 +423,49 @@ def test_a_signal_handler_may_ask_whatever_lock_it_interrupts(lock, make):
             signal.signal(signal.SIGUSR1, before)
     assert heard.outcomes == ["preempted"]
     asked = [event for event in heard.listener.heard if isinstance(event, PreemptRequested)]
-    assert {event.source for event in asked} == {"signal"}
+    assert {event[3:5] for event in asked} == {("signal", "SIGUSR1")}
+
+
+def test_what_the_main_thread_asks_is_asked_when_it_returns():
+    runs, go_on = threading.Event(), threading.Event()
+
+    class Deaf(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, _userdata):
+            runs.set()
+            go_on.wait(LONG_S)
+            return "done"
+
+    with use_clock(RealClock()) as clock:
+        machine = chain(both(Deaf()))
+        runner = clock.spawn(machine.execute, name="runner")
+        assert runs.wait(LONG_S)
+        machine.request_preempt()
+        was_asked = machine["S0"]["S0"].preempt_requested()
+        go_on.set()
+        assert runner.join(LONG_S)
+    assert was_asked
+
+
+def test_the_main_thread_asks_itself_if_no_thread_can_be_started(monkeypatch):
+    class Asks(State):
+        def __init__(self):
+            super().__init__(["done", "preempted"])
+
+        def execute(self, _userdata):
+            def refuse(*_, **__):
+                raise RuntimeError("can't start new thread")
+
+            monkeypatch.setattr(RealClock, "spawn", refuse)
+            machine.request_preempt()
+            monkeypatch.undo()
+            return "preempted" if self.preempt_requested() else "done"
+
+    with use_clock(RealClock()):
+        machine = chain(Asks())
+        assert machine.execute() == "preempted"
 
 
 def test_a_signal_handlers_request_is_for_the_run_that_is_on():
@@ -754,7 +783,7 @@ def test_a_request_between_two_attempts_of_the_root_is_heard_and_told(clock):
     heard = []
     machine.subscribe(heard.append)
     clock.call_later(1.0, lambda: machine.request_preempt(by="desk"))
-    assert machine.execute() == "aborted"
+    assert machine.execute() == "preempted"
     assert clock.now() == 1.0
     asked = [(e.path, e.by) for e in heard if isinstance(e, PreemptRequested)]
     assert asked == [("/SM_ROOT", "desk")]

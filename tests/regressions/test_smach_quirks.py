@@ -61,7 +61,7 @@ def test_the_callers_lists_and_dicts_are_never_changed():
     state = smach.State(outcomes, io_keys=keys)
     state.register_outcomes(["b"])
     sm = machine()
-    sm.add("A", state, transitions, remapping, constants={"c": 1})
+    sm.add("A", state, transitions, remapping, constants={"k": 1})
     names = ["done"]
     smach.Iterator(names, [], [], exhausted_outcome="exhausted")
     assert (outcomes, keys, transitions, remapping, names) == (
@@ -617,7 +617,7 @@ def test_nothing_is_printed_by_default(capsys):
 
 
 def test_set_loggers_keeps_its_order_of_arguments():
-    from smachpy import log
+    from smachpy.base import log
 
     heard = []
     before = log.current_loggers()

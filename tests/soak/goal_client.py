@@ -3,7 +3,7 @@
     python goal_client.py JOURNAL ACTION SEED PATIENCE
 
 SIGUSR1: cancel every goal of its own, one by one; SIGUSR2: cancel all goals of all clients.
-SIGTERM: send no more, wait for the end of each goal, leave.
+SIGHUP: its computer's clock is set. SIGTERM: send no more, wait for the end of each goal, leave.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 
+import wall
 from journal import Journal
 
 from actionlib_core import ActionClient, CommState, get_node
@@ -111,6 +112,7 @@ def main(path: str, action: str, seed: str, patience: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for number in (signal.SIGUSR1, signal.SIGUSR2):
         signal.signal(number, lambda number, _: client.commands.put(number))
+    wall.set_on(signal.SIGHUP, int(seed))
     journal.write("session", session=get_node().transport.session_id)
     print("up", flush=True)
     client.send_until(stop)

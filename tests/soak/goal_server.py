@@ -2,7 +2,8 @@
 
     python goal_server.py JOURNAL ACTION SEED
 
-Some of its callbacks are slow. SIGTERM stops it in good order.
+Some of its callbacks are slow. SIGTERM and SIGHUP stop it in good order, by the handlers of the
+library; SIGUSR1 sets its computer's clock.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import sys
 import threading
 import time
 
+import wall
 from journal import Journal
 
-from actionlib_core import ActionServer, get_node
+from actionlib_core import ActionServer, get_node, shutdown
 from actionlib_core.exceptions import ActionException, ServerConflictError
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestFeedback, TestResult
 
@@ -80,17 +82,20 @@ class Server:
 
 def main(path: str, action: str, seed: str) -> None:
     journal = Journal(path)
-    stop: list[int] = []  # no Event: its wait may hold the lock that a handler's set waits for
-    signal.signal(signal.SIGTERM, lambda number, _: stop.append(number))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    server = Server(journal, action, int(seed))
+    wall.set_on(signal.SIGUSR1, int(seed))
+    with shutdown.handle_signals():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        serve(Server(journal, action, int(seed)), journal)
+
+
+def serve(server: Server, journal: Journal) -> None:
     try:
         server.start()
     except ServerConflictError:
         journal.write("name taken")
         return
     print("up", flush=True)
-    while not stop:
+    while not shutdown.requested():
         time.sleep(0.1)
         if server.server.error is not None:
             journal.write("gave way")

@@ -93,6 +93,7 @@ class Group:
         self.random = rng
         self.programs: list[Program] = []
         self.busy_until = 0.0
+        self.clocks_set = 0
         self._directory = directory
         self._numbers = collections.Counter()
         path = directory / f"{name}.yaml"
@@ -182,6 +183,20 @@ class Group:
     def stop_server(self) -> None:
         if program := self._one("server"):
             self.hurt(program, signal.SIGTERM, "SIGTERM")
+
+    def hang_up_server(self) -> None:
+        """Close the terminal of a server, or stop its service by a signal that is less usual."""
+        if program := self._one("server"):
+            self.hurt(program, signal.SIGHUP, "SIGHUP")
+
+    def set_clock(self) -> None:
+        """Set the clock of the computer on which a server or a client runs; it is no fault."""
+        kind = self.random.choice(["server", "client"])
+        if program := self._one(kind):
+            number = signal.SIGUSR1 if kind == "server" else signal.SIGHUP
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(program.process.pid, number)
+            self.clocks_set += 1
 
     def overlap_servers(self) -> None:
         """Start the next server before the old one has gone."""
@@ -287,6 +302,8 @@ class Group:
 FAULTS = {
     "kill_server": 2,
     "stop_server": 2,
+    "hang_up_server": 1,
+    "set_clock": 3,
     "overlap_servers": 2,
     "two_servers": 1,
     "suspend_server": 1,
@@ -394,6 +411,7 @@ class Judge:
         """Take the journals of a group that has ended."""
         facts = Facts(group)
         self._faults.update(what for program in group.programs for _, _, what in program.faults)
+        self._faults["clock set"] += group.clocks_set
         self._executed += len(facts.execs)
         for goal_id, times in facts.execs.items():
             self._again += len(times) - 1

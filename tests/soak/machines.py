@@ -3,9 +3,11 @@
 python tests/soak/machines.py [--seconds 300] [--seed 1]
 
 Each machine runs wild (children that raise, block, do not listen or override what they inherit,
-callbacks and operators that ask it to stop), then calm, while threads of the wild run may still be
-about. A wild run ends soon after it was asked to stop, with an outcome that it declares or with an
-error of smachpy, and leaves no flag; a calm run ends 'done' and nobody in it is asked anything.
+callbacks and operators that ask it to stop, pause, step, jump and choose outcomes, and who set the
+computer's clock), then calm, while threads of the wild run may still be about. Some machines tidy
+up after a preempt, some have a clean-up. A wild run ends soon after it was asked to stop, with an
+outcome that it declares or with an error of smachpy, leaves no flag and no pause, and cleans up
+once each time it ran; a calm run ends 'done' and nobody in it is asked anything.
 """
 
 from __future__ import annotations
@@ -21,10 +23,16 @@ import threading
 import time
 from collections import Counter
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 from actionlib_core.clock import RealClock, VirtualClock, current_clock, use_clock
 from smachpy import Concurrence, Iterator, SmachError, State, StateMachine, set_options
-from smachpy.events import Abandoned, Preempted, PreemptRequested
+from smachpy.events import Abandoned, Entered, Preempted, PreemptRequested
+
+sys.path.append(str(Path(__file__).parents[1]))  # as a program it knows its own folder only
+
+from wall_clock import Computer
 
 OUTCOMES = ["done", "aborted", "preempted"]
 HANG_S = 60.0  # real seconds
@@ -44,6 +52,8 @@ class Attack:
         self.rng = random.Random(seed)
         self.unit = unit
         self.wild = True
+        self.is_late = False  # a command came after the run
+        self.wall: Any = None  # the clock of its computer, which the operator sets
         self.problems: list[str] = []
         self.states: list[State] = []
         self.root = self.container(0)
@@ -90,7 +100,12 @@ class Attack:
         for number in range(count):
             targets = [f"S{n}" for n in range(number + 1, count)]
             ways = {"done": (targets or ["done"])[0], "aborted": [*targets, "aborted"][0]}
+            if self.rng.random() < 0.2:
+                ways["preempted"] = "TIDY"
             made.add(f"S{number}", self.state(depth), ways)
+        made.add("TIDY", Tidies(self))
+        if self.rng.random() < 0.2:
+            made.add_cleanup("CLEAN_UP", Tidies(self))
         return made
 
     def concurrence(self, depth: int) -> Concurrence:
@@ -149,13 +164,19 @@ class Attack:
                 self.command(control)
             except SmachError:
                 continue  # it does not run any more
+        for place in control.breakpoints():
+            control.remove_breakpoint(*place)
         control.resume()
         clock.sleep(self.seconds(2.0))
 
     def command(self, control: object) -> None:
         active = control.active()
-        choice = self.rng.randrange(6)
-        if choice == 0:
+        # A pause that comes as the run has just ended is for the next one.
+        self.is_late = self.is_late or not self.root._is_running
+        choice = self.rng.randrange(10)
+        if choice >= 6:
+            self.rare_command(control, active, choice)
+        elif choice == 0:
             control.pause(running=self.rng.choice(["keep", "cancel"]))
         elif choice == 1:
             control.resume()
@@ -165,6 +186,17 @@ class Attack:
             control.preempt(self.rng.choice(active))
         else:
             self.root.request_preempt()
+
+    def rare_command(self, control: Any, active: tuple[str, ...], choice: int) -> None:
+        if choice == 6:
+            control.step()
+        elif choice == 7 and active:
+            place, _, _ = self.rng.choice(active).rpartition("/")
+            control.jump(f"{place}/{self.rng.choice(['S0', 'S1', 'TIDY'])}")
+        elif choice == 8 and active:
+            control.add_breakpoint(self.rng.choice(active))
+        else:
+            self.wall.ahead += self.rng.uniform(-4000.0, 4000.0)
 
 
 class Leaf(State):
@@ -195,6 +227,13 @@ class Listens(Leaf):
                 self.service_preempt()
             return "preempted"
         return self.attack.rng.choice(["done", "done", "aborted"])
+
+
+class Tidies(Leaf):
+    """What comes after a preempt."""
+
+    def run_wild(self) -> str:
+        return "preempted" if self.sleep(self.attack.seconds(0.5)) else "done"
 
 
 class Polls(Leaf):
@@ -300,6 +339,14 @@ def judge_run(attack: Attack, figures: Figures, events: list[object], outcome: o
         heard = [*asked, *lost, *(event for event in events if isinstance(event, Preempted))]
         if outcome != "done" or heard:
             attack.problems.append(f"a calm run ended with {outcome!r} and heard {heard}")
+    # What an operator's pause has stopped is done again after it.
+    paused = Counter(event.path for event in asked if event.why == "pause")
+    entered = Counter(event.path for event in events if isinstance(event, Entered)) - paused
+    for path, count in entered.items():
+        container, _, label = path.rpartition("/")
+        visits = entered[container] or 1  # the root is not entered
+        if label == "CLEAN_UP" and (count > visits or (count < visits and not attack.wild)):
+            attack.problems.append(f"{kind}: {count} clean-ups in {visits} visits of {container}")
     for state in attack.states:
         if state.preempt_requested():
             attack.problems.append(f"{kind}: a flag is left at a {type(state).__name__}")
@@ -317,15 +364,25 @@ def run_once(attack: Attack) -> tuple[object, list[object]]:
 
 
 def attack_in_virtual_time(seed: int, figures: Figures) -> list[str]:
-    with VirtualClock(seed) as clock, use_clock(clock):
+    with VirtualClock(seed) as clock, use_clock(Computer(clock)) as wall:
         attack = Attack(seed, 1.0)
+        attack.wall = wall
         clock.limit = 1000.0
         operator = clock.spawn(attack.operate, name="operator")
         # In a thread of its own: in the main thread nothing can be left behind.
         ended: list[tuple[object, list[object], float]] = []
-        runner = clock.spawn(lambda: ended.append((*run_once(attack), clock.now())), name="runner")
+        paused: list[bool] = []
+
+        def run() -> None:
+            ended.append((*run_once(attack), clock.now()))
+            # Nobody else runs between the end and this look.
+            paused.extend([True] if attack.root.control.is_paused() else [])
+
+        runner = clock.spawn(run, name="runner")
         runner.join()
         outcome, events, end = ended[0]
+        if paused and not attack.is_late:
+            attack.problems.append("a pause is left")
         operator.join()
         attack.root.control.resume()
         attack.root.recall_preempt()  # a late command was for the next run
@@ -344,8 +401,9 @@ def attack_in_virtual_time(seed: int, figures: Figures) -> list[str]:
 def attack_in_real_time(seed: int, figures: Figures, *, by_signal: bool) -> list[str]:
     """Run in this thread, asked by a signal handler, or in another one."""
     clock = RealClock()
-    with use_clock(clock):
+    with use_clock(Computer(clock)) as wall:
         attack = Attack(seed, 0.02)
+        attack.wall = wall
         results: list[tuple[object, list[object]]] = []
         operator = clock.spawn(attack.operate, name="operator")
         if by_signal:

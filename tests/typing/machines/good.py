@@ -19,7 +19,7 @@ from smachpy import (
     cb_interface,
 )
 from smachpy.events import Entered, Event, Left
-from smachpy.introspection import StateRecord, describe
+from smachpy.events.introspection import StateRecord, describe
 
 
 @dataclass
@@ -130,3 +130,7 @@ def build_others() -> str:
     with loop:
         Iterator.set_contained_state("EACH", steps, loop_outcomes=["ok"])
     return loop.execute(UserData())
+
+
+def in_a_function(userdata: object) -> str:
+    return "preempted" if smachpy.current_state().sleep(1.0) else "done"

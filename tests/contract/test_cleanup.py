@@ -1,0 +1,427 @@
+"""A clean-up runs once at every end of its machine, and changes nothing of that end."""
+
+from __future__ import annotations
+
+import copy
+import threading
+import warnings
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import smachpy
+from smachpy import (
+    Concurrence,
+    Ending,
+    InvalidConstructionError,
+    InvalidStateError,
+    InvalidUserCodeError,
+    Sequence,
+    State,
+    StateMachine,
+)
+from smachpy.checks import after_any_end, check
+from smachpy.testing import explore, mission_kit
+
+
+class Step(State):
+    def __init__(self, seconds: float = 1.0, **options: Any) -> None:
+        super().__init__(["done", "preempted"], **options)
+        self.seconds = seconds
+
+    def execute(self, userdata: Any) -> str:
+        return "preempted" if self.sleep(self.seconds) else "done"
+
+
+class Raising(State):
+    def __init__(self) -> None:
+        super().__init__(["done"])
+
+    def execute(self, userdata: Any) -> str:
+        raise OSError("no such door")
+
+
+class Dock(Step):
+    def __init__(self, seconds: float = 1.0, **options: Any) -> None:
+        super().__init__(seconds, **options)
+        self.endings: list[Ending | None] = []
+
+    def execute(self, userdata: Any) -> str:
+        self.endings.append(smachpy.current_ending())
+        return super().execute(userdata)
+
+
+def machine_of(state: State, cleanup: State, **options: Any) -> StateMachine:
+    sm = StateMachine(["done", "aborted", "preempted"], name="M", **options)
+    with sm:
+        sm.add("WORK", state)
+        sm.add_cleanup("DOCK", cleanup)
+    return sm
+
+
+def test_it_runs_after_success():
+    dock = Dock()
+    with mission_kit() as mission:
+        run = mission(machine_of(Step(), dock))
+    assert (run.outcome, run.path) == ("done", ("/M/WORK", "/M/DOCK"))
+    assert dock.endings == [Ending("done", "", preempted=False)]
+
+
+def test_it_runs_after_an_exception_which_is_raised_afterwards():
+    dock = Dock()
+    with pytest.raises(InvalidUserCodeError, match="no such door"):
+        machine_of(Raising(), dock).execute()
+    (ending,) = dock.endings
+    assert ending.outcome is None
+    assert "no such door" in ending.error
+
+
+def test_it_runs_after_a_timeout_of_the_machine():
+    dock = Dock()
+    outer = StateMachine(["done", "aborted", "preempted"])
+    with outer:
+        outer.add("M", machine_of(Step(60.0), dock, timeout=5.0))
+    with mission_kit() as mission:
+        run = mission(outer)
+    assert run.outcome == "aborted"
+    assert run.duration == 6.0
+    assert dock.endings == [Ending("preempted", "", preempted=True)]
+
+
+@pytest.mark.parametrize("how", ["preempt", "interrupt"])
+def test_it_runs_after_a_request_to_stop(how):
+    dock = Dock(30.0)
+    with mission_kit() as mission:
+        getattr(mission, how)(at=2.0)
+        run = mission(machine_of(Step(60.0), dock))
+    assert run.outcome == "preempted"
+    assert run.duration == 32.0
+    assert run.preempted
+    assert dock.endings == [Ending("preempted", "", preempted=True)]
+
+
+def test_it_runs_after_a_state_that_finishes_as_the_request_comes():
+    sm = StateMachine(["done", "preempted"], name="M")
+
+    @smachpy.state(["done"])
+    def finishing(userdata):
+        sm.request_preempt()
+        return "done"
+
+    with sm:
+        sm.add("WORK", finishing, {"done": "MORE"})
+        sm.add("MORE", Step())
+        sm.add_cleanup("DOCK", Dock())
+    with mission_kit() as mission:
+        run = mission(sm)
+    assert (run.outcome, run.path) == ("preempted", ("/M/WORK", "/M/DOCK"))
+
+
+def test_it_does_not_run_if_the_machine_was_asked_before_it_began():
+    dock = Dock()
+    sm = machine_of(Step(), dock)
+    sm.request_preempt()
+    assert sm.execute() == "preempted"
+    assert dock.endings == []
+
+
+def test_a_further_request_gives_it_its_grace():
+    dock = Dock(8.0, preempt_timeout=10.0)
+    with mission_kit() as mission:
+        mission.preempt(at=1.0)
+        mission.preempt(on="DOCK", after=2.0)
+        run = mission(machine_of(Step(60.0), dock))
+    assert run.duration == 9.0
+    run.assert_outcome("preempted")
+
+
+def test_after_its_grace_it_is_asked_to_stop_however_often_somebody_asks():
+    dock = Dock(1000.0, preempt_timeout=5.0)
+    with mission_kit() as mission:
+        mission.preempt(at=1.0)
+        for after in (2.0, 3.0, 4.0, 6.0):
+            mission.preempt(on="DOCK", after=after)
+        run = mission(machine_of(Step(60.0), dock))
+    assert run.duration == 1.0 + 2.0 + 5.0
+
+
+def test_a_first_request_while_it_runs_gives_it_its_grace_and_keeps_the_outcome():
+    dock = Dock(3.0)
+    with mission_kit() as mission:
+        mission.preempt(on="DOCK", after=1.0)
+        run = mission(machine_of(Step(), dock))
+    assert (run.outcome, run.duration) == ("done", 4.0)
+
+
+def test_a_request_while_it_runs_stops_the_machine_above():
+    outer = StateMachine(["done", "aborted", "preempted"], name="O")
+    with outer:
+        outer.add("M", machine_of(Step(), Dock(3.0)), {"done": "NEXT"})
+        outer.add("NEXT", Step())
+    with mission_kit() as mission:
+        mission.preempt(on="DOCK", after=1.0)
+        run = mission(outer)
+    assert (run.outcome, run.visits("NEXT"), run.duration) == ("preempted", 0, 4.0)
+
+
+def test_a_clean_up_that_ignores_its_request_is_interrupted():
+    class Deaf(State):
+        def __init__(self) -> None:
+            super().__init__(["done"], preempt_timeout=5.0)
+
+        def execute(self, userdata: Any) -> str:
+            self.clock().event("nothing").wait()
+            return "done"
+
+    with mission_kit() as mission:
+        mission.preempt(at=1.0)
+        mission.preempt(on="DOCK", after=2.0)
+        run = mission(machine_of(Step(60.0), Deaf()))
+    assert run.outcome == "preempted"
+    assert run.duration == pytest.approx(1.0 + 2.0 + 5.0 + 5.0, abs=0.2)
+
+
+def test_what_it_raises_is_reported_and_hides_nothing(caplog):
+    sm = machine_of(Step(0.0), Raising())
+    with mission_kit() as mission:
+        run = mission(sm)
+    assert run.outcome == "done"
+    assert any("no such door" in text for text in caplog.messages)
+    assert [event.path for event in run.events if type(event).__name__ == "Failed"] == ["/M/DOCK"]
+
+
+def test_the_exception_of_the_work_is_raised_if_both_raise():
+    class Other(Raising):
+        def execute(self, userdata: Any) -> str:
+            raise ValueError("the dock is gone")
+
+    with pytest.raises(InvalidUserCodeError, match="no such door"):
+        machine_of(Raising(), Other()).execute()
+
+
+def test_an_operator_stops_it_at_once():
+    sm = machine_of(Step(), Dock(1000.0))
+
+    def stop(event: Any) -> None:
+        if type(event).__name__ == "Entered" and event.path == "/M/DOCK":
+            threading.Thread(target=sm.control.preempt, args=("/M/DOCK",)).start()
+
+    sm.subscribe(stop)
+    assert sm.execute() == "done"
+
+
+def test_it_may_be_a_machine_and_knows_the_ending_at_every_depth():
+    dock = Dock()
+    inner = Sequence(["done", "preempted"], "done")
+    with inner:
+        inner.add("STOP", Step())
+        inner.add("DRIVE", dock)
+    with mission_kit() as mission:
+        mission.preempt(at=0.5)
+        run = mission(machine_of(Step(60.0), inner))
+    assert run.path == ("/M/WORK", "/M/DOCK/STOP", "/M/DOCK/DRIVE")
+    assert dock.endings == [Ending("preempted", "", preempted=True)]
+
+
+def test_no_ending_is_known_outside_of_a_clean_up():
+    dock = Dock()
+    with mission_kit() as mission:
+        mission(machine_of(dock, Step()))
+    assert dock.endings == [None]
+
+
+def test_that_of_a_concurrence_runs_after_all_branches():
+    cc = Concurrence(["done", "preempted"], "done", name="C")
+    with cc:
+        cc.add("A", Step(1.0))
+        cc.add("B", Step(3.0))
+        Concurrence.add_cleanup("STOP", Dock())
+    with mission_kit() as mission:
+        run = mission(cc)
+    assert (run.outcome, run.duration, run.path[-1]) == ("done", 4.0, "/C/STOP")
+
+
+def test_inner_clean_ups_run_first():
+    inner = machine_of(Step(60.0), Dock())
+    outer = StateMachine(["done", "aborted", "preempted"], name="O")
+    with outer:
+        outer.add("M", inner)
+        outer.add_cleanup("HOME", Dock())
+    with mission_kit() as mission:
+        mission.preempt(at=1.0)
+        run = mission(outer)
+    assert run.path == ("/O/M/WORK", "/O/M/DOCK", "/O/HOME")
+
+
+def test_it_reads_and_writes_the_userdata_of_its_machine():
+    @smachpy.state(["done"], input_keys=["at"], output_keys=["log"])
+    def note(userdata):
+        userdata.log = f"left {userdata.at}"
+        return "done"
+
+    sm = StateMachine(["done", "preempted"], output_keys=["report"], userdata={"place": "hall"})
+    with sm:
+        sm.add("WORK", Step(0.0))
+        sm.add_cleanup("NOTE", note, {"at": "place", "log": "report"})
+    sm.execute()
+    assert sm.userdata.report == "left hall"
+
+
+def test_a_second_one_is_refused():
+    sm = machine_of(Step(), Dock())
+    with pytest.raises(InvalidStateError, match=r"second one, beside 'DOCK'.*Try a Sequence"):
+        sm.add_cleanup("HOME", Dock())
+
+
+def test_a_transition_to_it_is_refused():
+    sm = StateMachine(["done", "preempted"], name="M")
+    sm.add("WORK", Step(), {"done": "DOCK"})
+    sm.add_cleanup("DOCK", Dock())
+    with pytest.raises(smachpy.InconsistentMachineError, match="leads nowhere: got 'DOCK'"):
+        sm.execute()
+
+
+def test_a_machine_needs_another_state():
+    sm = StateMachine(["done"], name="M")
+    sm.add_cleanup("DOCK", Dock())
+    with pytest.raises(smachpy.InconsistentMachineError, match="states: got none"):
+        sm.execute()
+
+
+def test_it_cannot_be_added_while_the_machine_runs():
+    sm = StateMachine(["done"], name="M")
+
+    @smachpy.state(["done"])
+    def adding(userdata):
+        sm.add_cleanup("DOCK", Dock())
+        return "done"
+
+    sm.add("WORK", adding)
+    with pytest.raises(InvalidConstructionError, match="got a new clean-up while it runs"):
+        sm.execute()
+
+
+def test_a_copy_has_it_too():
+    dock = Dock()
+    sm = copy.deepcopy(machine_of(Step(0.0), dock))
+    assert sm.execute() == "done"
+    assert sm["DOCK"].endings == [Ending("done", "", preempted=False)]
+
+
+def test_a_jump_to_it_is_refused():
+    sm = machine_of(Step(), Dock())
+    refused = []
+
+    @smachpy.state(["done"])
+    def jumping(userdata):
+        try:
+            sm.control.jump("/M/DOCK")
+        except smachpy.SmachError as error:
+            refused.append(str(error))
+        return "done"
+
+    sm = StateMachine(["done", "preempted"], name="M")
+    sm.add("WORK", jumping)
+    sm.add_cleanup("DOCK", Dock(0.0))
+    sm.execute()
+    assert "no jump there" in refused[0]
+
+
+def test_a_run_cannot_begin_with_it():
+    with pytest.raises(InvalidStateError, match=r"got \['DOCK'\]; expected one of \['WORK'\]\."):
+        machine_of(Step(), Dock()).set_initial_state(["DOCK"])
+
+
+def test_check_proves_that_no_end_goes_without():
+    with_it = machine_of(Step(), Dock())
+    report = check(with_it, properties=[after_any_end("DOCK")])
+    assert not [problem for problem in report.problems if problem.rule == "property"]
+    by_hand = StateMachine(["done", "preempted"], name="M")
+    with by_hand:
+        by_hand.add("WORK", Step(), {"done": "DOCK", "preempted": "DOCK"})
+        by_hand.add("DOCK", Dock())
+    report = check(by_hand, properties=["after_any_end(DOCK)"])
+    assert [problem.rule for problem in report.problems if problem.severity == "error"] == [
+        "property"
+    ]
+
+
+def test_every_way_runs_it_once():
+    found = explore(
+        lambda: machine_of(Step(), Dock()),
+        preempts=2,
+        grace=60.0,
+        invariants=[lambda run: run.visits("DOCK") == 1],
+    )
+    found.assert_ok()
+    assert found.exhaustive
+
+
+def test_a_mission_that_is_killed_anywhere_goes_on_to_the_same_end():
+    found = explore(lambda: machine_of(Step(), Dock()), preempts=2, faults=["kill"])
+    found.assert_ok()
+    assert found.exhaustive
+
+
+def test_a_service_in_a_callback_of_a_container_lets_the_machine_above_go_on():
+    inner = StateMachine(["done", "preempted"])
+
+    @smachpy.state(["done"])
+    def finishing(userdata):
+        outer.request_preempt()
+        return "done"
+
+    inner.add("WORK", finishing)
+    inner.register_termination_cb(lambda *_: inner.service_preempt())
+    outer = StateMachine(["done", "preempted"], name="O")
+    outer.add("IN", inner, {"done": "DOCK"})
+    outer.add("DOCK", Step())
+    with mission_kit() as mission:
+        run = mission(outer)
+    assert (run.outcome, run.visits("DOCK")) == ("done", 1)
+
+
+NESTED = st.recursive(
+    st.just("leaf"),
+    lambda below: st.tuples(st.sampled_from(["machine", "concurrence"]), below, below),
+    max_leaves=4,
+)
+
+
+def build(tree: Any, cleanups: list[str], path: str) -> State:
+    if tree == "leaf":
+        return Step()
+    kind, first, second = tree
+    container: Any
+    if kind == "machine":
+        container = StateMachine(["done", "preempted"])
+        container.add("A", build(first, cleanups, f"{path}/A"), {"done": "B"})
+    else:
+        container = Concurrence(["done", "preempted"], "done")
+        container.add("A", build(first, cleanups, f"{path}/A"))
+    container.add("B", build(second, cleanups, f"{path}/B"))
+    container.add_cleanup("Z", Step())
+    cleanups.append(path)
+    return container
+
+
+@settings(max_examples=50, deadline=None)
+@given(NESTED, st.floats(0.0, 12.0), st.floats(0.0, 6.0))
+def test_each_machine_that_began_cleans_up_once_whenever_somebody_asks(tree, first, more):
+    owners: list[str] = []
+    root = StateMachine(["done", "preempted"], name="R")
+    root.add("M", build(tree, owners, "/R/M"))
+    root.add_cleanup("Z", Step())
+    with mission_kit() as mission:
+        mission.preempt(at=first)
+        mission.preempt(at=first + more)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a preempt after the end
+            run = mission(root)
+    for owner in [*owners, "/R"]:
+        first_child = "M" if owner == "/R" else "A"
+        begun, cleaned = run.visits(f"{owner}/{first_child}"), run.visits(f"{owner}/Z")
+        assert cleaned <= 1
+        assert cleaned == 1 or not begun
