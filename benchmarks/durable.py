@@ -1,7 +1,7 @@
 """Transitions that are in a journal, beside DBOS's steps in the same run.
 
     pip install 'smachpy[bench]'
-    python benchmarks/durable.py [--steps 2000] [--rounds 5] [--folder DIR]
+    python benchmarks/durable.py [--steps 2000] [--rounds 5] [--folder DIR] [--json]
 
 A transition is one of `smachpy.run_durable`: a state ends, its userdata has changed and the next
 one is chosen, in one transaction. A step is one of a DBOS workflow that returns the same number.
@@ -151,6 +151,7 @@ def main():
     parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--folder", type=Path, help="where the files are (default: a new one)")
+    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=args.folder) as name:
         folder = Path(name)
@@ -163,7 +164,10 @@ def main():
         }
         dbos = None
         if importlib.util.find_spec("dbos") is None:
-            print("dbos is not installed: its row is left out. Try: pip install 'smachpy[bench]'")
+            print(
+                "dbos is not installed: its row is left out. Try: pip install 'smachpy[bench]'",
+                file=sys.stderr,
+            )
         else:
             dbos = Dbos(folder)
             candidates["DBOS step us"] = lambda: dbos.step_us(args.steps)
@@ -181,6 +185,9 @@ def main():
             recovery_ms(place) for place in [kept_machine(folder)] * args.rounds
         )
         figures["reading 100,000 entries ms"] = read_ms(folder)
+    if args.json:
+        print(json.dumps(figures))
+        return 0
     for row, value in figures.items():
         budget = BUDGETS.get(row)
         verdict = (

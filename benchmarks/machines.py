@@ -36,11 +36,12 @@ ROUNDS = 7
 STEPS = 2000
 # At most so many times the peer's time, at least so many a second, at most so many ms.
 BUDGETS = {
-    "flat / smach": 0.25,
-    "userdata / smach": 0.3,
-    "nested / smach": 0.4,
-    "flat buffered / flat": 2.0,
-    "flat recorded / flat": 2.0,
+    "flat / smach": 0.6,
+    "userdata / smach": 0.55,
+    "nested / smach": 0.85,
+    "flat buffered / flat": 4.0,
+    "flat recorded / flat": 6.0,
+    "flat listener / flat": 3.5,
     "concurrence runs/s": 2000.0,
     "preempt p50 ms": 0.5,
     "preempt p99 ms": 5.0,

@@ -1,10 +1,12 @@
 """Time to write and read a MoveBaseActionGoal: the generated codecs here beside those of rosbags.
 
-Run: python benchmarks/message_codecs.py
+python benchmarks/message_codecs.py [--json]
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import timeit
 from typing import TYPE_CHECKING
 
@@ -31,6 +33,9 @@ def micros(*functions: Callable[[], object]) -> list[float]:
 
 def main() -> None:
     """Print one line per direction."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
     store = get_typestore(Stores.ROS1_NOETIC)
     types = get_types_from_msg(
         "geometry_msgs/PoseStamped target_pose", "move_base_msgs/msg/MoveBaseGoal"
@@ -51,6 +56,10 @@ def main() -> None:
         lambda: MoveBaseActionGoal.from_bytes(data),
         lambda: store.deserialize_ros1(data, NAME),
     )
+    if args.json:
+        ratios = {"write / rosbags": ours_w / rosbags_w, "read / rosbags": ours_r / rosbags_r}
+        print(json.dumps({"write us": ours_w, "read us": ours_r, **ratios}))
+        return
     print(f"{len(data)} bytes")
     print(f"write  {ours_w:5.2f} us   rosbags {rosbags_w:5.2f} us   ratio {ours_w / rosbags_w:.2f}")
     print(f"read   {ours_r:5.2f} us   rosbags {rosbags_r:5.2f} us   ratio {ours_r / rosbags_r:.2f}")

@@ -1,11 +1,14 @@
 """What a firing of a plan costs beside a transition of a state machine with the same leaves.
 
 And how long a large plan takes to load and check.
-python benchmarks/petri_net_plans.py
+
+    python benchmarks/petri_net_plans.py [--json]
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import tempfile
 import time
 from pathlib import Path
@@ -53,16 +56,22 @@ def best_s(container: smachpy.Container) -> float:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
     transition = best_s(machine()) / ACTIONS
     firing = best_s(plan()) / (2 * ACTIONS)
-    print(f"a transition {transition * 1e6:.2f} us, a firing {firing * 1e6:.2f} us: "
-          f"{firing / transition:.1f} x")  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         file = pnp.write_pnml(sequence(PLACES // 2), Path(folder) / "long.pnml")
         begun = time.perf_counter()
         loaded = pnp.load(file)
         smachpy.check(loaded)
         seconds = time.perf_counter() - begun
+    if args.json:
+        print(json.dumps({"firing / transition": firing / transition, "load and check s": seconds}))
+        return
+    print(f"a transition {transition * 1e6:.2f} us, a firing {firing * 1e6:.2f} us: "
+          f"{firing / transition:.1f} x")  # fmt: skip
     print(f"{len(loaded.plan.net.places)} places loaded and checked in {seconds:.2f} s")
 
 

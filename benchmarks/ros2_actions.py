@@ -1,6 +1,6 @@
 """Goals over ROS 2's wire between two processes, beside raw zenoh in the same run.
 
-    python benchmarks/ros2_actions.py [--quick]
+    python benchmarks/ros2_actions.py [--quick] [--json]
 
 The floor is what a program of bare zenoh takes for the messages of such a goal: a query that is
 answered (send_goal), and from its callback a second one (get_result), with payloads and attachments
@@ -212,6 +212,7 @@ def main() -> int:
     """Print the figures; returns 1 when one does not hold."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--json", action="store_true")
     modes = {"--serve": serve, "--raw-serve": raw_serve, "--raw-client": raw_client}
     for mode in modes:
         parser.add_argument(mode, type=int, help=argparse.SUPPRESS)
@@ -223,6 +224,8 @@ def main() -> int:
             return 0
     figures = run(quick=options["quick"])
     print(json.dumps(figures, indent=2))
+    if options["json"]:
+        return 0
     if "rclpy_ratio" not in figures:
         print("rclpy was not measured; try: .ci/rclpy")
     missed = 0

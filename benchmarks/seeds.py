@@ -25,7 +25,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 GROUP = "smachpy.missions"
-MODULE = re.compile(r"^\s*(?:from|import) (missions[\w.]+)", re.MULTILINE)
+MODULE = re.compile(r"^\s*(?:from|import) (smachpy_missions[\w.]+)", re.MULTILINE)
 
 
 class Verdicts:

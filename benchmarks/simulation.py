@@ -27,11 +27,11 @@ from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport.memory import MemoryNetwork
-from smachpy.sim.config import load_config
-from smachpy.sim.exceptions import NavigationError
-from smachpy.sim.geometry import Pose2D
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.occupancy import OccupancyMap, load_map
+from smachpy.places.exceptions import NavigationError
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import OccupancyMap, load_map
+from smachpy.places.pose import Pose2D
+from smachpy.places.robot_file import load_config
 from smachpy.sim.pilot import Pilot
 from smachpy.sim.simulation import Simulation
 from smachpy.sim.world import Robot, World

@@ -1,6 +1,6 @@
 """What the live page costs: frames, time from an event to its paint, the server's processor time.
 
-    python benchmarks/viewer.py [--states N] [--depth N] [--rate HZ] [--seconds S]
+    python benchmarks/viewer.py [--states N] [--depth N] [--rate HZ] [--seconds S] [--json]
 
 A mission in another process, `smachpy view` in a third, a headless Chromium that draws in software.
 Hold at 50 transitions/s: 50 frames/s, p95 from event to paint 80 ms, 5 % of a core per client.
@@ -10,6 +10,7 @@ Figures mean something only on a machine that does nothing else.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import shutil
@@ -63,8 +64,14 @@ def measure(page, pid, seconds):
         f"{left / took:6.1f} transitions/s, {events / took:6.1f} events/s: "
         f"{frames / took:5.1f} frames/s, event to paint p50 {quantile(latencies, 0.5):5.1f} ms "
         f"p95 {quantile(latencies, 0.95):5.1f} ms, "
-        f"server {cpu:5.1%} of a core"
+        f"server {cpu:5.1%} of a core",
+        file=sys.stderr,
     )
+    return {
+        "frames/s": frames / took,
+        "event to paint p95 ms": quantile(latencies, 0.95),
+        "server: CPU s per s": cpu,
+    }
 
 
 def main():
@@ -73,6 +80,7 @@ def main():
     parser.add_argument("--depth", type=int, default=99)
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=6.0)
+    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     os.environ.setdefault("SMACHPY_DOMAIN", str(1 + os.getpid() % 9999))
     robot, _ = start(ROBOT, "--states", args.states, "--rate", args.rate)
@@ -96,13 +104,18 @@ def main():
             )
             page.wait_for_timeout(1000)
             shown = page.evaluate("() => document.querySelectorAll('.diagram *').length")
-            print(f"{args.states} states, {shown} elements; first picture after {first:.1f} s")
-            measure(page, view.pid, args.seconds)
+            print(
+                f"{args.states} states, {shown} elements; first picture after {first:.1f} s",
+                file=sys.stderr,
+            )
+            figures = {"first picture s": first, **measure(page, view.pid, args.seconds)}
             page.evaluate("() => smachpy.page.setFollow(true)")
             page.wait_for_timeout(1000)
-            print("following:")
+            print("following:", file=sys.stderr)
             measure(page, view.pid, args.seconds)
             browser.close()
+            if args.json:
+                print(json.dumps(figures))
     finally:
         for child in (robot, view):
             child.stdin.close()

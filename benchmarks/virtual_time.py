@@ -46,14 +46,14 @@ from actionlib_core.interfaces.actionlib.msg import TestAction
 from actionlib_core.node import Node, use_node
 from actionlib_core.transport._memory_entries import Inbox
 from actionlib_core.transport.memory import MemoryNetwork
-from missions.lesson_2_patrol import patrol
 from smachpy import CBState, Concurrence, SimpleActionState, StateMachine
-from smachpy.sim.config import load_config
-from smachpy.sim.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.sim.occupancy import load_map
+from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
+from smachpy.places.occupancy import load_map
+from smachpy.places.robot_file import load_config
 from smachpy.sim.server import RobotServer
 from smachpy.sim.world import Robot, World
 from smachpy.testing import mission_kit
+from smachpy_missions.patrol import patrol
 
 KINDS = ("clock", "network", "messages", "mission")
 PLACES = {  # in the path of a file -> kind
@@ -64,7 +64,7 @@ PLACES = {  # in the path of a file -> kind
     "smachpy/": "mission",
 }
 COUNTED = [
-    (VirtualClock, "_wait"),
+    (VirtualClock, "wait_for"),
     (VirtualClock, "call_later"),
     (VirtualClock, "spawn"),
     (Inbox, "_deliver"),
