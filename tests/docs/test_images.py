@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
 import smachpy
-from missions.lesson_6_server import go_and_look
 from smachpy.command.targets import load_target
+from smachpy_missions.lesson_11_server import look
+from tests.places import DOCS
 
-IMAGES = Path(__file__).parents[2] / "docs" / "images"
+IMAGES = DOCS / "images"
 MISSIONS = [
+    "asking",
+    "battery_check",
     "delivery",
     "door",
     "explore",
     "guided_recovery",
+    "hello",
     "inspect",
+    "mail",
+    "move_cup",
     "patrol",
     "patrol_run",
     "shuttle",
+    "take_cup",
     "there_and_back",
+    "watched_drive",
     "waypoints",
 ]
 
 
 def machine_of(picture):
     if picture == "look_at":  # the machine that is served; the mission only sends a goal to it
-        return go_and_look()
+        return look()
     return load_target(picture.removesuffix("_run")).build()
 
 

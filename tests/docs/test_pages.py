@@ -18,6 +18,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -192,7 +193,9 @@ def anchors_of(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "page", [*PAGES, ROOT / "missions" / "README.md"], ids=lambda page: str(page.relative_to(ROOT))
+    "page",
+    [*PAGES, ROOT / "missions" / "README.md", ROOT / "CHANGELOG.md"],
+    ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_every_link_leads_to_a_file_and_a_heading(page):
     broken = []
@@ -206,7 +209,8 @@ def test_every_link_leads_to_a_file_and_a_heading(page):
 
 def test_the_index_leads_to_every_page():
     index = ROOT / "docs" / "README.md"
-    linked = {(index.parent / link).resolve() for link in links_of(index)}
+    lists = [index, ROOT / "docs" / "decisions.md"]
+    linked = {(page.parent / link).resolve() for page in lists for link in links_of(page)}
     assert set((ROOT / "docs").rglob("*.md")) - {index} <= linked
 
 
@@ -219,9 +223,19 @@ def test_the_files_that_the_architecture_names_are_there():
 
 
 def test_the_configuration_page_lists_every_environment_variable():
-    packages = ("actionlib_core", "smachpy", "viz")
+    packages = ("actionlib_core", "smachpy", "viz", "missions")
     files = [file for name in packages for file in (ROOT / name).rglob("*.py")]
     used = {word for file in files for word in re.findall(r"SMACHPY_[A-Z0-9_]+", file.read_text())}
     page = (ROOT / "docs" / "configuration.md").read_text("utf-8")
     listed = page[page.index("## Environment variables") :]
     assert used == set(re.findall(r"`(SMACHPY_[A-Z0-9_]+)`", listed))
+
+
+def test_the_changelog_lists_each_change_once_and_each_subject_once_in_its_section():
+    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    for release in re.split(r"(?m)^## ", text)[1:]:
+        entries = re.findall(r"(?ms)^- .*?(?=\n- |\n\n|\n#|\n[A-Z]|\Z)", release)
+        assert [one for one, times in Counter(entries).items() if times > 1] == []
+        for section in re.split(r"(?m)^### ", release)[1:]:
+            subjects = re.findall(r"(?m)^[A-Z][\w, ]+$", section.partition("\n")[2])
+            assert [one for one, times in Counter(subjects).items() if times > 1] == []
