@@ -13,7 +13,7 @@ from tests.places import DOCS
 FILE = re.compile(r"<!-- file: (\S+) -->\n+```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize("page", ["deployments.md", "security.md"])
+@pytest.mark.parametrize("page", ["deployments.md", "howto/secure.md", "howto/certificates.md"])
 def test_configurations_can_be_read(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     files = dict(FILE.findall((DOCS / page).read_text()))
@@ -25,4 +25,4 @@ def test_configurations_can_be_read(page, tmp_path, monkeypatch):
         for needed in re.findall(r"(?:ca|certificate|key): (\S+)", text):
             Path(needed).touch()
         assert load_config(name).mode in {"router", "client"}
-    assert len(found) > 3
+    assert len(found) >= 3

@@ -28,7 +28,8 @@ def fleet(tmp_path):
     """`fleet(config, *words)` runs `actionlib` beside the router of the page; returns code and output."""
     port = free_port()
 
-    (tmp_path / "make_certificates.py").write_text(file_of("security.md", "make_certificates.py"))
+    program = file_of("howto/certificates.md", "make_certificates.py")
+    (tmp_path / "make_certificates.py").write_text(program)
     router = file_of("deployments.md", "fleet_router.yaml").replace(
         "tls/0.0.0.0:7447", f"tls/127.0.0.1:{port}"
     )

@@ -1,4 +1,4 @@
-"""Logins and access rules, enforced by a router; certificates at work are in docs/security.md."""
+"""Logins and access rules, enforced by a router; certificates at work are in docs/howto/certificates.md."""
 
 from __future__ import annotations
 
