@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 MD5_DIGITS = 32
-ERRORS_PAGE: Final = "https://smachpy.github.io/smachpy/reference/errors/"
+ERRORS_PAGE: Final = "https://smachpy.github.io/smachpy/latest/reference/errors/"
 _PACKAGES: Final = ("actionlib_core", "smachpy", "smachpy_viz")
 
 

@@ -44,7 +44,7 @@ def {name}() -> smachpy.StateMachine:
 '''
 
 _FILE = """\
-# yaml-language-server: $schema=https://smachpy.github.io/smachpy/mission.schema.json
+# yaml-language-server: $schema=https://smachpy.github.io/smachpy/latest/mission.schema.json
 name: {label}
 help: Drive to a place, wait there, come back.
 parameters:
