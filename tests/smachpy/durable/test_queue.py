@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import signal
@@ -350,7 +351,8 @@ def test_a_full_disk_while_pruning_loses_nothing_that_is_kept(tmp_path):
         told.add(done.stdout.strip())
         store = open_store(place)
         assert store.read("kept")[1] == [b"kept"]
-        assert sqlite3.connect(place).execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        with contextlib.closing(sqlite3.connect(place)) as raw:
+            assert raw.execute("PRAGMA integrity_check").fetchone() == ("ok",)
         store.close()
     assert told <= {"", "failed", "full"}
     assert told != {""}

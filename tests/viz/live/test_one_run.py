@@ -83,9 +83,11 @@ def test_a_mission_is_resumed_by_a_process_of_its_own(interrupted, monkeypatch, 
             started.append(self)
 
     monkeypatch.setattr(journals_module.subprocess, "Popen", Popen)
-    runs = Runs(Machines(), [Path("runs")], Journals([interrupted]))
+    journals = Journals([interrupted])
+    runs = Runs(Machines(), [Path("runs")], journals)
     with pytest.raises(SmachError, match="--allow"):
         runs.command({"journal": "j.db", "id": "m", "command": "resume"})
+    journals.close()
     journals = Journals([interrupted], logs=tmp_path / "logs", allow=[str(tmp_path)])
     runs = Runs(Machines(), [Path("runs")], journals)
     Path("go").touch()
