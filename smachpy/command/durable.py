@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.command_line.numbers import seconds
 from actionlib_core.names import clean_namespace
 from actionlib_core.process.output import printable, tell
-from smachpy.command.targets import PLANS
+from smachpy.command.targets import names_file
 from smachpy.durable.store import store_name
 from smachpy.exceptions import MissionError
 from smachpy.machines.mission_info import mission_info
@@ -149,8 +149,7 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
 def whole_target(text: str) -> str:
     """Return a mission's target; for a file with its absolute path."""
     place, colon, attribute = text.partition(":")
-    is_file = place.endswith((".py", *PLANS)) or "/" in place
-    return f"{Path(place).resolve()}{colon}{attribute}" if is_file else text
+    return f"{Path(place).resolve()}{colon}{attribute}" if names_file(place) else text
 
 
 def words_of(args: argparse.Namespace) -> tuple[str, ...]:

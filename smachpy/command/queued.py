@@ -18,7 +18,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.command.arguments import Text
-from smachpy.command.targets import DEFAULT_NAMES, GROUP, PLANS, TargetError, mission_names
+from smachpy.command.targets import (
+    DATA,
+    DEFAULT_NAMES,
+    GROUP,
+    TargetError,
+    mission_names,
+    names_file,
+)
 from smachpy.machines.container import Container
 from smachpy.machines.mission_info import is_mission
 
@@ -68,7 +75,7 @@ class Allowed:
         The text has the way out; "" if it may be run.
         """
         place, _, attribute = target.partition(":")
-        if place.endswith((".py", *PLANS)) or "/" in place:
+        if names_file(place):
             return self._problem_of_file(place, by)
         if target in self._installed or (not attribute and target in mission_names()):
             return ""
@@ -99,7 +106,8 @@ def check_is_mission(target: Target, by: str = "row") -> None:
     """Refuse what is no mission before it is called, if a row or something else names it.
 
     A mission is a machine, a function with `@smachpy.mission`, or a function of that file which is
-    called `mission`, `machine` or `sm`, or whose annotation says that it returns a machine.
+    called `mission`, `machine` or `sm`, or whose annotation says that it returns a machine; or a
+    plan or a mission file.
 
     Raises:
         TargetError: it is something else.
@@ -109,7 +117,7 @@ def check_is_mission(target: Target, by: str = "row") -> None:
     if (
         isinstance(thing, Container)
         or is_mission(thing)
-        or source == "a Petri net plan"
+        or source.endswith(DATA)  # `load_target` takes each such name for a file
         or source in {point.value for point in entry_points(group=GROUP)}
     ):
         return

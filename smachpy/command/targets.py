@@ -32,8 +32,15 @@ GROUP = "smachpy.missions"
 DEFAULT_NAMES = ("mission", "machine", "sm")
 PLANS = (".pnml", ".plan", ".pddlout")
 MISSION_FILES = (".yaml", ".yml")
+DATA = (*PLANS, *MISSION_FILES)
+"""Ends of names of files that are data: no code of the file itself is executed."""
 # A script that calls `sys.exit()` would end the command, with 0 as if the mission had succeeded.
 _FAILURES = (Exception, SystemExit)
+
+
+def names_file(place: str) -> bool:
+    """Return whether a target, without its `:attribute`, names a file rather than a module."""
+    return place.endswith((".py", *DATA)) or "/" in place
 
 
 class TargetError(SmachError):

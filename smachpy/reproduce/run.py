@@ -264,13 +264,15 @@ def maker(
             "needs none.",
         )
 
+    packages = [str(one) for one in allow]  # of which a mission file may name code
+
     def make() -> Container:
         if mission and whole_target(mission) != recorded:
-            return load_target(mission).build()
+            return load_target(mission, allow=packages).build()
         folder = str(then.get("folder") or "")
         if folder and folder not in sys.path:
             sys.path.append(folder)  # as for a module that is named from there
-        target = load_target(mission or recorded)
+        target = load_target(mission or recorded, allow=packages)
         if not mission:
             check_is_mission(target, "recording")
         return build(target, {key: Text(value) for key, value in inputs.items()}, words)

@@ -16,7 +16,7 @@ from actionlib_core.clock import RealClock
 from actionlib_core.interfaces._sources import BUNDLED
 from smachpy.command.arguments import Text, parameters_of, read_words
 from smachpy.command.durable import whole_target
-from smachpy.command.targets import load_target
+from smachpy.command.targets import MISSION_FILES, PLANS, load_target
 from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
@@ -120,7 +120,7 @@ def write_test(
     short = _shortened(chosen, trial)
     run = trial.run_of(short)
     assert run is not None
-    text = _text(recording, short, run, trial.counts, mission=mission, expect=expect)
+    text = _text(recording, short, run, trial.counts, mission=mission, allow=allow, expect=expect)
     return Written(text, trial.runs, tuple(script.gaps))
 
 
@@ -296,10 +296,11 @@ def _text(
     counts: dict[str, tuple[int, int]],
     *,
     mission: str,
+    allow: Iterable[str | Path],
     expect: str,
 ) -> str:
     ends = script.used()
-    call, imports = _call(recording, mission)
+    call, imports = _call(recording, mission, allow)
     made = datetime.fromtimestamp(recording.made_ns / 1e9, UTC)
     name = re.sub(r"[^a-z0-9]+", "_", run.record.label.lower()).strip("_")
     outcome = expect or run.outcome or "ends"
@@ -404,13 +405,22 @@ def _import_lines(ends: Iterable[End], imports: list[str]) -> list[str]:
     return [*plain, *sorted([*wanted, *own])]
 
 
-def _call(recording: Recording, mission: str) -> tuple[str, list[str]]:
+def _call(recording: Recording, mission: str, allow: Iterable[str | Path]) -> tuple[str, list[str]]:
     """Return the expression that makes the machine, and the imports for it."""
     assert recording.origin is not None
     then = recording.origin["mission"]
     text = mission or str(then["target"])
-    target = load_target(text)
+    target = load_target(text, imports=False)
     arguments = _arguments(then, target) if not mission or mission == then.get("target") else ""
+    if text.endswith(PLANS):
+        return f"load_plan({source(whole_target(text))})", [
+            "from smachpy.pnp.files import load_plan"
+        ]
+    if text.endswith(MISSION_FILES):
+        packages = [one for one in map(str, allow) if one.replace(".", "_").isidentifier()]
+        allowed = [f"allow={source(packages)}"] if packages else []
+        words = [source(whole_target(text)), *allowed, *([arguments] if arguments else [])]
+        return f"load({', '.join(words)})", ["from smachpy import load"]
     thing = target.thing
     is_machine = isinstance(thing, Container)
     module = getattr(thing, "__module__", "")

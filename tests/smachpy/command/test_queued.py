@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 
 import smachpy
+import smachpy_missions.pnp
+from smachpy.command import main
+from smachpy.command.durable import whole_target
 from smachpy.command.queued import Allowed, arguments_of, check_is_mission
 from smachpy.command.targets import TargetError, load_target
 from smachpy.durable.mission import new_mission
@@ -107,6 +110,7 @@ def test_rows_name_installed_missions_and_what_is_allowed(folder):
         f"{folder}/errand.py",
         f"{folder}/errand.py:other",
         f"{folder}/sub/plan.pnml",
+        f"{folder}/rounds.yaml",
         "my_robot.missions",
         "my_robot.missions:deliver",
         "my_robot.missions.night:deliver",
@@ -122,6 +126,8 @@ def test_rows_name_installed_missions_and_what_is_allowed(folder):
         "my_robot:deliver",
         "errand.py",
         "sub/plan.pnml",
+        "rounds.yaml",
+        f"{folder}-other/rounds.yaml",
         f"{folder}-other/errand.py",
         f"{folder}/../errand.py",
         f"{folder}/away/x.py",
@@ -141,6 +147,31 @@ def test_rows_name_installed_missions_and_what_is_allowed(folder):
 @pytest.mark.parametrize("name", ["", ":deliver", ":mission", ":other", ":ready"])
 def test_a_mission_is_taken(name):
     check_is_mission(load_target(f"errand.py{name}"))
+
+
+def test_files_that_are_data_are_missions(folder):
+    (folder / "rounds.yaml").write_text("outcomes: [done]\nstates: {A: {state: wait}}\n")
+    (folder / "look.pnml").write_bytes(
+        Path(smachpy_missions.pnp.__file__).with_name("look.pnml").read_bytes()
+    )
+    for name in ("rounds.yaml", "look.pnml", str(folder / "rounds.yaml")):
+        check_is_mission(load_target(name))
+        assert Path(whole_target(name)).is_absolute()
+
+
+def test_a_mission_file_is_resumed_from_another_folder(folder, monkeypatch, capsys):
+    (folder / "rounds.yaml").write_text(
+        "name: M\noutcomes: [done]\nstates: {A: {state: set, with: {x: 1}, on: {done: done}}}\n"
+    )
+    words = ["--db", f"{folder}/q.db", "--mission", "m1"]
+    assert main(["submit", "rounds.yaml", *words]) == 0
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    resume = ["missions", "resume", "m1", "--durable", f"{folder}/q.db", "--plain"]
+    assert main(resume) == 2
+    assert f"Try --allow {folder}/rounds.yaml" in capsys.readouterr().err
+    assert main([*resume, "--allow", str(folder)]) == 0
+    assert "M: done" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", [":cleanup", ":sm", ":_machine", ":subprocess.getoutput"])

@@ -412,6 +412,22 @@ def test_a_test_that_expects_better_fails_until_the_mission_is_mended(night, tmp
     assert pytest_in(fresh)[0] == 0
 
 
+def test_a_mission_file_is_reproduced_and_its_test_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("rounds.yaml").write_text(
+        "name: ROUNDS\noutcomes: [done, preempted]\nparameters: {seconds: {type: number}}\n"
+        "states: {A: {state: wait, with: {seconds: '${seconds}'}}}\n"
+    )
+    words = ["rounds.yaml", "--input", "seconds=2", "--time", "virtual", "--plain"]
+    assert main(["run", *words, "--record", "run.jsonl"]) == 0
+    assert main(["runs", "reproduce", "run.jsonl"]) == 2
+    assert f"Try --allow {tmp_path}/rounds.yaml" in capsys.readouterr().out
+    allowed = ["--allow", str(tmp_path)]
+    assert main(["runs", "reproduce", "run.jsonl", *allowed]) == 0
+    assert main(["runs", "reproduce", "run.jsonl", *allowed, "-o", "test_it.py"]) == 0
+    assert f'load("{tmp_path}/rounds.yaml", seconds=2.0)' in Path("test_it.py").read_text()
+
+
 def test_an_existing_file_is_not_overwritten(night, tmp_path, capsys):
     _, path = night
     (tmp_path / "test_incident.py").write_text("mine")
