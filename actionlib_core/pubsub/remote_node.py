@@ -52,8 +52,13 @@ class RemoteNode:
 
     Args:
         name: The node's name, `controller_server` for example.
-        timeout: Longest time of a call [s], including the wait for the node to appear.
+        timeout: Longest time of a call [s], including the wait for the node to appear; None: no
+            limit.
         node: Our node; None: the current node.
+
+    Attributes:
+        name: The full name, without a slash in front.
+        timeout: See above; it may be changed between calls.
 
     Raises:
         InvalidDurationError: `timeout` is not a duration, or negative.
@@ -67,13 +72,37 @@ class RemoteNode:
     """
 
     def __init__(
-        self, name: str, *, timeout: float | Duration = TIMEOUT_S, node: Node | None = None
+        self, name: str, *, timeout: float | Duration | None = TIMEOUT_S, node: Node | None = None
     ) -> None:
         self._node = node if node is not None else get_node()
         self.name = self._node.resolve(name, "node name")
-        self._timeout = check_limit(f"node {name!r}", "timeout", timeout)
+        self.timeout = check_limit(f"node {name!r}", "timeout", timeout)
+        self._closed = False
+        self._calls: set[ServiceProxy[..., Any, Any]] = set()  # those that run; `set` is atomic
         # The services' types are those of the robot's distribution.
         self._distro = choose_network(self._node.config.ros2, self.name).distro
+
+    def close(self) -> None:
+        """Make running and later calls fail with a `NodeError`; a second call does nothing."""
+        self._closed = True
+        for proxy in list(self._calls):
+            proxy.close()
+
+    def wait(self, timeout: float | Duration | None = None, *, managed: bool = False) -> None:
+        """Wait until the node is there.
+
+        Args:
+            timeout: Longest wait [s]; None: no limit.
+            managed: Wait for its life cycle rather than for its parameters.
+
+        Raises:
+            WaitTimeoutError: it was not there in time.
+        """
+        what = "get_state", "lifecycle_msgs/GetState"
+        self._use(
+            *(what if managed else ("get_parameters", "rcl_interfaces/GetParameters")),
+            lambda proxy: proxy.wait_for_service(timeout),
+        )
 
     def get_parameters(self, *names: str) -> dict[str, Any]:
         """Return the values of parameters by name.
@@ -162,11 +191,21 @@ class RemoteNode:
             raise RemoteNodeError(self.name, {transition: why})
 
     def _call(self, service: str, type_name: str, *args: Any, **fields: Any) -> Any:
+        return self._use(service, type_name, lambda proxy: proxy.call(*args, **fields))
+
+    def _use(self, service: str, type_name: str, use: Callable[[Any], Any]) -> Any:
+        """Use a proxy of one of its services, which `close` closes."""
         service_class: Any = ros2.get_service(type_name, self._distro)
-        proxy = ServiceProxy(
-            f"/{self.name}/{service}", service_class, timeout=self._timeout, node=self._node
+        proxy: Any = ServiceProxy(
+            f"/{self.name}/{service}", service_class, timeout=self.timeout, node=self._node
         )
-        return proxy.call(*args, **fields)
+        self._calls.add(proxy)
+        try:
+            if self._closed:  # also by a `close` that has not seen this proxy
+                proxy.close()
+            return use(proxy)
+        finally:
+            self._calls.discard(proxy)
 
 
 def value_of(message: Any) -> Any:

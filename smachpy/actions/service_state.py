@@ -14,19 +14,17 @@ from actionlib_core.exceptions import (
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import CALL_TIMEOUT_S, ServiceProxy
 from smachpy.actions.messages import Incoming, Outgoing, UserCallback
-from smachpy.actions.wakeup import Wakeup, answer_preempt
+from smachpy.actions.wakeup import PreemptedError, answer_preempt, call_blocking
 from smachpy.base import log
 from smachpy.base.problems import Problems
 from smachpy.base.slips import accepting
-from smachpy.engine.frame import current_scope
+from smachpy.engine.frame import clock_of_run, current_scope
 from smachpy.machines.state import State
-from smachpy.machines.util import is_shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from typing import Unpack
 
-    from actionlib_core.clock import Task
     from actionlib_core.node import Node
     from actionlib_core.time import Duration
     from smachpy.actions.interface import UntimedOptions
@@ -161,40 +159,33 @@ class ServiceState(State):
         Blocks: until the answer, `timeout` or a preempt. After a preempt the server may continue
             with the call.
         """
-        with Wakeup(self) as wake:
-            if answer_preempt(self):
-                return "preempted"
-            request = self.__request.build(ud)  # may block in the user's callback
-            if answer_preempt(self):
-                return "preempted"
-            call = _Call(self.__get_proxy(), request, self.__timeout_s, wake)
-            try:
-                while not (call.over or self.preempt_requested()):
-                    wake.wait_until()
-                    wake.clear()
-            except BaseException:
-                # Such as KeyboardInterrupt: do not leave the call's thread behind.
-                self.__drop_proxy()
-                raise
-        if not call.over:
-            self.__drop_proxy()  # ends the call with an error, so the join is short
-            call.task.join()
-            if answer_preempt(self):
-                return "preempted"
-        return self.__finish(ud, call)
-
-    def __finish(self, ud: Any, call: _Call) -> str:
-        if call.error is not None and (answer_preempt(self) or is_shutdown()):
+        if answer_preempt(self):
             return "preempted"
-        if isinstance(call.error, (ServiceException, WaitTimeoutError)):
+        request = self.__request.build(ud)  # may block in the user's callback
+        if answer_preempt(self):
+            return "preempted"
+        proxy, clock = self.__get_proxy(), clock_of_run()
+        start = clock.now()
+
+        def call() -> Any:
+            proxy.wait_for_service(self.__timeout_s)
+            if self.__timeout_s is not None:  # one timeout for the wait and the call together
+                proxy.timeout = max(0.0, self.__timeout_s - (clock.now() - start))
+            return proxy.call(request)
+
+        try:
+            response = call_blocking(
+                self, call, self.__drop_proxy, f"call of {proxy.resolved_name}"
+            )
+        except PreemptedError:
+            return "preempted"
+        except (ServiceException, WaitTimeoutError) as error:
             scope = current_scope()
             where = f"ServiceState {self.__service_name!r}" if scope is None else scope.path
-            log.logwarn(f"{where}: service '{self.__service_name}': {call.error}")
-            return self.__timeout_outcome if isinstance(call.error, _TIMED_OUT) else "aborted"
-        if call.error is not None:
-            raise call.error
-        self.__response.store(ud, call.response)
-        chosen = self.__response.callback(ud, call.response)
+            log.logwarn(f"{where}: service '{self.__service_name}': {error}")
+            return self.__timeout_outcome if isinstance(error, _TIMED_OUT) else "aborted"
+        self.__response.store(ud, response)
+        chosen = self.__response.callback(ud, response)
         return "succeeded" if chosen is None else chosen
 
     def __get_proxy(self) -> ServiceProxy:
@@ -229,39 +220,3 @@ def _as_request(service_spec: Any, given: Any) -> Any:
     if given is None or isinstance(given, kind) or not kind.__slots__ or not accepting():
         return given
     return kind(given)
-
-
-class _Call:
-    """A call in its own thread, so that a preempt can end the state before the answer.
-
-    Attributes:
-        over: It has returned or raised.
-        response: Its result.
-        error: The exception that it raised.
-    """
-
-    def __init__(
-        self, proxy: ServiceProxy, request: Any, timeout_s: float | None, wake: Wakeup
-    ) -> None:
-        self.over = False
-        self.response: Any = None
-        self.error: BaseException | None = None
-        self._proxy = proxy
-        self._request = request
-        self._timeout_s = timeout_s
-        self._wake = wake
-        self.task: Task = wake.clock.spawn(self._run, name=f"call of {proxy.resolved_name}")
-
-    def _run(self) -> None:
-        proxy, clock = self._proxy, self._wake.clock
-        start = clock.now()
-        try:
-            proxy.wait_for_service(self._timeout_s)
-            if self._timeout_s is not None:  # one timeout for the wait and the call together
-                proxy.timeout = max(0.0, self._timeout_s - (clock.now() - start))
-            self.response = proxy.call(self._request)
-        except BaseException as error:  # noqa: BLE001  raised in the state's thread
-            self.error = error
-        finally:
-            self.over = True
-            self._wake.set()

@@ -1,16 +1,24 @@
-"""The event on which a state waits while it runs: set by a preempt and by anything else."""
+"""Waits that a preempt ends: an event of the running state, and blocking calls in a thread."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from smachpy.engine.frame import clock_of_run
 from smachpy.engine.preempt import on_preempt
+from smachpy.engine.shutdown_check import is_shutdown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import Self
 
     from smachpy.machines.state import State
+
+R = TypeVar("R")
+
+
+class PreemptedError(Exception):
+    """A preempt has ended a call of a state, and was serviced."""
 
 
 def answer_preempt(state: State) -> bool:
@@ -59,3 +67,53 @@ class Wakeup:
         """
         due = [deadline for deadline in deadlines if deadline is not None]
         self._event.wait(max(0.0, min(due) - self.clock.now()) if due else None)
+
+
+def call_blocking(
+    state: State, function: Callable[[], R], stop: Callable[[], object], name: str
+) -> R:
+    """Call a function that blocks, in a thread of its own, so that a preempt can end the call.
+
+    Args:
+        state: The running state.
+        function: The function.
+        stop: Makes it raise soon; called at a preempt, in the state's thread.
+        name: Name of the thread.
+
+    Raises:
+        PreemptedError: the state was asked to stop before the function had returned.
+        BaseException: what the function raised, unless a preempt or the shutdown was the reason.
+
+    Blocks: until the function has returned or raised.
+    """
+    results: list[R] = []
+    errors: list[BaseException] = []
+
+    with Wakeup(state) as wake:
+
+        def run() -> None:
+            try:
+                results.append(function())
+            except BaseException as error:  # noqa: BLE001  raised in the state's thread
+                errors.append(error)
+            finally:
+                wake.set()
+
+        task = wake.clock.spawn(run, name=name)
+        try:
+            while not (results or errors or state.preempt_requested()):
+                wake.wait_until()
+                wake.clear()
+        except BaseException:
+            stop()  # such as KeyboardInterrupt: do not leave the thread behind
+            raise
+        if not (results or errors):
+            stop()
+            task.join()
+            if answer_preempt(state):
+                raise PreemptedError
+    if errors:
+        if answer_preempt(state) or is_shutdown():
+            raise PreemptedError
+        raise errors[0]
+    return results[0]

@@ -29,6 +29,7 @@ from smachpy.states.questions import (
     find_questions,
     give_answer,
 )
+from smachpy.states.ros2_nodes import RestoreParameters, SetLifecycle, SetParameters
 from smachpy.states.serving import Serve, serve_during, serving_machine
 from smachpy.states.waiting import AwaitMessage, Wait
 from smachpy.states.waypoints import PlaceFile, Route, Waypoint, load_route
@@ -47,8 +48,11 @@ __all__ = [
     "Pose2D",
     "Progress",
     "Question",
+    "RestoreParameters",
     "Route",
     "Serve",
+    "SetLifecycle",
+    "SetParameters",
     "Wait",
     "Waypoint",
     "drive_back",

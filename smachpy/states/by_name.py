@@ -274,6 +274,50 @@ def nav2_active(manager: str = "lifecycle_manager_navigation", timeout: float = 
     return active(manager=manager, timeout=timeout)
 
 
+def set_parameters(
+    node: str,
+    values: Mapping[str, Any],
+    before: str = "parameters_before",
+    timeout: float | None = 10.0,
+) -> State:
+    """Set parameters of a ROS 2 node. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        node: Name of the node.
+        values: Name of the parameter: value.
+        before: The userdata key that gets what they were; see `restore_parameters`.
+        timeout: Longest time [s]; none: no limit.
+    """
+    from smachpy.states.ros2_nodes import SetParameters
+
+    return SetParameters(node, values, before=before, timeout=timeout)
+
+
+def restore_parameters(before: str = "parameters_before", timeout: float | None = 10.0) -> State:
+    """Set back what `set_parameters` has set. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        before: The userdata key that `set_parameters` has written.
+        timeout: Longest time for each node [s]; none: no limit.
+    """
+    from smachpy.states.ros2_nodes import RestoreParameters
+
+    return RestoreParameters(before=before, timeout=timeout)
+
+
+def set_lifecycle(node: str, state: str = "active", timeout: float | None = 60.0) -> State:
+    """Bring a managed ROS 2 node to a state. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        node: Name of the node.
+        state: unconfigured, inactive, active or finalized.
+        timeout: Longest time [s]; none: no limit.
+    """
+    from smachpy.states.ros2_nodes import SetLifecycle
+
+    return SetLifecycle(node, state, timeout=timeout)
+
+
 def _class_of(message: Any) -> Any:
     return message.__class__
 
@@ -287,8 +331,11 @@ BY_NAME: Final[dict[str, Callable[..., State]]] = {
     "locate": locate,
     "monitor": monitor,
     "nav2_active": nav2_active,
+    "restore_parameters": restore_parameters,
     "service": service,
     "set": set_keys,
+    "set_lifecycle": set_lifecycle,
+    "set_parameters": set_parameters,
     "turn": turn,
     "wait": wait,
 }

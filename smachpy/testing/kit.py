@@ -23,6 +23,7 @@ from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.process import MissionNode, Process
 from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, RunRecorder, Stuck, Trigger
+from smachpy.testing.ros2_node import ScriptedNode
 from smachpy.testing.runs import Run
 from smachpy.testing.servers import (
     ScriptedActionServer,
@@ -442,6 +443,12 @@ class MissionKit:
     def topic(self, name: str, message_class: Any) -> ScriptedTopic:
         """Publish on a topic, and record its messages."""
         return ScriptedTopic(self, name, message_class)
+
+    def ros2_node(
+        self, name: str, parameters: Mapping[str, Any] | None = None, *, state: str = ""
+    ) -> ScriptedNode:
+        """Be a ROS 2 node with parameters and, with a `state`, a life cycle."""
+        return ScriptedNode(self, name, parameters, state)
 
     def play(
         self,

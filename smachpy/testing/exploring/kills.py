@@ -12,6 +12,7 @@ from actionlib_core.clock._virtual_parts import Stopped
 from smachpy.durable.mission import new_mission
 from smachpy.durable.position import Position
 from smachpy.durable.store import FencedError, Lease
+from smachpy.testing.ros2_node import ScriptedNode
 from smachpy.testing.servers import ScriptedActionServer
 
 if TYPE_CHECKING:
@@ -110,6 +111,9 @@ class MemoryJournal:
             "ends of states": {f"{path}: {outcome}": n for (path, outcome), n in left.items()},
             "calls of once": dict(once),
             "goals": {server.name: len(server.goals) for server in servers},
+            "parameters": {
+                end.name: end.parameters for end in ends if isinstance(end, ScriptedNode)
+            },
         }
 
     # -- the store -----------------------------------------------------------------------------

@@ -22,8 +22,11 @@ ARGUMENTS: dict[str, list[dict[str, Any]]] = {
     "locate": [{}],
     "monitor": [{"topic": "t", "type": "std_msgs/Bool", "valid_while": "data"}],
     "nav2_active": [{"timeout": 5.0}],
+    "restore_parameters": [{}, {"before": "speeds", "timeout": None}],
     "service": [{"name": "s", "type": "std_srvs/SetBool", "request": {"data": True}}],
     "set": [{"a": 1, "b": [2]}],
+    "set_lifecycle": [{"node": "map_server"}, {"node": "map_server", "state": "inactive"}],
+    "set_parameters": [{"node": "controller_server", "values": {"max_vel_x": 0.2}}],
     "turn": [{"degrees": 90}],
     "wait": [{"seconds": 1}, {}],
 }

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from actionlib_core.config import Config, Ros2
 from actionlib_core.exceptions import (
     InvalidDurationError,
+    NodeError,
     RemoteNodeError,
     ServiceUnavailableError,
+    WaitTimeoutError,
 )
 from actionlib_core.interfaces import ros2
 from actionlib_core.node import Node
@@ -190,3 +192,24 @@ def test_values_that_no_parameter_has(value: Any) -> None:
 def test_a_value_that_is_not_set_is_none() -> None:
     assert value_of(make_value()) is None
     assert value_of(make_value(type=77)) is None
+
+
+def test_it_is_waited_for(robot: Robot) -> None:
+    nobody = RemoteNode("nobody", timeout=None, node=robot.nodes[1])
+    with pytest.raises(WaitTimeoutError, match="/nobody/get_parameters: no server"):
+        nobody.wait(3.0)
+    with pytest.raises(WaitTimeoutError, match="/nobody/get_state: no server"):
+        nobody.wait(0, managed=True)
+    RemoteNode("controller", node=robot.nodes[1]).wait(None)
+
+
+def test_close_ends_running_and_later_calls(robot: Robot, remote: RemoteNode) -> None:
+    nobody = RemoteNode("nobody", timeout=None, node=robot.nodes[1])
+    robot.clock.call_later(2.0, nobody.close)
+    with pytest.raises(NodeError):
+        nobody.wait()
+    assert robot.clock.now() == 2.0
+    remote.close()
+    remote.close()
+    with pytest.raises(NodeError):
+        remote.get_parameters("speed")
