@@ -81,7 +81,7 @@ def add_options(parser: Any, *, loads: bool) -> None:
             "--import",
             action="store_true",
             dest="imports",
-            help="import the modules that the actions of a plan name; that runs their code",
+            help="import the modules that a plan or mission file names; that runs their code",
         )
 
 

@@ -22,6 +22,7 @@ from smachpy.files.reference import (
     Origin,
     Reference,
     check_allowed,
+    check_named,
     finish,
     make_named,
     make_registered,
@@ -235,9 +236,9 @@ class _Reader:
         section = parameters.section(name)
         kind = section.text("type", "any", tuple(TYPES))
         given = section.value("default", REQUIRED)
-        unit, text = section.value("unit", ""), section.value("help", "")
+        unit, text = (section.text(key, "", may_be_blank=True) for key in ("unit", "help"))
         section.close()
-        found = Parameter(name, kind, given, str(unit), str(text))
+        found = Parameter(name, kind, given, unit, text)
         if not name.isidentifier():
             parameters.report(name, f"got {name!r}; expected a name of letters, digits and '_'.")
         if given is not REQUIRED and not found.fits(given):
@@ -247,7 +248,7 @@ class _Reader:
     def machine(self, arguments: Mapping[str, Any]) -> StateMachine:
         """Build the machine."""
         top = self.file.top
-        top.allow("smachpy", "help")
+        top.text("help", "", may_be_blank=True)
         if top.value("smachpy", 1) != 1:
             top.problem("smachpy", "1, the version of the form")
         self._take(arguments)
@@ -258,7 +259,14 @@ class _Reader:
         return machine  # type: ignore[no-any-return]
 
     def _name(self, top: Section) -> str:
-        return top.text("name", self._path.name.partition(".")[0].upper())
+        name = top.text("name", self._path.name.partition(".")[0].upper())
+        self._check_printable(top, "name", name)
+        return name
+
+    def _check_printable(self, section: Section, key: str, name: str) -> None:
+        """Refuse control characters: a name with a line end forges the lines of reports."""
+        if not name.isprintable():
+            section.report(key, f"got {name!r}; expected no control characters.")
 
     def _take(self, arguments: Mapping[str, Any]) -> None:
         known = {one.name: one for one in self.parameters()}
@@ -313,9 +321,14 @@ class _Reader:
         """Build a container from its section."""
         given: dict[str, Any] = dict(extra)
         outcomes = section.texts("outcomes", REQUIRED)
+        for outcome in outcomes:
+            self._check_printable(section, "outcomes", outcome)
         for key in ("input_keys", "output_keys"):
             given[key] = section.texts(key, ())
         given["userdata"] = self._mapping(section, "userdata")
+        items = given.get("it")
+        if isinstance(items, ItemsOf) and items.key not in given["userdata"]:
+            given["input_keys"] = [*dict.fromkeys([*given["input_keys"], items.key])]
         given |= self._options(section)
         made: Any = self._made(section, kind, {"outcomes": outcomes, **given})
         if kind is Iterator:
@@ -376,6 +389,7 @@ class _Reader:
         if not list(states):
             section.problem("states", "a mapping: label -> state")
         for label in states:
+            self._check_printable(states, label, label)
             entry = states.section(label)
             self._add(entry, made, label)
         if "initial" in section and isinstance(made, StateMachine):
@@ -389,8 +403,9 @@ class _Reader:
                 labels[1], "got a second clean-up; expected one. Try a sequence of both."
             )
         for label in labels[:1]:
+            self._check_printable(cleanup, label, label)
             entry = cleanup.section(label)
-            state = self._state(entry)
+            state = self._state(entry, ("remapping",))
             remapping = self._names(entry, "remapping")
             entry.close()
             add = partial(getattr(made, "add_cleanup", str), label, state, remapping)
@@ -404,8 +419,9 @@ class _Reader:
         if len(labels) != 1:
             section.problem("each", "a mapping with one state: label -> state")
             return
+        self._check_printable(each, labels[0], labels[0])
         entry = each.section(labels[0])
-        state = self._state(entry)
+        state = self._state(entry, ("remapping",))
         remapping = self._names(entry, "remapping")
         entry.close()
         self._try(
@@ -418,17 +434,23 @@ class _Reader:
         )
 
     def _add(self, entry: Section, made: Any, label: str) -> None:
-        state = self._state(entry)
-        remapping = self._names(entry, "remapping")
-        arguments: list[Any] = [remapping]
+        around = ["on", "remapping", "constants"]
         if isinstance(made, Concurrence):
+            around = ["remapping"]
             entry.allow("on")
             if "on" in entry:
                 entry.report(
                     "on",
                     "got transitions; expected none in a concurrence: its outcome_map decides.",
                 )
-        elif made is not None:
+        elif isinstance(made, Sequence):
+            around.remove("constants")
+        state = self._state(entry, around)
+        remapping = self._names(entry, "remapping")
+        arguments: list[Any] = [remapping]
+        if made is None:
+            entry.allow(*around)
+        elif not isinstance(made, Concurrence):
             arguments = [self._transitions(entry), remapping]
             if type(made) is StateMachine:
                 arguments.append(self._mapping(entry, "constants"))
@@ -480,9 +502,15 @@ class _Reader:
 
     # -- one state -----------------------------------------------------------------------------
 
-    def _state(self, entry: Section) -> State | None:
-        """Return the state of an entry, without what its container does with it."""
-        entry.allow("on", "remapping", "constants", "help", "with", *OPTIONS, *KEYS)
+    def _state(self, entry: Section, around: SequenceOf[str]) -> State | None:
+        """Return the state of an entry, without what its container does with it.
+
+        Args:
+            entry: The entry.
+            around: The keys of it that its container reads.
+        """
+        entry.text("help", "", may_be_blank=True)
+        entry.allow(*around)
         kinds = [kind for kind in KINDS if kind in entry]
         if len(kinds) != 1:
             entry.allow(*KINDS)
@@ -492,8 +520,12 @@ class _Reader:
             return None
         (kind,) = kinds
         if kind in {"state", "mission", "plan"}:
-            return self._named(entry, kind)
+            return self._named(entry, kind, around)
         inner = entry.section(kind)
+        for key in (*OPTIONS, *KEYS):
+            if key in entry:
+                entry.allow(key)
+                entry.report(key, f"got it beside {kind!r}; expected it inside of that.")
         extra: dict[str, Any] = {}
         containers: dict[str, type[Container]] = {
             "machine": StateMachine,
@@ -567,13 +599,17 @@ class _Reader:
             "exhausted_outcome": inner.text("exhausted", "done"),
         }
 
-    def _named(self, entry: Section, kind: str) -> State | None:
+    def _named(self, entry: Section, kind: str, around: SequenceOf[str]) -> State | None:
         name = entry.text(kind, REQUIRED)
         options = self._options(entry)
+        entry.allow(*OPTIONS)
         raw = {key: entry.value(key) for key in options}
-        with_ = entry.section("with")
-        arguments = self._mapping(entry, "with")
-        keys = {key: entry.texts(key, ()) for key in KEYS if key in entry}
+        with_ = Section(entry.file, "", {}) if kind == "plan" else entry.section("with")
+        arguments = {} if kind == "plan" else self._mapping(entry, "with")
+        keys: dict[str, Any] = {}
+        if kind == "state":
+            entry.allow(*KEYS)
+            keys = {key: entry.texts(key, ()) for key in KEYS if key in entry}
         place = Naming(self._where(entry, kind), self._folder, self._allow)
         origin = Origin(kind, name, {key: with_.value(key) for key in with_}, raw, keys)
         if not entry.is_good(kind, "with", *OPTIONS):
@@ -590,7 +626,7 @@ class _Reader:
             field, known, rest = text.partition("with: ")
             entry.report("with" if known and not field else kind, rest if not field else text)
             return None
-        return self._reference(entry, name, arguments, options, origin, place)
+        return self._reference(entry, name, arguments, options, origin, place, around)
 
     def _where(self, entry: Section, kind: str) -> str:
         path = entry.path(kind)
@@ -604,17 +640,22 @@ class _Reader:
         options: dict[str, Any],
         origin: Origin,
         place: Naming,
+        around: SequenceOf[str],
     ) -> State | None:
         try:
             if self._to_run:
-                check_allowed(name.partition(":")[0], place)
+                check_named(name, arguments, place)
         except MissionError as error:
-            entry.report("state", str(error).removeprefix(f"{place.where}: "))
+            text = str(error).removeprefix(f"{place.where}: ")
+            known = text.startswith("with: ")
+            entry.report("with" if known else "state", text.removeprefix("with: "))
             return None
-        on = list(entry.section("on"))
+        on, renamed, constants = (
+            list(entry.section(key)) if key in around else []
+            for key in ("on", "remapping", "constants")
+        )
         outcomes = list(dict.fromkeys((*origin.keys.get("outcomes", ()), *on)))
-        renamed = list(entry.section("remapping"))
-        inputs = (*origin.keys.get("input_keys", ()), *renamed, *entry.section("constants"))
+        inputs = (*origin.keys.get("input_keys", ()), *renamed, *constants)
         outputs = (*origin.keys.get("output_keys", ()), *renamed)
 
         def make() -> State:
@@ -646,7 +687,8 @@ class _Reader:
                 f"got {name!r}, which is not in {str(self._folder)!r}; expected a file there."
             )
         if not there:
-            near = sorted(each.name for each in path.parent.glob(f"*{path.suffix}"))
+            beside = path.parent.glob(f"*{path.suffix}") if path.suffix else ()
+            near = sorted(each.name for each in beside if each.is_file())
             hint = did_you_mean(name, near)
             raise MissionError(f"got {name!r}, which is no file; expected one of {near}.{hint}")
         if path in self._around or len(self._around) > MOST_FILES:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import importlib
+import importlib.util
 import inspect
 import sys
 from dataclasses import dataclass, field
 from functools import cache, partial
+from importlib.machinery import PathFinder
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NoReturn
 
 from smachpy.base.problems import unknown_name
 from smachpy.engine.threads import OBSERVERS
 from smachpy.exceptions import MissionError, SmachError, error_text
+from smachpy.files.source import names_in
 from smachpy.machines.container import Container
 from smachpy.machines.state import FunctionState, State, set_options
 
@@ -201,8 +205,8 @@ def named_thing(text: str, place: Naming) -> Any:
     Raises:
         MissionError: it may not be imported, or does not exist.
     """
+    check_named(text, {}, place)
     module, _, name = text.partition(":")
-    check_allowed(module, place)
     thing: Any = _import(module, place)
     for part in name.split("."):
         if part.startswith("__") or not hasattr(thing, part):
@@ -219,10 +223,75 @@ def _check_origin(thing: Any, place: Naming) -> None:
     Raises:
         MissionError: it is of a module that is not allowed.
     """
+    while isinstance(thing, partial):
+        thing = thing.func
     if inspect.ismodule(thing):
         check_allowed(thing.__name__, place)
     elif inspect.isclass(thing) or inspect.isroutine(thing):
         check_allowed(getattr(thing, "__module__", None) or "builtins", place)
+    elif callable(thing) and not isinstance(thing, State):
+        check_allowed(type(thing).__module__, place)
+
+
+def check_named(text: str, arguments: Mapping[str, Any], place: Naming) -> None:
+    """Refuse `module:Name` as far as the source of the module says; nothing is imported.
+
+    Args:
+        text: It.
+        arguments: What it is called with; none are checked if there are none.
+        place: Where it is named.
+
+    Raises:
+        MissionError: it may not be imported, is not defined there, or takes no such argument.
+    """
+    module, _, name = text.partition(":")
+    check_allowed(module, place)
+    first = name.partition(".")[0]
+    if not all(part.isidentifier() for part in name.split(".")):
+        raise MissionError(f"{place.where}: got {text!r}; expected module:Name.")
+    file = _file_of(module, place.folder) or _installed(module, place)
+    if file is None:
+        return
+    try:
+        names = names_in(file)
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        problem = f"{place.where}: got {module!r}, which is no Python: {error_text(error)}"
+        raise MissionError(problem) from error
+    if names is None:  # it can have names that its source does not show
+        return
+    if first not in names:
+        near = [known for known in names if not known.startswith("_")]
+        raise MissionError(f"{place.where}: {unknown_name(f'name in {module}', first, near)}")
+    found = names[first]
+    if isinstance(found, str):
+        check_allowed(found, place)
+    elif first == name and arguments and found is not None:
+        for argument in arguments:
+            if argument not in found:
+                problem = unknown_name(text, argument, list(found))
+                raise MissionError(f"{place.where}: with: {problem}")
+
+
+def _installed(module: str, place: Naming) -> Path | None:
+    """Return the file of a module of an allowed package; None if it has no source.
+
+    Raises:
+        MissionError: there is no such module.
+    """
+    top, *below = module.split(".")
+    try:
+        spec = importlib.util.find_spec(top)
+        name = top
+        for part in below:  # not `find_spec(module)`, which imports what the module is in
+            name = f"{name}.{part}"
+            folders = None if spec is None else spec.submodule_search_locations
+            spec = PathFinder.find_spec(name, folders) if folders else None
+    except (ImportError, ValueError):  # such as `__main__`, which has none
+        return None
+    if spec is None:
+        raise MissionError(f"{place.where}: got {module!r}, which is not installed.")
+    path = Path(spec.origin or "")
+    return path if path.suffix == ".py" and path.is_file() else None
 
 
 def check_allowed(module: str, place: Naming) -> None:
@@ -255,23 +324,38 @@ def _file_of(module: str, folder: Path) -> Path | None:
 
 def _import(name: str, place: Naming) -> Any:
     file = _file_of(name, place.folder)
-    folder = str(place.folder.resolve())
-    sys.path.insert(0, folder)
-    try:
-        module = importlib.import_module(name)
-    except Exception as error:
-        raise MissionError(
-            f"{place.where}: importing {name!r} raised {error_text(error)}"
-        ) from error
-    finally:
-        sys.path.remove(folder)
+    folder = place.folder.resolve()
+    with contextlib.ExitStack() as stack:
+        if file is not None:  # code of an allowed package must not find that of the folder instead
+            sys.path.insert(0, str(folder))
+            stack.callback(_take_off_path, str(folder))
+            # The package around it may be another one of that name, whose code is not allowed.
+            top = importlib.util.find_spec(name.partition(".")[0])
+            around = [] if top is None else [top.origin, *(top.submodule_search_locations or ())]
+            if not any(one and Path(one).resolve().is_relative_to(folder) for one in around):
+                _refuse_other(name, around[0] if around else None, file, place)
+        try:
+            module = importlib.import_module(name)
+        except Exception as error:
+            raise MissionError(
+                f"{place.where}: importing {name!r} raised {error_text(error)}"
+            ) from error
     found = getattr(module, "__file__", None)
     if file is not None and (found is None or Path(found).resolve() != file):
-        raise MissionError(
-            f"{place.where}: got {name!r}, which is {found} already; expected {file}. Try another "
-            "name for the file."
-        )
+        _refuse_other(name, found, file, place)
     return module
+
+
+def _take_off_path(folder: str) -> None:
+    with contextlib.suppress(ValueError):  # its code may have changed the path
+        sys.path.remove(folder)
+
+
+def _refuse_other(name: str, found: str | None, file: Path, place: Naming) -> NoReturn:
+    raise MissionError(
+        f"{place.where}: got {name!r}, which is {found} already; expected {file}. Try another "
+        "name for the file."
+    )
 
 
 def _called(thing: Any, name: str, arguments: Mapping[str, Any], place: Naming) -> State:

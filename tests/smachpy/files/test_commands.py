@@ -48,7 +48,7 @@ def test_a_file_that_is_not_there_names_the_nearest(folder, capsys):
 
 def test_check_refuses_the_code_that_a_run_would_refuse(folder, capsys, monkeypatch):
     (folder / "code.yaml").write_text(
-        "outcomes: [done]\nstates:\n  A: {state: 'antigravity:fly', on: {done: done}}\n"
+        "outcomes: [done]\nstates:\n  A: {state: 'antigravity:geohash', on: {done: done}}\n"
     )
     monkeypatch.delitem(sys.modules, "antigravity", raising=False)
     assert main(["check", "code.yaml"]) == 2

@@ -234,7 +234,7 @@ def test_code_that_cannot_be_used_is_refused_before_anything_starts(with_code, n
 def test_an_allowed_package_gives_only_its_own_code(file, tmp_path):
     arguments = f"with: {{path: '{tmp_path / 'made'}'}}"
     text = f"outcomes: [done]\nstates:\n  A: {{state: 'smachpy.base.log:logging.os.mkdir', {arguments}, on: {{done: done}}}}\n"
-    with pytest.raises(ResolveError, match="Try --allow logging"):
+    with pytest.raises(MissionFileError, match="Try --allow logging"):
         load(file(text), allow=["smachpy"]).execute()
     assert not (tmp_path / "made").exists()
 
@@ -257,10 +257,52 @@ def test_outcomes_that_the_code_does_not_have_are_refused(with_code):
 
 
 def test_a_module_of_the_standard_library_is_not_taken_for_one_of_the_folder(file, tmp_path):
-    (tmp_path / "json.py").write_text("raise SystemExit")
+    (tmp_path / "json.py").write_text("loads = None\nraise SystemExit")
     text = NAMES_CODE.replace("some_states:Count", "json:loads")
     with pytest.raises(ResolveError, match=r"which is .* already"):
         load(file(text)).execute()
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("state: 'some_states:Cont'", "5:11: states.COUNT.state: .*Did you mean 'Count'?"),
+        ("state: 'some_states:os.getcwd'", "5:11: states.COUNT.state: got 'os', which is not in"),
+        ("state: 'some_states:State'", "5:11: states.COUNT.state: got 'smachpy', which is not in"),
+        ("state: 'broken:Count'", "5:11: states.COUNT.state: got 'broken', which is no Python"),
+        ("state: some_states", "5:11: states.COUNT.state: got 'some_states'; expected one of"),
+        ("state: 'some_states:'", "5:11: states.COUNT.state: .*expected module:Name"),
+        (
+            "state: 'some_states:step', with: {second: 3}",
+            "5:38: states.COUNT.with: some_states:step: .*Did you mean 'seconds'?",
+        ),
+    ],
+)
+def test_check_refuses_what_the_source_of_the_code_shows_without_running_it(
+    with_code, tmp_path, text, problem
+):
+    (tmp_path / "broken.py").write_text("def (")
+    path = with_code(f"outcomes: [done]\n\n\nstates:\n  COUNT: {{{text}, on: {{done: done}}}}\n")
+    with pytest.raises(MissionFileError, match=problem):
+        load(path)
+    assert "some_states" not in sys.modules
+
+
+def test_an_installed_module_in_the_place_of_one_of_the_folder_is_not_imported(file, tmp_path):
+    (tmp_path / "antigravity").mkdir()  # a namespace: the module of Python comes before it
+    shutil.copy(HERE / "own_states.py", tmp_path / "antigravity" / "states.py")
+    machine = load(file(NAMES_CODE.replace("some_states", "antigravity.states")))
+    with pytest.raises(ResolveError, match=r"which is .* already"):
+        machine.execute()
+    assert "antigravity" not in sys.modules
+
+
+def test_an_object_of_a_class_of_elsewhere_is_not_called(with_code, tmp_path):
+    path = with_code(NAMES_CODE.replace("some_states:Count", "callers:get"))
+    (tmp_path / "callers.py").write_text("import operator\nget = operator.methodcaller('x')\n")
+    with pytest.raises(ResolveError, match="Try --allow operator"):
+        load(path).execute()
+    sys.modules.pop("callers", None)
 
 
 # -- other files -------------------------------------------------------------------------------
@@ -310,6 +352,60 @@ def test_stop_others_names_states_of_the_concurrence(file):
     (problem,) = problems_of(file(text))
     assert problem.startswith("3:73: states.A.concurrence.stop_others: ")
     assert "got 'LET'" in problem
+
+
+INNER = "{outcomes: [done, preempted], states: {B: {state: wait, with: {seconds: 1}}}}"
+
+
+@pytest.mark.parametrize(
+    ("states", "problem"),
+    [
+        (f"A: {{machine: {INNER}, timeout: 5}}", "states.A.timeout: got it beside 'machine'"),
+        (f"A: {{machine: {INNER}, outcomes: [x]}}", "states.A.outcomes: got it beside 'machine'"),
+        (f"A: {{machine: {INNER}, with: {{x: 1}}}}", "states.A.with: got an unknown field"),
+        ("A: {plan: x.pnml, with: {x: 1}}", "states.A.with: got an unknown field"),
+        (
+            f"A: {{concurrence: {{default_outcome: done, {INNER[1:-3]}, constants: {{x: 1}}}}}}}}}}",
+            "states.A.concurrence.states.B.constants: got an unknown field",
+        ),
+        (
+            f"A: {{sequence: {{connector: done, {INNER[1:-3]}, constants: {{x: 1}}}}}}}}}}",
+            "states.A.sequence.states.B.constants: got an unknown field",
+        ),
+        (
+            "A: {iterator: {outcomes: [done, preempted], items: [1], each: {B: {state: wait, on: {done: done}}}}}",
+            "states.A.iterator.each.B.on: got an unknown field",
+        ),
+        ("A: {state: wait, help: [1]}", "states.A.help: got [1]; expected a text"),
+        ('"A\\nB": {state: wait}', "got 'A\\nB'; expected no control characters"),
+        ("A: {mission: .}", "states.A.mission: got '.', which is no file; expected one of []."),
+    ],
+)
+def test_what_would_have_no_effect_is_refused(file, states, problem):
+    found = problems_of(file(f"outcomes: [done, preempted]\nstates:\n  {states}\n"))
+    assert any(problem in one for one in found), found
+
+
+def test_what_would_have_no_effect_in_a_clean_up_is_refused(file):
+    text = "outcomes: [done, preempted]\nstates: {A: {state: wait}}\ncleanup: {C: {state: wait, on: {done: done}}}\n"
+    (problem,) = problems_of(file(text))
+    assert "cleanup.C.on: got an unknown field" in problem
+
+
+def test_an_iterator_reads_the_key_of_its_items(file):
+    text = """\
+outcomes: [done, preempted]
+userdata: {places: [a, b, c]}
+states:
+  ALL:
+    iterator:
+      outcomes: [done, preempted]
+      items_from: places
+      each: {ONE: {state: wait, with: {seconds: 1}}}
+"""
+    with mission_kit() as mission:
+        assert mission(load(file(text))).duration == 3.0
+    assert load(file(text))["ALL"].get_registered_input_keys() == ("places",)
 
 
 # -- hostile texts -----------------------------------------------------------------------------
