@@ -42,7 +42,7 @@ from actionlib_core.inputs.yaml_text import YamlTextError, load_yaml
 from actionlib_core.names import is_rule
 from smachpy.exceptions import MissionError
 from smachpy.machines.container import Container
-from smachpy.userdata.secret import MASK, Secret, is_secret_name, masked
+from smachpy.userdata.secret import MASK, Secret, holds_secret, is_secret_name, masked
 
 if TYPE_CHECKING:
     from smachpy.command.targets import Target
@@ -371,6 +371,20 @@ def read_secret(text: Text, where: str, *, kept: bool) -> Text:
     return text
 
 
+def check_kept(value: object) -> None:
+    """Check that there is no secret inside a typed value, or a list of them, that is kept.
+
+    Raises:
+        MisfitError: there is one.
+    """
+    texts = value if isinstance(value, list) else [value]
+    if any(isinstance(text, Text) and holds_secret(text) for text in texts):
+        raise MisfitError(
+            "no secret in it: journals and queues keep arguments. Try a parameter of its own for "
+            "the secret, with a smachpy.Secret, as @FILE"
+        )
+
+
 # -- the words after `--` --------------------------------------------------------------------------
 
 
@@ -526,9 +540,11 @@ class _WordBinder:
         try:
             if parameter.secret and isinstance(value, Text):
                 value = read_secret(value, where, kept=self._kept)
+            elif self._kept:
+                check_kept(value)
             self.values[parameter.name] = fit(value, parameter.hint)
         except MisfitError as error:
             shown = str(value) if isinstance(value, Text) else value
-            shown = MASK if parameter.secret else shown
+            shown = MASK if parameter.secret or holds_secret(str(value)) else shown
             self.problems.append(f"{where}: got {shown!r}; expected {error}.")
             self.values[parameter.name] = None

@@ -14,7 +14,15 @@ from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, current_clock
 from actionlib_core.names import NameArguments, clean_namespace
 from actionlib_core.process.output import printable, tell
-from smachpy.command.arguments import MisfitError, Text, fit, parameters_of, read_secret, read_words
+from smachpy.command.arguments import (
+    MisfitError,
+    Text,
+    check_kept,
+    fit,
+    parameters_of,
+    read_secret,
+    read_words,
+)
 from smachpy.command.bag import playing
 from smachpy.command.durable import DurableOptions, journalled
 from smachpy.command.extras import load_view
@@ -27,7 +35,7 @@ from smachpy.events.outcome_classes import is_good
 from smachpy.exceptions import InvalidUserCodeError, MissionError
 from smachpy.machines.mission_info import mission_info
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.userdata.secret import Secret, is_secret_name, masked
+from smachpy.userdata.secret import MASK, Secret, holds_secret, is_secret_name, masked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -223,9 +231,13 @@ def _fit_userdata(machine: Container, key: str, value: object, *, kept: bool) ->
             secret = str(read_secret(value, f"--input {key}", kept=kept))
             # What a journal does not keep, each process reads again.
             return Secret(secret) if kept or hint is Secret else secret
+        if kept:
+            check_kept(value)
         return fit(value, hint)
     except MisfitError as error:
-        got, mine = str(masked(value, key)), masked(own, key)
+        is_hidden = hint is Secret or holds_secret(str(value))
+        got = MASK if is_hidden else str(masked(value, key))
+        mine = masked(own, key)
         raise MissionError(
             f"--input {key}: got {got:.60}; expected {error}, as the mission's own {mine!r}."
         ) from error

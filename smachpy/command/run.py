@@ -29,7 +29,7 @@ from smachpy.events.inputs import WHICH
 from smachpy.exceptions import MissionError
 from smachpy.machines.mission_info import mission_info
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
-from smachpy.userdata.secret import MASK, Secret, is_secret_name, masked
+from smachpy.userdata.secret import MASK, Secret, hides, holds_secret
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -327,15 +327,19 @@ def _origin(args: argparse.Namespace, target: Target, inputs: Mapping[str, Text]
     """Return how to begin this mission again, for recordings: without secrets."""
     from smachpy.command.durable import whole_target
 
-    has_secret = any(
-        is_secret_name(name) or Secret.__name__ in str(parameter.hint)
+    hidden = {
+        name
         for name, parameter in parameters_of(target.thing).items()
-    )
+        if parameter.secret or Secret.__name__ in str(parameter.hint)
+    }
     return {
         "target": whole_target(args.target),
         "folder": str(Path.cwd()),
-        "words": [MASK for _ in args.words] if has_secret else list(args.words),
-        "inputs": {key: str(masked(value, key)) for key, value in inputs.items()},
+        "words": [MASK if hidden or holds_secret(word) else word for word in args.words],
+        "inputs": {
+            key: MASK if key in hidden or hides(key, value) or holds_secret(value) else str(value)
+            for key, value in inputs.items()
+        },
         "names": [f"{rule.old}:={rule.new}" for rule in args.names.rules],
         "robot": args.robot,
         "time": str(args.time),

@@ -46,7 +46,7 @@ from smachpy.userdata.kept_types import (
     problem_of,
 )
 from smachpy.userdata.readonly import writable
-from smachpy.userdata.secret import is_secret_name
+from smachpy.userdata.secret import hides, is_secret
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -141,6 +141,7 @@ class _Refused(Exception):  # noqa: N818  never leaves this module
 
 _ATOMS: Final = frozenset({type(None), bool, int, str})
 _NUMBERS: Final = _ATOMS | {float}
+_SIZED: Final = (str, bytes, bytearray, list, tuple, dict, set, frozenset)
 _LARGEST: Final = 2**4096
 """Larger integers are kept as hexadecimal text: CPython refuses to convert integers of more than
 4300 decimal digits (`sys.set_int_max_str_digits`), hexadecimal ones have no limit.
@@ -205,23 +206,30 @@ def _encode_dict(value: dict[Any, Any], place: str, depth: int) -> Any:
     pairs = [
         [
             _encode(key, f"{place} key {key!r}", depth + 1),
-            _encode(item, f"{place}[{key!r}]", depth + 1),
+            _encode_named(key, item, place, depth),
         ]
         for key, item in items
     ]
     return {"$items": pairs}
 
 
-def _encode_named(name: str, value: Any, place: str, depth: int) -> Any:
+def is_named_secret(name: object, value: object) -> bool:
+    """Return whether a value is a secret by its name, in clear; nothing, as "", is none."""
+    is_empty = isinstance(value, _SIZED) and not value
+    return hides(name, value) and not is_empty and not is_secret(value)
+
+
+def _encode_named(name: object, value: Any, place: str, depth: int) -> Any:
     """Encode a value with a name; one that its name calls a secret is refused in clear."""
-    if type(value) in {str, bytes} and value and is_secret_name(name):
+    inside = f"{place}.{name}" if isinstance(name, str) else f"{place}[{name!r}]"
+    if is_named_secret(name, value):
         raise _Refused(
-            f"{place}.{name}",
+            inside,
             type(value),
             "its name says that it is a secret",
             "a userdata key of its own with a smachpy.Secret, which is not kept, or another name",
         )
-    return _encode(value, f"{place}.{name}", depth + 1)
+    return _encode(value, inside, depth + 1)
 
 
 def _sequence(mark: str) -> Callable[[Any, str, int], Any]:

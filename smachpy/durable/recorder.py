@@ -16,7 +16,7 @@ from actionlib_core.clock.forks import is_copy
 from actionlib_core.shutdown import AT_EXIT
 from smachpy.base import log
 from smachpy.base.problems import name_of
-from smachpy.durable.codec import NotDurableError, decode, encode
+from smachpy.durable.codec import NotDurableError, decode, encode, is_named_secret
 from smachpy.durable.position import OF_PROCESS
 from smachpy.durable.store import FencedError, StoreError, digest_of
 from smachpy.engine.described import walk
@@ -30,7 +30,7 @@ from smachpy.machines.container import Container, control_of
 from smachpy.machines.state import get_options
 from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
-from smachpy.userdata.secret import is_secret, is_secret_name
+from smachpy.userdata.secret import is_secret
 from smachpy.userdata.user_data import CheckedDict, ConstantKey, data_of
 
 if TYPE_CHECKING:
@@ -787,7 +787,7 @@ class Recorder(RunJournal):
         """Raise a NotDurableError if the value cannot be kept."""
         # Here rather than at the end of the state, so that the traceback shows the assignment.
         home = self._homes.get(id(frame.container.userdata))
-        if type(value) in ATOMS and not (type(value) is str and is_secret_name(key)):
+        if type(value) in ATOMS and not is_named_secret(key, value):
             return
         if home is not None and self._is_kept(home, key, value):
             _encoded(value, key, path)
@@ -850,7 +850,7 @@ class Recorder(RunJournal):
         if kept is not _MISSING:
             return decode(self._journal.value(kept))
         value = call()
-        facts = {"key": key, "value": encode(value, key=key, path=path)}
+        facts = {"key": key, "value": _encoded(value, key, path)}
         if frame.dead:
             raise Interruption
         if not self._write_with(None, None, "Once", path, facts, "value"):
@@ -879,12 +879,12 @@ def _shortened(text: str) -> str:
 
 
 def _encoded(value: Any, key: str, path: str) -> Any:
-    """Encode a value of userdata; one that its name calls a secret is refused in clear.
+    """Encode a value of userdata or `once`; one that its name calls a secret is refused in clear.
 
     Raises:
         NotDurableError: it cannot be kept.
     """
-    if isinstance(value, str | bytes) and value and is_secret_name(key):
+    if is_named_secret(key, value):
         reason = "its name says that it is a secret"
         way_out = f"smachpy.Secret(...) for {key!r}, which is not kept, another name"
         raise NotDurableError(key, "", type(value), reason, way_out, path=path)

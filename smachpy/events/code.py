@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.userdata.secret import is_secret_name
+from smachpy.userdata.secret import holds_secret, is_secret_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,9 +35,9 @@ def code_facts() -> dict[str, Any]:
 
     Returns:
         `files`: name of each of the program's own modules -> hash of its file; their common
-        `folder`; `hash` of all; `constants`: "module.NAME" -> value as text; `commit` and `dirty`
-        of the git repository there ("" and False without one); `versions`. Modules of Python, of
-        installed packages and of this library are not its own.
+        `folder`; `hash` of all; `constants`: "module.NAME" -> value as text, without secrets;
+        `commit` and `dirty` of the git repository there ("" and False without one); `versions`.
+        Modules of Python, of installed packages and of this library are not its own.
 
     Blocks: it reads the files, and calls git once in each process, for 2 * `GIT_S` at most.
     """
@@ -82,9 +82,10 @@ def own_constants(files: Mapping[str, Path]) -> dict[str, str]:
     for module in list(sys.modules.values()):
         name = names.get(str(getattr(module, "__file__", None)))
         for word, value in list(vars(module).items()) if name else ():
-            if word.isupper() and _is_plain(value) and not is_secret_name(word):
+            is_hidden = is_secret_name(word) or is_secret_name(word.removesuffix("S"))
+            if word.isupper() and _is_plain(value) and not is_hidden:
                 text = repr(value)
-                if len(text) <= MAX_CONSTANT_LENGTH:
+                if len(text) <= MAX_CONSTANT_LENGTH and not holds_secret(text):
                     found[f"{name}.{word}"] = text
     return dict(sorted(found.items())[:MAX_FILES])
 

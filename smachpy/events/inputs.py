@@ -21,7 +21,7 @@ from actionlib_core import border
 from actionlib_core.inputs.checked_data import Number  # noqa: TC001  read at run time
 from smachpy.events.code import code_facts
 from smachpy.userdata.json_text import encoded
-from smachpy.userdata.secret import MASK, masked
+from smachpy.userdata.secret import MASK, is_secret, masked
 from smachpy.userdata.shown import Room, shown
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class Inputs:
             if said := getattr(crossing, key):
                 record[key] = said
         if crossing.value is not None:
-            value = message_value(crossing.value)
+            value = message_value(crossing.value, crossing.key if crossing.what == "once" else "")
             text = json.dumps(value)
             if MASK in text:
                 record["hidden"] = True
@@ -114,12 +114,12 @@ class Inputs:
         return record
 
 
-def message_value(message: Any) -> Any:
-    """Return a message as recordings have it, with masked secrets.
+def message_value(message: Any, name: str = "") -> Any:
+    """Return a message, or another value with a name, as recordings have it: with masked secrets.
 
     Left out are the fields that a new message of ROS 1 has anyway: 0, "", false and no items.
     """
-    value = encoded(masked(message))
+    value = encoded(masked(message, name))
     is_message = isinstance(value, dict) and "$msg" in value
     if not is_message or getattr(message, "_wire", "") == "ros2":  # those have defaults
         return value
@@ -184,11 +184,16 @@ def origin_facts(
     which: Which,
 ) -> dict[str, Any]:
     """Return `origin` of the header."""
+    mission = masked(dict(mission))
+    given = mission.get("inputs", {})
+    hidden = {key: MASK for key in given if is_secret(userdata.get(key))}
+    if hidden:  # a key whose own value is a secret, whatever its name
+        mission = {**mission, "inputs": {**given, **hidden}}
     return {
         "t": clock.now(),
         "namespace": namespace,
         "inputs": which,
-        "mission": encoded(masked(dict(mission))),
+        "mission": encoded(mission),
         "userdata": {key: encoded(masked(value, key)) for key, value in userdata.items()},
         "code": code_facts(),
     }

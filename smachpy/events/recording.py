@@ -117,6 +117,7 @@ class Recording:
         base: The state of the run at its beginning; None if it began with the run.
         events: The records.
         cut: Whether the file ends in the middle of a line.
+        wrong: What is left out as it has a wrong form, "line 7: ...".
         observed: Records of the robot's topics, numbered from 1 in `n`.
         made_ns: When it was really made; `stamp_ns` differs if the mission's time was virtual.
         definitions: Texts of the mission's own message types, as `interface_texts` returns them.
@@ -131,6 +132,7 @@ class Recording:
     base: dict[str, Any] | None
     events: list[dict[str, Any]] = field(default_factory=list)
     cut: bool = False
+    wrong: list[str] = field(default_factory=list)
     observed: list[dict[str, Any]] = field(default_factory=list)
     made_ns: int = 0
     definitions: dict[str, str] = field(default_factory=dict)
@@ -694,18 +696,20 @@ def recording_lines(
 
 
 def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield the events numbered from 1; missing events are counted."""
-    seq = 0
+    """Yield the events numbered from 1; missing events are counted, also those of lost lines."""
+    seq = given = 0
     for event in events:
-        seq += 1 + event.get("dropped", 0)
-        yield {**event, "seq": seq}
+        before, given = given, event.get("seq", 0)
+        dropped = max(event.get("dropped", 0), given - before - 1 if before else 0)
+        seq += 1 + dropped
+        yield {**event, "seq": seq, **({"dropped": dropped} if dropped else {})}
 
 
 def read_recording(path: str | Path) -> Recording:
     """Read a file.
 
-    Data of robots' topics that has another form than `smachpy.events.reading` knows is left out,
-    with a warning.
+    Data of robots' topics, and inputs, that have another form than `smachpy.events.reading` knows
+    are left out, with a warning.
 
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event; with the line.
@@ -724,7 +728,7 @@ def read_recording(path: str | Path) -> Recording:
 def _read(path: Path, file: TextIO) -> Recording:
     recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
     events: list[dict[str, Any]] = []
-    wrong: list[str] = []  # data of topics that is left out
+    wrong = recording.wrong
     for number, record in _records(path, file):
         if record is None:
             recording.cut = True
@@ -740,8 +744,8 @@ def _read(path: Path, file: TextIO) -> Recording:
     recording.events = list(_numbered(map(SteadyStamps().fix, events)))
     if wrong:
         log.logwarn(
-            f"recording {str(path)!r}: {len(wrong)} record(s) of topics are left out; the first: "
-            f"{wrong[0]}"
+            f"recording {str(path)!r}: {len(wrong)} record(s) of topics or inputs are left out; "
+            f"the first: {wrong[0]}"
         )
     return recording
 
@@ -760,21 +764,38 @@ def _texts(given: Any) -> dict[str, str]:
 
 
 def _read_header(path: Path, line: str) -> Recording:
+    data: Any = None
     try:
         data = load_json(line, longest=MAX_LINE_LENGTH, deepest=MAX_NESTING)
+        _check_is_known(path, data)
         header = checked(_Header, data, known_only=True)
         record: StateRecord = checked(StateRecord, header["machine"])
         base = header.get("base")
         if base is not None:
             base = read_facts(base)
     except ValueError as error:
+        is_ours = isinstance(data, dict) and data.get("format") == FORMAT
+        got = "a wrong header" if is_ours else "no header" if line else "an empty file"
+        cut = ", which is cut off" if line and not line.endswith("\n") else ""
         raise RecordingError(
-            path, f"line 1: got no header ({error}); expected a file of `smachpy run --record`."
+            path,
+            f"line 1{cut}: got {got} ({error}); expected a file of `smachpy run --record`.",
         ) from error
     stamp_ns = header["stamp_ns"]
     made_ns = header.get("made_ns", stamp_ns)  # older files have none
     run, origin = header.get("run", ""), header.get("origin")
     return Recording(path, record, stamp_ns, base, made_ns=made_ns, run=run, origin=origin)
+
+
+def _check_is_known(path: Path, data: Any) -> None:
+    """Refuse a recording of a newer version, whatever else it has."""
+    version = data.get("version") if isinstance(data, dict) else None
+    if type(version) is int and version > VERSION and data.get("format") == FORMAT:
+        raise RecordingError(
+            path,
+            f"line 1: got version {version}, of a newer smachpy; expected {VERSION}. Try to update "
+            "smachpy.",
+        )
 
 
 class _Header(TypedDict):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import random
 import sys
 from dataclasses import dataclass, field
@@ -139,34 +140,37 @@ def reproduce(
     started = RealClock().now()
     then = dict(recording.origin["mission"])
     random.seed(then.get("seed"))
-    begin_ns = recording.stamp_ns
     cancelled: set[str] = set()
-    kit = MissionKit(
-        seed=seed,
-        begin_ns=max(0, begin_ns),
-        namespace=str(recording.origin.get("namespace") or ""),
-        arguments=parse_arguments(list(then.get("names", ()))),
-    )
+    try:
+        kit = MissionKit(
+            seed=seed,
+            begin_ns=recording.stamp_ns,
+            namespace=recording.origin["namespace"],
+            arguments=parse_arguments(list(then.get("names", ()))),
+        )
+    except ActionlibError as error:
+        raise ReproductionError(recording.path, f"line 1: origin: {first_line(error)}") from error
     kit.draws = False
     with kit, _cancels(cancelled):
         try:
             machine = make()
-            _restore_userdata(machine, recording)
+            notes = _restore_userdata(machine, recording)
         except (SmachError, ActionlibError) as error:
             raise ReproductionError(recording.path, str(error)) from error
         record = describe(machine)
+        check_machine(recording, events[0]["path"], record)
         player = Player(kit, world, events)
         player.open()
         buffer = machine.event_buffer(limit=LARGEST_BUFFER)
         end = player.begin(machine)
         machine._smachpy.live.journal = Recorded(world, player)
-        notes: list[str] = []
+        ends: list[str] = []  # why the run has no outcome
         outcome = None
         try:
             outcome = kit(machine, limit=world.ended - world.began + LONGER_S).outcome
         except (Deadlock, TimeLimitError, AssertionError, SmachError) as error:
             if not isinstance(error, SmachError) or isinstance(error, TimeLimitError):
-                notes.append(str(error).splitlines()[0])
+                ends.append(first_line(error))
         finally:
             end()
             buffer.close()
@@ -186,11 +190,16 @@ def reproduce(
         duration=world.ended - world.began,
         seconds=RealClock().now() - started,
         outcome=outcome,
-        notes=(*world.lacks, *(() if is_same else notes), *dict.fromkeys(player.problems)),
+        notes=(*world.lacks, *notes, *(() if is_same else ends), *dict.fromkeys(player.problems)),
         changed=() if is_same else tuple(changes(recording, record, code_facts())),
         events=now,
         record=record,
     )
+
+
+def first_line(error: BaseException) -> str:
+    """Return the first line of an error; further ones are for whoever looks closer."""
+    return str(error).partition("\n")[0].rstrip(":")
 
 
 class Recorded(RunJournal):
@@ -205,11 +214,15 @@ class Recorded(RunJournal):
         left = self._left.get((frame.path, key))
         if not left:
             return call()
-        try:
-            return decoded(left.pop(0), key)
-        except ValueError as error:
-            self._player.problems.append(f"{frame.path}: once {key!r}: {error}")
-            return call()
+        value = left.pop(0)
+        problem = "it has a secret, which is not recorded; it was called again"
+        if MASK not in json.dumps(value):
+            try:
+                return decoded(value, key)
+            except ValueError as error:
+                problem = str(error)
+        self._player.problems.append(f"{frame.path}: once {key!r}: {problem}")
+        return call()
 
 
 @contextlib.contextmanager
@@ -257,7 +270,7 @@ def maker(
     if problem:
         raise ReproductionError(recording.path, f"{recorded}: {problem}")
     words, inputs = tuple(then.get("words", ())), dict(then.get("inputs", {}))
-    if MASK in [*words, *inputs.values()]:
+    if any(MASK in text for text in (*words, *inputs.values())):
         raise ReproductionError(
             recording.path,
             "it was begun with a secret, which is not recorded. Try --mission with a function that "
@@ -270,8 +283,9 @@ def maker(
         if mission and whole_target(mission) != recorded:
             return load_target(mission, allow=packages).build()
         folder = str(then.get("folder") or "")
-        if folder and folder not in sys.path:
-            sys.path.append(folder)  # as for a module that is named from there
+        # For a module that is named from there. Whoever made the recording has chosen the folder.
+        if folder and folder not in sys.path and not Allowed(allow).problem(f"{folder}/"):
+            sys.path.append(folder)
         target = load_target(mission or recorded, allow=packages)
         if not mission:
             check_is_mission(target, "recording")
@@ -280,13 +294,37 @@ def maker(
     return make
 
 
-def _restore_userdata(machine: Container, recording: Recording) -> None:
-    """Give the machine the values that keys had at the begin and have no longer."""
+def check_machine(recording: Recording, root: str, record: StateRecord) -> None:
+    """Check that a recording, whose run is that of `root`, is one of this machine.
+
+    Raises:
+        ReproductionError: it is of another one.
+    """
+    recorded = {recording.record.path, root}
+    if recorded != {record.path}:
+        names = " and ".join(repr(path.strip("/")) for path in sorted(recorded))
+        raise ReproductionError(
+            recording.path,
+            f"it is of the machine {names}; expected one of {record.label!r}, which the mission "
+            "is. Try --mission with the recorded one.",
+        )
+
+
+def _restore_userdata(machine: Container, recording: Recording) -> list[str]:
+    """Give the machine the values that keys had at the begin and have no longer.
+
+    Returns what could not be restored, in words.
+    """
     assert recording.origin is not None
+    notes = []
     for key, value in recording.origin["userdata"].items():
-        if key not in machine.userdata or not recording.origin["mission"]:
+        if MASK in json.dumps(value):
+            if key not in machine.userdata:
+                notes.append(f"userdata key {key!r} had a secret, which is not recorded")
+        elif key not in machine.userdata or not recording.origin["mission"]:
             try:
                 machine.userdata[key] = decoded(value, key)
             except ValueError as error:
                 if key not in machine.userdata:
                     raise MissionError(f"userdata key {key!r}: {error_text(error)}") from error
+    return notes

@@ -38,9 +38,7 @@ def reproduce_file(path: str, options: Options) -> Verdict:
     except SmachError as error:
         took = RealClock().now() - started
         text = str(error)
-        return Verdict(
-            path, "failed", (text if text.startswith(path) else f"{path}: {text}",), seconds=took
-        )
+        return Verdict(path, "failed", (text if path in text else f"{path}: {text}",), seconds=took)
     kind = "same" if found.is_same else "differs"
     comparison = found.comparison
     return Verdict(

@@ -254,6 +254,8 @@ def _add_lacks(world: World, recording: Recording, events: list[dict[str, Any]])
     for one in recording.inputs:
         if one["what"] == "lost":
             lacks.append(f"{one.get('key')} inputs are missing: too many came at once")
+    if recording.wrong:
+        lacks.append(f"{len(recording.wrong)} record(s) are left out: {recording.wrong[0]}")
     large = Counter(one["name"] for one in recording.inputs if is_outline(one.get("value")))
     for name, count in large.items():
         lacks.append(
@@ -270,7 +272,7 @@ def _why_not_more(recording: Recording) -> str:
             return ", when its process ended"
         if event.get("dropped"):
             return f", where {event['dropped']} events are missing"
-    return ""
+    return ", where the file is cut off" if recording.cut else ""
 
 
 def is_outline(value: Any) -> bool:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import RealClock
+from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces._sources import BUNDLED
 from smachpy.command.arguments import Text, parameters_of, read_words
 from smachpy.command.durable import whole_target
@@ -21,7 +22,7 @@ from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
 from smachpy.reproduce.compare import steps_of
-from smachpy.reproduce.run import ReproductionError, maker
+from smachpy.reproduce.run import ReproductionError, check_machine, maker
 from smachpy.reproduce.script import Line, Script, fewer_fields, kinds, script_of, source
 from smachpy.reproduce.world import first_run, world_of
 from smachpy.testing.kit import MissionKit
@@ -103,6 +104,13 @@ def write_test(
     if not events or recording.origin is None:
         raise ReproductionError(recording.path, "it has no inputs, or not the begin of the run.")
     make = maker(recording, mission, allow)
+    try:
+        with MissionKit():
+            check_machine(recording, events[0]["path"], describe(make()))
+    except ReproductionError:
+        raise
+    except (SmachError, ActionlibError) as error:
+        raise ReproductionError(recording.path, str(error)) from error
     world = world_of(recording)
     recorded = _recorded_way(recording, events)
     namespace = str(recording.origin.get("namespace") or "")

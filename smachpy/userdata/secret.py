@@ -10,7 +10,9 @@ from __future__ import annotations
 import copy
 import dataclasses
 import re
+from collections import UserDict, UserList, deque
 from functools import lru_cache
+from types import MappingProxyType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from smachpy.exceptions import InvalidStateError
@@ -23,10 +25,20 @@ MASK: Final = "<secret>"
 
 _LAST: Final = frozenset(
     {"password", "passwd", "passphrase", "pwd", "secret", "token", "credential", "credentials"}
-    | {"apikey"}
+    | {"apikey", "passwords", "passphrases", "secrets"}
 )
 _KEYS: Final = frozenset({"api", "access", "private", "secret"})  # before "key"
-_PART: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_PART: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_NAMED: Final = re.compile(
+    r"(?<![\w-])([A-Za-z_][\w-]{0,200})[\"']?[ \t]{0,9}[:=][ \t]{0,9}"
+    r"(?!(?:true|false|null|none|~)\b|@)[^\s,}]",
+    re.IGNORECASE,
+)
+_LOGIN: Final = re.compile(r"://[^/\s:@]{0,200}:[^/\s@]{1,200}@")  # "://user:password@"
+_ATOMS: Final = frozenset({type(None), bool, int, float, complex, str, bytes})
+_MAPPINGS: Final = (dict, UserDict, MappingProxyType)
+_LISTS: Final = (list, tuple, set, frozenset, deque, UserList)
+_DEEPEST: Final = 50
 _named: set[str] = set()  # by missions
 
 
@@ -83,21 +95,27 @@ class Secret:
 
 def add_secret_names(names: Iterable[str]) -> None:
     """Treat values under these names as secrets, in this process."""
-    _named.update(names)
+    _named.update(name.lower() for name in names)
     is_secret_name.cache_clear()
 
 
 @lru_cache(maxsize=4096)
 def is_secret_name(name: str) -> bool:
     """Return whether a key, field or parameter of this name holds a secret."""
-    if name in _named:
+    if name.lower() in _named:
         return True
     if len(name) > 200:  # noqa: PLR2004  no name that a person has written
         return False
     parts = [part.lower() for part in _PART.findall(name)]
     return parts[-1:] != [] and (
-        parts[-1] in _LAST or (parts[-1] == "key" and parts[-2:-1] != [] and parts[-2] in _KEYS)
+        parts[-1] in _LAST
+        or (parts[-1] in {"key", "keys"} and parts[-2:-1] != [] and parts[-2] in _KEYS)
     )
+
+
+def holds_secret(text: str) -> bool:
+    """Return whether a text has a secret in it: `password: x`, `token=x`, or a login in a URL."""
+    return bool(_LOGIN.search(text)) or any(map(is_secret_name, _NAMED.findall(text)))
 
 
 def is_secret(value: object) -> bool:
@@ -112,36 +130,90 @@ def hides(name: object, value: object) -> bool:
     return is_secret(value) or (isinstance(name, str) and is_secret_name(name))
 
 
-def masked(value: Any, name: object = "", depth: int = 20) -> Any:
+class _Opaque:
+    """Stands for a value of which only the class may be shown."""
+
+    def __init__(self, kind: type) -> None:
+        self._text = f"<{kind.__name__} with secrets>"
+
+    def __repr__(self) -> str:
+        return self._text
+
+
+def masked(value: Any, name: object = "") -> Any:
     """Return a value for display: a copy in which secrets are replaced.
 
-    They are looked for in dicts, lists and tuples, and in the fields of dataclasses and messages.
+    They are looked for in containers, and in what objects have by name: the fields of dataclasses,
+    messages, named tuples and namespaces. Any other object that has a secret in its attributes is
+    replaced as a whole. A value that contains itself has "..." there.
     """
+    return _masked(value, name, _DEEPEST, {})
+
+
+def _masked(value: Any, name: object, depth: int, known: dict[int, list[Any]]) -> Any:
     if hides(name, value):
         return MASK
     kind = type(value)
-    if depth and kind is dict:
-        return {key: masked(one, key, depth - 1) for key, one in value.items()}
-    if depth and kind in {list, tuple}:
-        return kind(masked(one, "", depth - 1) for one in value)
-    hidden = {}
-    for field in _fields_of(kind) if depth else ():
-        one = getattr(value, field, None)
-        shown = masked(one, field, depth - 1)
-        if shown is not one:
-            hidden[field] = shown
+    if kind in _ATOMS:
+        return value
+    if not depth:
+        return MASK  # nobody has looked inside
+    found = known.get(id(value))
+    if found is None:
+        found = known[id(value)] = ["...", value]  # as long as that lives, its id is its own
+        found[0] = _masked_parts(value, kind, depth - 1, known)
+    return found[0]
+
+
+def _masked_parts(value: Any, kind: Any, depth: int, known: dict[int, list[Any]]) -> Any:
+    if isinstance(value, _MAPPINGS):
+        return _masked_mapping(value, depth, known)
+    names = _names_in(value, kind)
+    if isinstance(value, _LISTS) and not names:
+        return _masked_list(value, depth, known)
+    old = {one: getattr(value, one, None) for one in names}
+    new = {one: _masked(part, one, depth, known) for one, part in old.items()}
+    hidden = {one: part for one, part in new.items() if part is not old[one]}
+    if hidden and isinstance(value, tuple):
+        return value._replace(**hidden)  # type: ignore[attr-defined]  # a named tuple
     if hidden:
         value = copy.copy(value)
-        for field, shown in hidden.items():
-            object.__setattr__(value, field, shown)  # it may be frozen, or check its types
-    return value
+        for one, part in hidden.items():
+            object.__setattr__(value, one, part)  # it may be frozen, or check its types
+    held = {} if names else getattr(value, "__dict__", {})
+    return _Opaque(kind) if any(hides(one, part) for one, part in held.items()) else value
 
 
-def _fields_of(kind: type) -> Iterable[str]:
-    """Return the fields of a dataclass or of a message, else none."""
+def _masked_mapping(value: Any, depth: int, known: dict[int, list[Any]]) -> Any:
+    hidden, found = type(value) is dict, {}
+    for key, one in value.items():
+        is_plain = _masked(key, "", depth, known) is key
+        part = found[key if is_plain else MASK] = _masked(one, key, depth, known)
+        hidden = hidden or not is_plain or part is not one
+    return found if hidden else value
+
+
+def _masked_list(value: Any, depth: int, known: dict[int, list[Any]]) -> Any:
+    if _ATOMS.issuperset(map(type, value)):
+        return value
+    items = [_masked(one, "", depth, known) for one in value]
+    if all(new is old for new, old in zip(items, value, strict=True)):
+        return value
+    return tuple(items) if isinstance(value, tuple) else items
+
+
+def _names_in(value: Any, kind: Any) -> Iterable[str]:
+    """Return what a value has by name: fields of a message, of a dataclass and the like."""
     if dataclasses.is_dataclass(kind):
         return [field.name for field in dataclasses.fields(kind)]
-    return kind.__slots__ if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__") else ()
+    if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
+        names: Iterable[str] = kind.__slots__
+        return names
+    if isinstance(value, tuple) and hasattr(kind, "_fields"):
+        return list(kind._fields)
+    if isinstance(value, SimpleNamespace):
+        return list(vars(value))
+    return [one.name for one in getattr(kind, "__attrs_attrs__", ())]
 
 
 def masked_words(argv: Sequence[str]) -> list[str]:
@@ -153,6 +225,8 @@ def masked_words(argv: Sequence[str]) -> list[str]:
             words.append(MASK)
         elif equals and value[:1] != "@" and is_secret_name(key.replace("-", "_")):
             words.append(f"{word.partition('=')[0]}={MASK}")
+        elif holds_secret(word):
+            words.append(MASK)
         else:
             words.append(word)
         is_flag = word.startswith("--") and not equals

@@ -35,7 +35,7 @@ from itertools import chain
 from types import MappingProxyType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from smachpy.userdata.secret import MASK, hides, is_secret
+from smachpy.userdata.secret import MASK, hides, is_secret, masked
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -80,7 +80,7 @@ def text_of(value: Any, room: Room, depth: int = 0) -> str:
         fits = _fits(value, left, set())
         spent = room.items - max(left.items, 0)
         room.items -= spent if fits else spent // 4  # counting costs less than formatting
-        return repr(value) if fits else _outline(value, room, depth)
+        return repr(masked(value)) if fits else _outline(value, room, depth)
     except Exception as error:  # noqa: BLE001  the user's code: show its failure instead
         return f"<{type(value).__name__}: its repr raised {type(error).__name__}>"
 
@@ -161,9 +161,13 @@ def _outline(value: Any, room: Room, depth: int) -> str:
         return f"<{kind.__name__} of {size} elements>"
     room.items -= size
     if named is not None:
-        return _joined(f"{kind.__qualname__}(", named, ")", room, depth)
+        plain = [(name, MASK if hides(name[:-1], part) else part) for name, part in named]
+        return _joined(f"{kind.__qualname__}(", plain, ")", room, depth)
     if kind.__repr__ is dict.__repr__:
-        pairs = ((f"{text_of(key, room, depth + 1)}: ", part) for key, part in value.items())
+        pairs = (
+            (f"{text_of(key, room, depth + 1)}: ", MASK if hides(key, part) else part)
+            for key, part in value.items()
+        )
         return _joined("{", pairs, "}", room, depth)
     return f"<{kind.__name__} of {size} elements>"
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 
 import pytest
 
 from smachpy.events import code
+from smachpy.userdata import secret
 
 
 @pytest.mark.parametrize(
@@ -27,3 +29,35 @@ def test_a_git_that_hangs_is_not_waited_for(tmp_path, monkeypatch, hangs_in, fou
     monkeypatch.setattr(code.subprocess, "run", run)
     assert code._git(tmp_path) == found
     assert set(limits) == {code.GIT_S}
+
+
+CONSTANTS = """
+LOW = 0.3
+NAMES = ("ann", "bob")
+WIFI_PASSWORD = "hunter2"
+TOKENS = ("hunter2", "x")
+PASSWORD_2 = "hunter2"
+DATABASE = "postgresql://ann:hunter2@host/db"
+CONNECTION = "host=db password=hunter2"
+DOOR_CODE = "hunter2"
+"""
+
+
+def test_no_constant_is_a_secret(tmp_path, monkeypatch):
+    """They stood in each recording of the program, where nobody looks for them."""
+    path = tmp_path / "secretive_constants.py"
+    path.write_text(CONSTANTS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(secret, "_named", {"door_code"})
+    secret.is_secret_name.cache_clear()
+    import secretive_constants
+
+    try:
+        found = code.own_constants({"secretive_constants": path})
+    finally:
+        del sys.modules[secretive_constants.__name__]
+        secret.is_secret_name.cache_clear()
+    assert found == {
+        "secretive_constants.LOW": "0.3",
+        "secretive_constants.NAMES": "('ann', 'bob')",
+    }

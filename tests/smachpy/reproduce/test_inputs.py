@@ -7,6 +7,7 @@ from collections import Counter
 
 import pytest
 
+import smachpy
 from actionlib_core import border
 from actionlib_core.clock import VirtualClock
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
@@ -143,6 +144,24 @@ def test_secrets_are_masked(mission, topic, tmp_path):
     assert "sesame" not in (tmp_path / "run.jsonl").read_text()
     assert recording.origin["userdata"]["place"] == "door"
     assert recording.origin["mission"]["inputs"]["password"] == "<secret>"
+
+
+def test_results_of_once_are_masked_by_their_name(mission, tmp_path):
+    sm = StateMachine(["done"], name="HUSH")
+    call = {"api_key": lambda: "sesame", "list": lambda: [{"token": "sesame"}], "door": lambda: 7}
+    states = [
+        CBState(lambda _, key=key: [smachpy.once(key, call[key]), "done"][1], outcomes=["done"])
+        for key in call
+    ]
+    with sm:
+        sm.add("A", states[0], {"done": "B"})
+        sm.add("B", states[1], {"done": "C"})
+        sm.add("C", states[2])
+    recording = recorded(mission, tmp_path, sm)
+    assert "sesame" not in (tmp_path / "run.jsonl").read_text()
+    found = {one["key"]: one for one in recording.inputs if one["what"] == "once"}
+    assert (found["api_key"]["value"], found["api_key"]["hidden"]) == ("<secret>", True)
+    assert found["door"]["value"] == 7
 
 
 def test_the_code_is_identified(mission, tmp_path):

@@ -254,7 +254,7 @@ def test_a_recording_that_ends_early_is_reproduced_up_to_there(night):
     found = reproduce(read_recording(path), allow=[path.parent])
     assert found.is_same, found.comparison
     assert found.comparison.total == 6
-    assert "the run is recorded up to 32.4 s" in found.notes
+    assert "the run is recorded up to 32.4 s, where the file is cut off" in found.notes
 
 
 def test_a_gap_ends_the_reproduction(night):
@@ -266,6 +266,116 @@ def test_a_gap_ends_the_reproduction(night):
     found = reproduce(read_recording(path), allow=[path.parent])
     assert found.is_same
     assert any("where 3 events are missing" in note for note in found.notes)
+
+
+def test_lines_that_are_lost_are_a_gap(night):
+    """The first difference was where the file had lost a line, as if the mission were another."""
+    _, path = night
+    lines = path.read_bytes().splitlines(keepends=True)
+    at = next(n for n, line in enumerate(lines) if b'"Left"' in line and b'"invalid"' in line)
+    path.write_bytes(b"".join(lines[:at] + lines[at + 1 :]))
+    recording = read_recording(path)
+    assert recording.dropped == 1
+    found = reproduce(recording, allow=[path.parent])
+    assert found.is_same
+    assert any("where 1 events are missing" in note for note in found.notes)
+
+
+def changed_header(path, **facts):
+    header, *rest = path.read_text().splitlines(keepends=True)
+    path.write_text(json.dumps(json.loads(header) | facts) + "\n" + "".join(rest))
+
+
+def changed_origin(path, **facts):
+    data = json.loads(path.read_text().partition("\n")[0])
+    changed_header(path, origin=data["origin"] | facts)
+
+
+def cut(path, size):
+    path.write_bytes(path.read_bytes()[:size])
+
+
+WRONG = [
+    (lambda path: changed_header(path, version=2, machine={"new": 1}), "of a newer smachpy"),
+    (lambda path: changed_header(path, origin=5), "line 1: got a wrong header ($.origin: got 5;"),
+    (lambda path: changed_origin(path, code=None), r"($.origin.code: got None; expected an object"),
+    (lambda path: changed_origin(path, code={"constants": {"a": 5}}), r"constants['a']: got 5;"),
+    (lambda path: changed_origin(path, code={"files": []}), "$.origin.code.files: got a list of 0"),
+    (lambda path: changed_origin(path, mission={"seed": "x"}), "$.origin.mission.seed: got 'x'"),
+    (lambda path: changed_origin(path, namespace="a b//"), "line 1: origin: invalid namespace"),
+    (lambda path: cut(path, 300), "line 1, which is cut off: got no header"),
+    (lambda path: cut(path, 0), "line 1: got an empty file"),
+    (lambda path: path.write_bytes(bytes(range(256)) * 9), "line 1: got no header"),
+    (
+        lambda path: path.write_text(path.read_text().replace('"/ROUND', '"/OTHER')),
+        "it is of the machine 'OTHER'; expected one of 'ROUND'",
+    ),
+    (
+        lambda path: path.write_text(path.read_text().replace('"path": "/ROUND', '"path": "/O', 1)),
+        "it is of the machine 'O' and 'ROUND'",
+    ),
+]
+
+
+@pytest.mark.parametrize(("harm", "said"), WRONG, ids=[said for _, said in WRONG])
+def test_what_is_wrong_with_a_recording_is_one_line(night, capsys, harm, said):
+    _, path = night
+    harm(path)
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}"]) == 2
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert lines[0].count(str(path)) == 1
+
+
+def test_a_recording_does_not_say_where_modules_are(night, tmp_path, capsys):
+    """With --allow night, the module of its own folder was run, whoever had sent both."""
+    _, path = night
+    evil = tmp_path / "evil"
+    evil.mkdir()
+    (evil / "nocturne.py").write_text(EVIL)
+    data = json.loads(path.read_text().partition("\n")[0])
+    facts = data["origin"]["mission"] | {"target": "nocturne:mission", "folder": str(evil)}
+    changed_origin(path, mission=facts)
+    assert main(["runs", "reproduce", str(path), "--allow", "nocturne"]) == 2
+    assert not (evil / "executed").exists()
+    assert str(evil) not in sys.path
+
+
+def test_no_test_is_written_of_a_mission_that_cannot_be_made(night, tmp_path, capsys):
+    _, path = night
+    data = json.loads(path.read_text().partition("\n")[0])
+    changed_origin(path, mission=data["origin"]["mission"] | {"words": ["--password=<secret>"]})
+    output = tmp_path / "test_it.py"
+    command = ["runs", "reproduce", str(path), f"--allow={path.parent}", "-o", str(output)]
+    assert main(command) == 2
+    assert "it was begun with a secret" in capsys.readouterr().err
+    changed_origin(path, mission=data["origin"]["mission"] | {"words": ["one", "too", "many"]})
+    assert main(command) == 2
+    assert "got 3 more than it takes" in capsys.readouterr().err
+    assert not output.exists()
+
+
+def test_secrets_of_a_recording_are_no_values(tmp_path):
+    """The mission was run with the password "<secret>"."""
+    seen = []
+
+    def look(userdata):
+        seen.append((userdata.password, smachpy.once("token", lambda: "mine")))
+        return "done"
+
+    def make():
+        sm = StateMachine(["done"], name="LOGIN", userdata={"password": "sesame"})
+        sm.add("GO", CBState(look, outcomes=["done"], input_keys=["password"]))
+        return sm
+
+    machine = make()
+    with mission_kit() as kit, Recorder(tmp_path / "run.jsonl", machine):
+        kit(machine)
+    found = reproduce(read_recording(tmp_path / "run.jsonl"), make=make)
+    assert found.is_same, lines_of(found)
+    assert seen == [("sesame", "mine")] * 2
+    assert any("once 'token': it has a secret" in note for note in found.notes)
 
 
 def test_older_recordings_say_what_they_lack(night, capsys):
@@ -503,5 +613,7 @@ def test_what_is_broken_in_the_inputs_is_left_out(night):
         for line in lines
     ]
     path.write_text("".join(broken))
-    found = reproduce(read_recording(path), allow=[path.parent])
+    recording = read_recording(path)
+    found = reproduce(recording, allow=[path.parent])
     assert found.comparison.total == 15
+    assert f"{len(recording.wrong)} record(s) are left out: {recording.wrong[0]}" in found.notes

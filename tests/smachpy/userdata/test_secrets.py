@@ -12,9 +12,12 @@ import re
 import subprocess
 import sys
 import traceback
+from collections import OrderedDict, UserDict, UserList, defaultdict, deque
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
+from typing import NamedTuple
 
 import pytest
 from rich.console import Console
@@ -28,8 +31,8 @@ from smachpy.command.targets import Target
 from smachpy.durable.store import open_store
 from smachpy.events import to_record
 from smachpy.network.values import value_text
-from smachpy.userdata.json_text import dumps
-from smachpy.userdata.secret import is_secret_name, masked, masked_words
+from smachpy.userdata.json_text import dumps, encoded
+from smachpy.userdata.secret import holds_secret, is_secret_name, masked, masked_words
 from smachpy.userdata.shown import Room, shown
 from smachpy_viz import TerminalView
 
@@ -107,10 +110,10 @@ def test_a_secret_is_a_text_that_shows_nothing():
     [
         *[
             (name, True)
-            for name in ("password", "wifi_password", "PASSWORD", "dbPassword", "token")
+            for name in ("password", "wifi_password", "PASSWORD", "dbPassword", "token", "token_2")
         ],
         *[(name, True) for name in ("accessToken", "api_key", "apiKey", "APIKey", "client-secret")],
-        *[(name, True) for name in ("private_key", "credentials", "passphrase", "pwd")],
+        *[(name, True) for name in ("private_key", "credentials", "passphrase", "pwd", "API_KEYS")],
         *[(name, False) for name in ("key", "password_file", "tokens_left", "secret_door", "pass")],
         *[
             (name, False)
@@ -144,6 +147,78 @@ def test_records_of_values_have_none():
     machine = StateMachine(["done"])
     machine.userdata.password = PASSWORD
     assert repr(machine.userdata) == "UserData(password='<secret>')"
+
+
+class Robot:
+    def __init__(self):
+        self.password = PASSWORD
+
+    def __repr__(self):
+        return f"Robot({self.password})"
+
+
+class Account(NamedTuple):
+    user: str
+    password: str
+
+
+HOLDERS = [
+    OrderedDict(password=PASSWORD),
+    defaultdict(str, token=PASSWORD),
+    UserDict(password=PASSWORD),
+    MappingProxyType({"password": PASSWORD}),
+    SimpleNamespace(password=PASSWORD),
+    Account("ann", PASSWORD),
+    {Account("ann", PASSWORD)},
+    frozenset({Account("ann", PASSWORD)}),
+    {Account("ann", PASSWORD): 1},
+    deque([{"password": PASSWORD}]),
+    UserList([{"password": PASSWORD}]),
+    {1: {"password": PASSWORD}},
+    {1: 2, "password": PASSWORD},
+    Robot(),
+    [Robot()],
+    reduce(lambda inside, _: [inside], range(30), {"password": PASSWORD}),
+    deque([{"password": PASSWORD}, *range(2000)]),
+]
+
+
+@pytest.mark.parametrize("value", HOLDERS, ids=range(len(HOLDERS)))
+def test_no_kind_of_value_shows_what_is_in_it(value):
+    """Recordings had the userdata in full, if that was a subclass of a dict, a named tuple, ..."""
+    for text in (
+        json.dumps(encoded(masked(value))),
+        dumps({"it": value}, longest=5_000),
+        json.dumps(shown(value, Room())),
+        repr(masked(value)),
+    ):
+        assert PASSWORD not in text
+
+
+def test_a_value_that_contains_itself_has_an_end():
+    value = {"password": PASSWORD, "list": []}
+    value["list"] += [value, value, value]
+    assert masked(value) == {"password": "<secret>", "list": ["...", "...", "..."]}
+
+
+@pytest.mark.parametrize(
+    ("text", "is_one"),
+    [
+        ("{user: ann, password: hunter2}", True),
+        ('{"api_key": "hunter2"}', True),
+        ("host=db password=hunter2", True),
+        ("https://host/?token=hunter2", True),
+        ("postgresql://ann:hunter2@host/db", True),
+        ("{user: ann, needs_token: true}", False),
+        ("password: @/a/file", False),
+        ("tcp://127.0.0.1:7447", False),
+        ("a key: to the door", False),
+        ("x" * 100_000, False),
+        ("a_" * 50_000 + ":", False),
+    ],
+)
+def test_texts_with_secrets_in_them(text, is_one):
+    assert holds_secret(text) is is_one
 
 
 @dataclass(frozen=True)
@@ -260,6 +335,66 @@ def test_a_secret_in_clear_is_refused_where_it_would_be_kept(folder, capfd, word
     assert "expected @FILE" in said
     assert PASSWORD not in said
     assert written(folder) == []
+
+
+INSIDE = """
+import smachpy
+
+
+def mission(login: dict, word: smachpy.Secret | None = None):
+    machine = smachpy.StateMachine(["done"], name="M")
+    machine.userdata.code = smachpy.Secret("")
+    machine.add("A", smachpy.CBState(lambda _: "done", outcomes=["done"]))
+    return machine
+"""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--", "{user: ann, password: hunter2}"],
+        ["--input", 'login={"user": "ann", "token": "hunter2"}'],
+        ["--input", "login={url: 'tcp://ann:hunter2@host'}"],
+        ["--input", "login={}", "--input", "word=hunter2"],
+        ["--input", "login={}", "--input", "code=hunter2"],
+    ],
+)
+def test_arguments_with_secrets_in_them_are_kept_nowhere(folder, capfd, caplog, words):
+    Path("inside.py").write_text(INSIDE)
+    assert main(["run", "inside.py", "--plain", "--record", "r.jsonl", *words]) == 0
+    assert PASSWORD not in Path("r.jsonl").read_text()
+    assert main(["runs", "reproduce", "r.jsonl", "--allow", "."]) == 2
+    assert "it was begun with a secret" in capfd.readouterr().out
+    assert main(["submit", "inside.py", "--db", "j.db", *words]) == 2
+    assert main(["run", "inside.py", "--plain", "--durable", "j.db", *words]) == 2
+    said = capfd.readouterr()
+    assert "journals and queues keep arguments" in said.err
+    assert PASSWORD not in said.out + said.err + caplog.text
+    assert written(folder) == []
+
+
+@pytest.mark.parametrize("pin", ["4711", 4711, ["4711"], {"day": 4711}])
+def test_any_value_that_its_name_calls_a_secret_is_refused_by_a_journal(folder, pin):
+    @smachpy.state(outcomes=["done"], output_keys=["found"])
+    def work(userdata):
+        userdata.found = {1: 2, "door_code": pin}
+        return "done"
+
+    @smachpy.state(outcomes=["done"])
+    def call(userdata):
+        smachpy.once("door_code", lambda: pin)
+        return "done"
+
+    @smachpy.mission(secrets=["Door_Code"])
+    def machine(state):
+        machine = StateMachine(["done"], name="M")
+        machine.add("A", state)
+        return machine
+
+    for name, state in (("found", work), ("once", call)):
+        with pytest.raises(smachpy.NotDurableError, match="its name says that it is a secret"):
+            smachpy.run_durable(machine(state), "j.db", mission=name)
+    assert [path for path in folder.glob("j.db*") if b"4711" in path.read_bytes()] == []
 
 
 def test_userdata_that_its_name_calls_a_secret_is_not_kept_in_clear(folder):

@@ -220,7 +220,7 @@ def test_data_of_topics_in_another_shape_is_left_out_with_a_warning(record, capl
     path = with_line(path, kind="Observed", **fields)
     recording = read_recording(path)
     assert [one["at"] for one in recording.observed] == [[1.0, 2.0, 0.0]]
-    assert "1 record(s) of topics are left out; the first: line 9" in caplog.text
+    assert "1 record(s) of topics or inputs are left out; the first: line 9" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,7 @@ def test_a_state_before_the_first_event_of_another_form_is_refused(record, chang
     header, *lines = path.read_text().splitlines(keepends=True)
     base = {**RunState().data, **change}
     path.write_text("".join([json.dumps({**json.loads(header), "base": base}) + "\n", *lines]))
-    with pytest.raises(RecordingError, match=r"line 1: got no header"):
+    with pytest.raises(RecordingError, match=r"line 1: got a wrong header"):
         read_recording(path)
 
 
