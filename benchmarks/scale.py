@@ -23,6 +23,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -429,6 +430,56 @@ def start_servers(count: int) -> dict[str, float]:
     return {"zenoh": alone, "start": started - begun, "stop": stopped - started}
 
 
+def of_action_states(sizes: Sequence[int]) -> dict[str, float]:
+    """CPU time of a concurrence of action states: from the preempt of all to the machine's end."""
+    costs = []
+    for size in sizes:
+        command = [sys.executable, __file__, "--states", str(size)]
+        runs = [subprocess.run(command, check=True, capture_output=True) for _ in range(3)]
+        costs.append(min(float(run.stdout) for run in runs))
+    return {
+        f"{sizes[-1]} action states: CPU s until told and ended": costs[-1],
+        "action states told and ended: slope": slope(sizes, costs),
+    }
+
+
+def preempt_states(count: int) -> float:
+    """Return the CPU time of preempting `count` action states of this process [s]."""
+    from actionlib_core import ActionServer
+    from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
+    from actionlib_core.wire.private_network import private_network
+
+    begun, left = threading.Event(), [count]
+
+    def on_goal(handle: Any) -> None:
+        handle.set_accepted()
+        left[0] -= 1
+        if not left[0]:
+            begun.set()
+
+    def on_cancel(handle: Any) -> None:
+        handle.set_canceled(TestResult(0))
+
+    outcomes = ["succeeded", "aborted", "preempted"]
+    machine = smachpy.Concurrence(outcomes=outcomes, default_outcome="succeeded")
+    with private_network():
+        server = ActionServer("scale", TestAction, on_goal, on_cancel, auto_start=False)
+        server.start()
+        for number in range(count):
+            machine.add(
+                f"C{number}", smachpy.SimpleActionState("scale", TestAction, goal=TestGoal(1))
+            )
+        run = threading.Thread(target=machine.execute)
+        run.start()
+        assert begun.wait(START_S)
+        before = time.process_time()
+        machine.request_preempt()
+        run.join()
+        took = time.process_time() - before
+        server.stop()
+    return took
+
+
 def of_dbos(place: str, missions: int) -> dict[str, float]:
     """Missions per second of a queue in one process: ours one by one, DBOS's workflows at once."""
     from dbos import DBOS
@@ -479,9 +530,13 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="larger sizes, and runners")
     parser.add_argument("--store", metavar="URL", help="an empty database for the queue")
     parser.add_argument("--servers", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--states", type=int, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.servers:
         print(json.dumps(start_servers(args.servers)))
+        return
+    if args.states:
+        print(preempt_states(args.states))
         return
     waiting = (100, 1_000, 10_000, 100_000) if args.long else (100, 1_000, 10_000)
     finished = (10, 1_000, 10_000, 100_000) if args.long else (10, 1_000, 10_000)
@@ -504,6 +559,7 @@ def main() -> None:
             found |= of_starts(folder, 10 if args.long else 4)
             found |= of_servers(1_000 if args.long else 400)
             if args.long:
+                found |= of_action_states((300, 1_000, 3_000))
                 found |= of_runners(str(folder / "runners.db"), folder, (1, 2, 4, 8), 50)
     if args.json:
         print(json.dumps({"figures": found}))

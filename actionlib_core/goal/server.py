@@ -186,13 +186,16 @@ class ServerGoals:
         Returns:
             The goals that this cancel asks to stop and that were not asked before.
         """
-        everything = not goal_id and not stamp_ns
-        asked = [
-            goal
-            for goal in self.tracked.values()
-            if (everything or goal.id == goal_id or 0 < goal.stamp_ns <= stamp_ns)
-            and self.request_cancel(goal)
-        ]
+        if goal_id and not stamp_ns:  # the usual one: no walk over all, which a thousand may send
+            named = self.tracked.get(goal_id)
+            meant = [] if named is None else [named]
+        else:
+            meant = [
+                goal
+                for goal in self.tracked.values()
+                if goal.id == goal_id or not stamp_ns or 0 < goal.stamp_ns <= stamp_ns
+            ]
+        asked = [goal for goal in meant if self.request_cancel(goal)]
         if goal_id and goal_id not in self.tracked and goal_id not in self._past:
             self.tracked[goal_id] = ServerGoal(
                 goal_id, 0, Status.RECALLING, arrived=False, listed_until=now + LISTED_S

@@ -53,6 +53,24 @@ def test_cancel_asks_each_goal_once_and_no_ended_one():
     assert goals.on_cancel("", 0, 0.0) == []
 
 
+def test_a_cancel_by_id_walks_over_no_other_goal():
+    class Walked(dict):
+        walks = 0
+
+        def values(self):
+            Walked.walks += 1
+            return super().values()
+
+    goals = book(*((f"g{n}", n + 1) for n in range(100)))
+    goals.tracked = Walked(goals.tracked)
+    for n in range(100):
+        assert [goal.id for goal in goals.on_cancel(f"g{n}", 0, 0.0)] == [f"g{n}"]
+    assert goals.on_cancel("nobody", 0, 0.0) == []
+    assert Walked.walks == 0
+    goals.on_cancel("", 0, 0.0)
+    assert Walked.walks == 1
+
+
 def test_cancel_before_goal_recalls_it_and_lists_it_meanwhile():
     goals = book()
     assert goals.on_cancel("late", 0, 0.0) == []
