@@ -11,7 +11,6 @@ import sys
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.machinery import PathFinder
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NoReturn
 
@@ -170,6 +169,8 @@ def registered() -> dict[str, Callable[[], Any]]:
 
 @cache
 def _points() -> tuple[Any, ...]:
+    from importlib.metadata import entry_points
+
     return tuple(entry_points(group=GROUP))  # it reads a file of each installed package
 
 
@@ -183,6 +184,10 @@ def make_registered(name: str, arguments: Mapping[str, Any], place: Naming) -> S
     Raises:
         MissionError: there is none of this name, or an argument is wrong.
     """
+    from smachpy.states.by_name import BY_NAME
+
+    if name in BY_NAME:  # without a look at the installed packages
+        return _called(BY_NAME[name], name, arguments, place)
     known = registered()
     if name not in known:
         text = unknown_name("state", name, sorted(known))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.pubsub.topic import Subscriber
 from smachpy.base.problems import Problems
 from smachpy.engine.frame import clock_of_run
 from smachpy.engine.preempt import on_preempt
@@ -52,6 +51,8 @@ class AwaitMessage(State):
         """
         del userdata
         came: list[bool] = []
+        from actionlib_core.pubsub.topic import Subscriber
+
         wake = clock_of_run().event(f"a message on {self.__topic}")
 
         def on_message(message: Any) -> None:
