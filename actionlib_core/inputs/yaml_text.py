@@ -18,17 +18,22 @@ MAX_YAML_LENGTH: Final = 1_000_000
 MAX_YAML_NESTING: Final = 200
 """Most levels of brackets; with more, the parser takes seconds and runs out of stack."""
 
+MAX_YAML_NUMBER: Final = 1000
+"""Longest whole number [characters]: Python cannot write those of more than 4300 digits."""
+
 
 class YamlTextError(ValueError):
     """A text is not YAML, or is refused.
 
     Attributes:
         line: Number of the line, from 1; 0: unknown.
+        column: Number of the column, from 1; 0: unknown.
         reason: The reason, on one line.
     """
 
-    def __init__(self, reason: str, line: int = 0) -> None:
+    def __init__(self, reason: str, line: int = 0, column: int = 0) -> None:
         self.line = line
+        self.column = column
         self.reason = " ".join(reason.split())
         super().__init__(f"line {line}: {self.reason}" if line else self.reason)
 
@@ -64,6 +69,7 @@ def load_with_marks(text: str) -> tuple[object, dict[str, tuple[int, int]]]:
     """
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError
+    from ruamel.yaml.reader import ReaderError
 
     if len(text) > MAX_YAML_LENGTH:
         raise YamlTextError(f"got {len(text):,} characters; expected at most {MAX_YAML_LENGTH:,}")
@@ -78,14 +84,18 @@ def load_with_marks(text: str) -> tuple[object, dict[str, tuple[int, int]]]:
         # counted before the values are made: merged keys (`<<`) multiply while that is done.
         if "*" in text and "&" in text:
             _count_values(root, {})
+        _check_numbers(root, set())
         data: object = yaml.constructor.construct_document(root)
         return data, dict(_marks(yaml.constructor, root, ""))
     except YamlTextError:
         raise
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        line = int(mark.line) + 1 if mark is not None else 0
-        raise YamlTextError(str(error.problem or error.context), line) from error
+        place = (0, 0) if mark is None else (int(mark.line) + 1, int(mark.column) + 1)
+        raise YamlTextError(str(error.problem or error.context), *place) from error
+    except ReaderError as error:  # a control character
+        problem = f"the character {chr(error.character)!r} is not allowed"
+        raise YamlTextError(problem, *_place_in(text, error.position)) from error
     except RecursionError as error:
         raise YamlTextError("it is nested too deeply") from error
     except Exception as error:  # ruamel.yaml: any exception, for a value that does not fit its tag
@@ -94,10 +104,39 @@ def load_with_marks(text: str) -> tuple[object, dict[str, tuple[int, int]]]:
 
 def _check_depth(text: str) -> None:
     depth = 0
-    for bracket in re.findall(r"[\[\]{}]", text):
-        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+    for bracket in re.finditer(r"[\[\]{}]", text):
+        depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)
         if depth > MAX_YAML_NESTING:
-            raise YamlTextError(f"it is nested too deeply: more than {MAX_YAML_NESTING} brackets")
+            raise YamlTextError(
+                f"it is nested too deeply: more than {MAX_YAML_NESTING} brackets",
+                *_place_in(text, bracket.start()),
+            )
+
+
+def _place_in(text: str, position: int) -> tuple[int, int]:
+    """Return line and column of a position, all but the position from 1."""
+    return text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
+
+
+def _check_numbers(node: Any, known: set[int]) -> None:
+    """Refuse whole numbers that cannot be written again.
+
+    Args:
+        node: A node of ruamel.yaml.
+        known: Ids of the nodes that were looked at: aliases lead to one of them again.
+
+    Raises:
+        YamlTextError: there is one.
+    """
+    if node.id == "scalar":
+        if len(node.value) > MAX_YAML_NUMBER and node.tag.endswith(":int"):
+            got = f"a number of {len(node.value):,} characters"
+            raise YamlTextError(f"got {got}; expected {MAX_YAML_NUMBER} at most", *_place(node))
+    elif id(node) not in known:
+        known.add(id(node))
+        parts = node.value if node.id == "sequence" else chain.from_iterable(node.value)
+        for part in parts:
+            _check_numbers(part, known)
 
 
 def _count_values(node: Any, known: dict[int, int]) -> int:
@@ -112,7 +151,7 @@ def _count_values(node: Any, known: dict[int, int]) -> int:
     """
     count = known.get(id(node))
     if count == 0:
-        raise YamlTextError("a value contains itself", int(node.start_mark.line) + 1)
+        raise YamlTextError("a value contains itself", *_place(node))
     if count is None:
         known[id(node)] = 0
         parts = node.value if node.id in {"mapping", "sequence"} else ()
@@ -120,7 +159,8 @@ def _count_values(node: Any, known: dict[int, int]) -> int:
         count = 1 + sum(_count_values(part, known) for part in pairs)
         known[id(node)] = count
     if count > MAX_YAML_PARTS:
-        raise YamlTextError(f"its aliases stand for more than {MAX_YAML_PARTS} values")
+        problem = f"its aliases stand for more than {MAX_YAML_PARTS} values"
+        raise YamlTextError(problem, *_place(node))
     return count
 
 

@@ -206,6 +206,7 @@ class _Reader:
         try:
             data, marks = load_with_marks(text)
         except YamlTextError as error:
+            self._columns[""] = max(1, error.column)
             file.report("", f"not YAML: {error.reason}.", error.line)
             return None, {}
         self._columns = {path: column for path, (_, column) in marks.items()}

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.inputs.checked_file import read_limited
+from actionlib_core.inputs.yaml_text import MAX_YAML_LENGTH, load_yaml
 from smachpy.exceptions import MissionError
 from smachpy.files.reading import ItemsOf, StopOthers
 from smachpy.files.reference import Origin
@@ -50,7 +53,8 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
         path: Where to write it; None only returns the text.
 
     Raises:
-        NotWrittenError: some parts cannot be written; all at once, nothing was written.
+        NotWrittenError: some parts cannot be written, or another file is there; all at once,
+            nothing was written.
         OSError: the file cannot be written.
     """
     from ruamel.yaml import YAML
@@ -63,10 +67,8 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
         raise NotWrittenError(writer.problems)
     yaml = YAML()
     yaml.width = 120
-    old: Any = None
-    if path is not None and Path(path).is_file():
-        old = yaml.load(Path(path).read_text(encoding="utf-8"))
-    if isinstance(old, dict):
+    old: Any = None if path is None else _there(Path(path), yaml)
+    if old:
         for key in ("smachpy", "help", "parameters"):
             if key in old:
                 data = {**data, key: old[key]}
@@ -76,8 +78,36 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
     yaml.dump(data, stream)
     text = stream.getvalue()
     if path is not None:
-        Path(path).write_text(text, encoding="utf-8")
+        whole = Path(path).resolve()
+        part = whole.with_name(f".{whole.name}.{os.getpid()}")
+        try:  # a full disk must not leave a half of what was there
+            part.write_text(text, encoding="utf-8")
+            part.replace(whole)
+        finally:
+            part.unlink(missing_ok=True)
     return text
+
+
+def _there(path: Path, yaml: Any) -> Any:
+    """Return the content of the file that is there, with its comments; None if there is none.
+
+    Raises:
+        NotWrittenError: it is no mission file.
+        OSError: it cannot be read.
+    """
+    if not path.exists():
+        return None
+    try:
+        text = read_limited(path, MAX_YAML_LENGTH).decode("utf-8-sig")
+        data = load_yaml(text)
+    except ValueError as error:
+        data, problem = None, f"not YAML: {error}"
+    else:
+        problem = "no mission"
+        if data is None or (isinstance(data, dict) and "states" in data):
+            return yaml.load(text)
+    expected = "expected a mission file or none. Try another name."
+    raise NotWrittenError([f"{path}: the file that is there is {problem}; {expected}"])
 
 
 def _merge(old: Any, new: Mapping[str, Any]) -> None:

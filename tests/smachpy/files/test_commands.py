@@ -85,3 +85,31 @@ def test_export_writes_a_file_and_says_what_it_cannot(folder, capsys):
     assert main(["export", "patrol", "-o", "patrol.yaml"]) == 2
     assert "/PATROL/ROUND" in capsys.readouterr().err
     assert not (folder / "patrol.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"a: [b\n c: {", "not YAML: line 2"),
+        (b"\xff\xfe", "not YAML: "),
+        (b"- 1\n", "no mission"),
+        (b"network: {mode: peer}\n", "no mission"),
+        (b"a: !!python/object/apply:os.system [ls]", "not YAML: line 1"),
+    ],
+)
+def test_export_leaves_a_file_that_is_no_mission_as_it_is(folder, capsys, content, problem):
+    (folder / "rounds.yaml").write_text(GOOD)
+    (folder / "other.yaml").write_bytes(content)
+    assert main(["export", "rounds.yaml", "-o", "other.yaml"]) == 2
+    assert f"other.yaml: the file that is there is {problem}" in capsys.readouterr().err
+    assert (folder / "other.yaml").read_bytes() == content
+    assert sorted(path.name for path in folder.iterdir()) == ["other.yaml", "rounds.yaml"]
+
+
+def test_export_writes_through_a_link_and_into_an_empty_file(folder):
+    (folder / "rounds.yaml").write_text(GOOD)
+    (folder / "real.yaml").touch()
+    (folder / "link.yaml").symlink_to("real.yaml")
+    assert main(["export", "rounds.yaml", "-o", "link.yaml"]) == 0
+    assert (folder / "link.yaml").is_symlink()
+    assert load(folder / "real.yaml").name == "ROUNDS"

@@ -438,6 +438,23 @@ def test_hostile_texts_are_refused(file, tmp_path, text):
     assert not (tmp_path / "evil").exists()
 
 
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("name: X\noutcomes: [a\x00]\n", "2:13: not YAML: the character '\\x00' is not allowed."),
+        ("name: X\nstates:\n  A: 1\n  A: 2\n", "4:3: not YAML: found duplicate key"),
+        ("name: X\nn: " + "9" * 5000, "2:4: not YAML: got a number of 5,000 characters"),
+        ("name: X\nn: 0x" + "f" * 5000, "2:4: not YAML: got a number of 5,002 characters"),
+        ("name: X\nn: " + "[" * 300, "2:204: not YAML: it is nested too deeply"),
+        ("name: X\na: &a [*a]", "2:4: not YAML: a value contains itself"),
+        ("name: X\na: !x 1", "2:4: not YAML: could not determine a constructor"),
+    ],
+)
+def test_what_is_no_yaml_has_its_place(file, text, problem):
+    (found,) = problems_of(file(text))
+    assert found.startswith(problem)
+
+
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(MissionFileError, match="No such file"):
         load(tmp_path / "none.yaml")
