@@ -72,7 +72,7 @@ def _run(frame: Frame, parent_ud: Any) -> str:
         frame.first.innermost = frame
         with FLAGS:  # a request comes either before this, or to this run
             live.frame = frame
-            live.runs += 1
+            live.runs += live.root is None  # a root has counted its run already
         if live.listeners or live.buffers:
             run.watched = True
         # A durable run that goes on inside this container has its userdata from the journal.

@@ -151,6 +151,10 @@ class Run:
         if published is not None:
             published.set()
 
+    def is_publishing(self) -> bool:
+        """Return whether this thread is in a listener that `flush` has called."""
+        return self._publisher == threading.get_ident()
+
     def flush_soon(self) -> None:
         """Flush in a new thread, so that no timer waits for a listener or a logger."""
         if not self.pending:

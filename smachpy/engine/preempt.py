@@ -598,6 +598,9 @@ def request(
             # children has begun them meanwhile.
             if live.is_passing_on or now is None or not frame.run is now.run is wanted:
                 return None
+            # A listener that answers each request with a further one would never come to an end.
+            if container._preempt_requested and wanted.is_publishing():
+                return None
             frame = now
             if frame.run.journal.asked(frame, origin):
                 return None

@@ -397,6 +397,9 @@ class _Reader:
             first = section.text("initial", REQUIRED, tuple(states))
             if section.is_good("initial", "states"):
                 made._smachpy.initial = first
+        self._fill_cleanup(section, made)
+
+    def _fill_cleanup(self, section: Section, made: Any) -> None:
         cleanup = section.section("cleanup")
         labels = list(cleanup)
         if len(labels) > 1:
@@ -433,6 +436,7 @@ class _Reader:
             made,
             state,
         )
+        self._fill_cleanup(section, made)
 
     def _add(self, entry: Section, made: Any, label: str) -> None:
         around = ["on", "remapping", "constants"]

@@ -90,6 +90,7 @@ def schema() -> dict[str, Any]:
                 "break_outcomes": TEXTS,
                 "final_outcomes": names,
                 "each": states | {"minProperties": 1, "maxProperties": 1},
+                "cleanup": states | {"maxProperties": 1},
             },
             ["outcomes", "each"],
         ),

@@ -154,7 +154,7 @@ class _Writer:
             }
         found |= self._options(container, path)
         if isinstance(container, Iterator):
-            return found | self._iterator(container, path)
+            return found | self._iterator(container, path) | self._cleanup(container, path)
         if isinstance(container, Concurrence):
             found |= self._policy(container, path)
         if isinstance(container, Sequence):
@@ -171,11 +171,14 @@ class _Writer:
             label: self._entry(container, label, state, f"{path}/{label}")
             for label, state in others.items()
         }
-        if data.cleanup:
-            state = data.children[data.cleanup]
-            entry = self._entry(container, data.cleanup, state, f"{path}/{data.cleanup}")
-            found["cleanup"] = {data.cleanup: entry}
-        return found
+        return found | self._cleanup(container, path)
+
+    def _cleanup(self, container: Container, path: str) -> dict[str, Any]:
+        label = container._smachpy.cleanup
+        if not label:
+            return {}
+        state = container._smachpy.children[label]
+        return {"cleanup": {label: self._entry(container, label, state, f"{path}/{label}")}}
 
     def _entry(self, parent: Container, label: str, state: State, path: str) -> dict[str, Any]:
         data: Any = parent._smachpy
@@ -323,7 +326,7 @@ class _Writer:
                 found[key] = list(getattr(data, key))
         if data.final_outcome_map:
             found["final_outcomes"] = dict(data.final_outcome_map)
-        ((label, state),) = data.children.items()
+        ((label, state),) = data.others().items()
         return {**found, "each": {label: self._entry(container, label, state, f"{path}/{label}")}}
 
     def _plain(self, value: Any, where: str) -> Any:

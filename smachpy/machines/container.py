@@ -24,7 +24,7 @@ from smachpy.exceptions import (
     error_text,
 )
 from smachpy.machines.callbacks import Callbacks
-from smachpy.machines.construction import Openable
+from smachpy.machines.construction import Openable, construction_method
 from smachpy.machines.old_states import as_state
 from smachpy.machines.state import DataOf, Shown, State
 from smachpy.userdata.typed_keys import key_problems
@@ -141,6 +141,46 @@ class Container(Openable, Callbacks, State):
     def get_children(self) -> dict[str, State]:
         """Return label -> child, in the order in which they were added."""
         return self._smachpy.children
+
+    @construction_method
+    def add_cleanup(
+        self: Container, label: str, state: State, remapping: Mapping[str, str] | None = None
+    ) -> State:
+        """Add a state or machine that runs at every end of this container, once.
+
+        It runs after success and failure, an exception, a timeout, a preempt, and a shutdown by the
+        first Ctrl-C, before the container ends as it would without it. A request to stop that
+        comes while it runs gives it its `preempt_timeout` to finish, and asks it only then.
+        `smachpy.current_ending()` tells it how the container ends. See docs/cleanup.md.
+
+        Args:
+            label: Its name here; unique.
+            state: The state.
+            remapping: Key of the state -> key of this container's userdata.
+
+        Returns:
+            The state.
+
+        Raises:
+            InvalidStateError: there is a clean-up already, the label is taken, or an argument has a
+                wrong form.
+            InvalidConstructionError: called on the class while no such container is open, or it
+                runs.
+        """
+        data, problems = self._smachpy, Problems(str(label))
+        if data.live.frame is not None:
+            raise InvalidConstructionError(
+                f"{label}: add_cleanup: got a new clean-up while it runs; expected it before or "
+                "after."
+            )
+        if data.cleanup:
+            problems.add(
+                f"clean-up: got a second one, beside {data.cleanup!r}; expected one. Try a "
+                "Sequence of both."
+            )
+        stored = self._smachpy_store_child(label, state, remapping, problems)
+        data.cleanup = plain(label)
+        return stored
 
     def set_initial_state(
         self, initial_states: Sequence[str], userdata: UserData | None = None
@@ -301,25 +341,6 @@ class Container(Openable, Callbacks, State):
         self._smachpy_exchange(label, state)
         self._smachpy.remappings[label] = names
         return state
-
-    def _smachpy_add_cleanup(
-        self, label: str, state: State, remapping: Mapping[str, str] | None
-    ) -> State:
-        """Add the child that runs at every end of the others."""
-        data, problems = self._smachpy, Problems(str(label))
-        if data.live.frame is not None:
-            raise InvalidConstructionError(
-                f"{label}: add_cleanup: got a new clean-up while it runs; expected it before or "
-                "after."
-            )
-        if data.cleanup:
-            problems.add(
-                f"clean-up: got a second one, beside {data.cleanup!r}; expected one. Try a "
-                "Sequence of both."
-            )
-        stored = self._smachpy_store_child(label, state, remapping, problems)
-        data.cleanup = plain(label)
-        return stored
 
     def _smachpy_exchange(self, label: str, state: State) -> None:
         """Set a child, or replace it between two runs, by a test double for instance."""

@@ -158,15 +158,17 @@ class Iterator(Container):
         breaks = problems.names("break_outcomes", break_outcomes)
         final = problems.names_of("final_outcome_map", final_outcome_map, "outcome -> outcome")
         # A new child replaces the old one, which stays if the new one is refused.
-        before = self._smachpy.children, self._smachpy.remappings
-        self._smachpy.children, self._smachpy.remappings = {}, {}
+        data = self._smachpy
+        before, old = (data.children, data.remappings), data.others()
+        data.children = {name: each for name, each in data.children.items() if name not in old}
+        data.remappings = {name: data.remappings[name] for name in data.children}
         try:
             self._smachpy_store_child(label, state, remapping, problems)
         except InvalidStateError:
-            self._smachpy.children, self._smachpy.remappings = before
+            data.children, data.remappings = before
             raise
-        self._smachpy.loop_outcomes, self._smachpy.break_outcomes = loop, breaks
-        self._smachpy.final_outcome_map = final
+        data.loop_outcomes, data.break_outcomes = loop, breaks
+        data.final_outcome_map = final
         return state
 
     def __set_items(self, it: Any, it_label: Any, problems: Problems) -> None:
@@ -184,19 +186,22 @@ class Iterator(Container):
             return frozenset(data.break_outcomes)
         if not data.loop_outcomes:
             return frozenset()
-        outcomes = (o for state in data.children.values() for o in state._smachpy.outcomes)
+        outcomes = (o for state in data.others().values() for o in state._smachpy.outcomes)
         return frozenset(outcomes).difference(data.loop_outcomes)
 
     def get_active_states(self) -> list[str]:
         """Return the child's label while the iterator runs."""
-        return list(self._smachpy.children) if self._smachpy.live.frame is not None else []
+        frame = self._smachpy.live.frame
+        if frame is None:
+            return []
+        return list(self._smachpy.others()) if frame.tidying is None else [self._smachpy.cleanup]
 
     def find_problems(self, where: str) -> tuple[str, ...]:
         """Return the problems of this iterator itself."""
         data, problems = self._smachpy, []
-        if not data.children:
+        if not data.others():
             return (f"{where}: contained state: got none; expected one. Try set_contained_state.",)
-        ((label, state),) = data.children.items()
+        ((label, state),) = data.others().items()
         outcomes, final = state._smachpy.outcomes, data.final_outcome_map
         # Without `break_outcomes`, all that is no loop outcome breaks; 'preempted' needs no way on.
         breaks = data.break_outcomes or tuple(
@@ -225,9 +230,9 @@ class Iterator(Container):
         from smachpy.events.introspection import RuleRecord, TransitionRecord
 
         structure, data = super().describe_structure(), self._smachpy
-        if not data.children:
+        if not data.others():
             return structure
-        ((label, state),) = data.children.items()
+        ((label, state),) = data.others().items()
         breaks, final = self.__breaks(), data.final_outcome_map
         edges = tuple(
             TransitionRecord(

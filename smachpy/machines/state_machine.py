@@ -172,33 +172,6 @@ class StateMachine(Container):
         self.__connect(label, connectors)
         return state
 
-    @construction_method
-    def add_cleanup(
-        self: StateMachine, label: str, state: State, remapping: Mapping[str, str] | None = None
-    ) -> State:
-        """Add a state or machine that runs at every end of this container, once.
-
-        It runs after success and failure, an exception, a timeout, a preempt, and a shutdown by the
-        first Ctrl-C, before the container ends as it would without it. A request to stop that
-        comes while it runs gives it its `preempt_timeout` to finish, and asks it only then.
-        `smachpy.current_ending()` tells it how the container ends. See docs/cleanup.md.
-
-        Args:
-            label: Its name here; unique.
-            state: The state.
-            remapping: Key of the state -> key of this container's userdata.
-
-        Returns:
-            The state.
-
-        Raises:
-            InvalidStateError: there is a clean-up already, the label is taken, or an argument has a
-                wrong form.
-            InvalidConstructionError: called on the class while no such container is open, or it
-                runs.
-        """
-        return self._smachpy_add_cleanup(label, state, remapping)
-
     def __connect(self, label: str, connectors: Iterable[str]) -> None:
         """Let the outcomes of a child that have no transition lead to the child added next."""
         given = self._smachpy.transitions[label]

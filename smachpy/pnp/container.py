@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from smachpy.base.problems import Problems
 from smachpy.engine.described import ContainerData
-from smachpy.engine.step import make_step
+from smachpy.engine.step import Plan as CompiledChildren
 from smachpy.events.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.exceptions import InvalidStateError, did_you_mean
 from smachpy.machines.container import Container, below
@@ -71,16 +71,14 @@ class PlanData(ContainerData):
         return {name: label for label, name in self.names.items()}
 
 
-class _Compiled:
+class _Compiled(CompiledChildren):
     """A plan, compiled: its children, and the table of its firings."""
 
-    __slots__ = ("epoch", "steps", "table", "userdata")
+    __slots__ = ("table",)
 
     def __init__(self, machine: PetriNetPlan) -> None:
+        super().__init__(machine)
         data = machine._smachpy
-        self.epoch = 0
-        self.userdata = machine.userdata
-        self.steps = {label: make_step(machine, label) for label in data.children}
         for step in self.steps.values():
             # A child's outcome leads nowhere by itself: the net decides what follows.
             step.end_always()
@@ -90,10 +88,6 @@ class _Compiled:
             {label: step.state._smachpy.outcomes for label, step in self.steps.items()},
             lambda name: data.knowledge.source_of(name) is not None,
         )
-
-    # See `smachpy.machines.container`: a changed child makes the plan compile again.
-    def is_stale(self) -> bool:
-        return any(step.is_stale() for step in self.steps.values())
 
 
 class _WatchedValues(dict[str, Any]):
@@ -387,7 +381,7 @@ class PetriNetPlan(Container):
     def __shared_states(self, where: str) -> Iterator[str]:
         # Actions run at the same time, and a state object has only one run at a time.
         label_of: dict[int, str] = {}
-        for label, child in self._smachpy.children.items():
+        for label, child in self._smachpy.others().items():
             for state in {id(state): state for state in below(child)}.values():
                 other = label_of.setdefault(id(state), label)
                 if other != label:
@@ -398,15 +392,10 @@ class PetriNetPlan(Container):
 
     def describe_structure(self) -> Structure:
         """Return the children and the net."""
-        children = tuple(
-            (label, state, tuple(self._smachpy.remappings[label].items()))
-            for label, state in self._smachpy.children.items()
-        )
         details = (
             (("strict", "an end waits for its action"),) if self._smachpy.net_plan.strict else ()
         )
-        success = self._smachpy.options.success
-        return Structure(children, net=self.__net_record(), details=details, success=success)
+        return replace(super().describe_structure(), net=self.__net_record(), details=details)
 
     def __net_record(self) -> NetRecord:
         plan: Plan = self._smachpy.net_plan
@@ -448,9 +437,6 @@ class PetriNetPlan(Container):
             return execution.run()
         finally:
             data.execution = None
-
-    def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  of any container
-        return list(self._smachpy.children)
 
     def marking(self) -> dict[str, int]:
         """Return id of a place -> its tokens, for places that hold some; if idle, at the start.

@@ -141,6 +141,8 @@ class _NetWriter:
         """Add a state that begins at a place; return outcome -> place of this end."""
         # A subclass that overrides `execute` may do anything: it is an action, not opened.
         if type(state).execute is Container.execute and "execute" not in vars(state):
+            if isinstance(state, (Concurrence, StateMachine)):
+                self._refuse_what_nets_lack(record)
             if isinstance(state, Concurrence):
                 if stop is not None:
                     self._problems.add(
@@ -151,6 +153,18 @@ class _NetWriter:
             if isinstance(state, StateMachine):
                 return self._machine(state, record, begin, stop)
         return self._action(state, record, begin, stop)
+
+    def _refuse_what_nets_lack(self, record: StateRecord) -> None:
+        if record.cleanup:
+            self._problems.add(
+                f"{record.path}: clean-up: got {record.cleanup!r}; expected none, as a net runs "
+                "nothing at every end. Try a clean-up of the plan that the net becomes."
+            )
+        for guard in dict.fromkeys(edge.guard for edge in record.transitions if edge.guard):
+            self._problems.add(
+                f"{record.path}: condition: got {guard!r}; expected transitions without "
+                "conditions. Try a state that has an outcome for each case."
+            )
 
     def _action(
         self, state: State, record: StateRecord, begin: str, stop: StopPlaces | None

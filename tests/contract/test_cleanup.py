@@ -18,12 +18,15 @@ from smachpy import (
     InvalidConstructionError,
     InvalidStateError,
     InvalidUserCodeError,
+    Iterator,
     Sequence,
     State,
     StateMachine,
 )
 from smachpy.checks import after_any_end, check
+from smachpy.pnp import PetriNetPlan
 from smachpy.testing import explore, mission_kit
+from tests.smachpy.pnp.nets import net_of
 
 
 class Step(State):
@@ -241,6 +244,86 @@ def test_that_of_a_concurrence_runs_after_all_branches():
     with mission_kit() as mission:
         run = mission(cc)
     assert (run.outcome, run.duration, run.path[-1]) == ("done", 4.0, "/C/STOP")
+
+
+def iterator_of(state: State, cleanup: State) -> Iterator:
+    it = Iterator(["done", "preempted"], [], [], range(3), "item", "done", name="I")
+    with it:
+        Iterator.set_contained_state("EACH", state)
+        Iterator.add_cleanup("STOP", cleanup)
+    return it
+
+
+def plan_of(state: State, cleanup: State) -> PetriNetPlan:
+    net = """
+        init* -> WORK.exec : WORK.start
+        WORK.exec -> goal : WORK.end
+    """
+    plan = PetriNetPlan(net_of(net), {"WORK": state}, name="P")
+    plan.add_cleanup("STOP", cleanup)
+    return plan
+
+
+def test_that_of_an_iterator_runs_after_the_last_item():
+    it = iterator_of(Step(1.0), Dock())
+    with mission_kit() as mission:
+        run = mission(it)
+    assert (run.outcome, run.duration) == ("done", 4.0)
+    assert (run.visits("EACH"), run.visits("STOP")) == (3, 1)
+    assert it["STOP"].endings == [Ending("done", "", preempted=False)]
+
+
+def test_another_child_of_an_iterator_leaves_its_clean_up():
+    it = iterator_of(Step(), Dock())
+    it.set_contained_state("OTHER", Step())
+    with pytest.raises(InvalidStateError):
+        it.set_contained_state("STOP", Step())
+    with mission_kit() as mission:
+        run = mission(it)
+    assert (run.visits("OTHER"), run.visits("STOP")) == (3, 1)
+
+
+def test_an_iterator_needs_another_state():
+    it = Iterator(["done"], [], [], range(3), "item", "done", name="I")
+    it.add_cleanup("STOP", Dock())
+    with pytest.raises(smachpy.InconsistentMachineError, match="contained state: got none"):
+        it.execute()
+
+
+def test_that_of_a_plan_runs_after_its_goal():
+    dock = Dock()
+    with mission_kit() as mission:
+        run = mission(plan_of(Step(2.0), dock))
+    assert (run.outcome, run.duration, run.path) == ("goal", 3.0, ("/P/WORK", "/P/STOP"))
+    assert dock.endings == [Ending("goal", "", preempted=False)]
+
+
+@pytest.mark.parametrize("make", [iterator_of, plan_of])
+def test_those_run_once_and_the_same_at_every_end(make):
+    found = explore(
+        lambda: make(Step(), Dock()),
+        preempts=2,
+        grace=60.0,
+        invariants=[lambda run: run.visits("STOP") == 1],
+    )
+    found.assert_ok()
+    assert found.exhaustive
+
+
+@pytest.mark.parametrize("make", [iterator_of, plan_of])
+def test_those_go_on_after_a_kill(make):
+    found = explore(lambda: make(Step(), Dock()), preempts=1, faults=["kill"])
+    found.assert_ok()
+    assert found.exhaustive
+
+
+@pytest.mark.parametrize("make", [iterator_of, plan_of])
+def test_those_are_drawn_and_proved(make):
+    machine = make(Step(), Dock())
+    assert smachpy.describe(machine).cleanup == "STOP"
+    assert "STOP" in machine._repr_svg_()
+    report = check(machine, properties=[after_any_end("STOP")])
+    assert not [problem for problem in report.problems if problem.rule == "property"]
 
 
 def test_inner_clean_ups_run_first():

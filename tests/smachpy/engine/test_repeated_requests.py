@@ -9,7 +9,7 @@ import pytest
 
 import smachpy
 from smachpy import Concurrence, State, StateMachine
-from smachpy.events import Abandoned, Left
+from smachpy.events import Abandoned, Left, PreemptRequested
 from smachpy.states import Wait
 
 ENDS = ["done", "parked", "aborted", "preempted"]
@@ -236,3 +236,29 @@ def test_an_operator_may_stop_the_tidy_up_that_a_concurrence_began(clock):
     clock.call_later(6.0, lambda: both.control.preempt("/C/M"))
     both.execute()
     assert clock.now() == 6.0
+
+
+def test_a_listener_that_asks_again_at_each_request_comes_to_an_end(clock):
+    """Its own request was published to it, so that it asked again until the stack was full."""
+    machine = within(Wait(60.0))
+    seen = []
+
+    def ask_again(event):
+        if isinstance(event, PreemptRequested):
+            seen.append(event.path)
+            machine.request_preempt()
+
+    machine.subscribe(ask_again)
+    clock.call_later(1.0, machine.request_preempt)
+    assert machine.execute() == "preempted"
+    assert seen == ["/M", "/M/DRIVE"]
+
+
+def test_a_run_of_a_root_counts_once():
+    inner, machine = within(Wait(0.0)), within(Wait(0.0))
+    machine.add("IN", inner)
+    machine.set_initial_state(["IN"])
+    for number in (1, 2):
+        machine.execute()
+        assert machine._smachpy.live.runs == number
+    assert inner._smachpy.live.runs == 1

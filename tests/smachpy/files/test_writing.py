@@ -45,6 +45,8 @@ def build(tree: Any) -> State:
         iterator = Iterator(outcomes, it=[1, 2], it_label="number", exhausted_outcome="a", **KEYS)
         loop = ["a"] if extra else []
         iterator.set_contained_state("EACH", children[0], loop, ["b"] if extra else [])
+        if extra:
+            iterator.add_cleanup("TIDY", Up())
         return iterator
     if kind == "concurrence":
         concurrence = Concurrence(

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actionlib_core.clock import VirtualClock, current_clock, use_clock
-from smachpy import CBState, Concurrence, InvalidStateError, State, StateMachine
+from smachpy import CBState, Concurrence, InvalidStateError, State, StateMachine, when
 from smachpy.command import main
 from smachpy.events.outcome_classes import is_good
 from smachpy.pnp import (
@@ -309,6 +309,26 @@ def test_what_cannot_be_written_is_told():
         export_net(sm)
     paths = {problem.partition(": ")[0] for problem in caught.value.problems}
     assert paths == {"/P/GO", "/P/ONE", "/P/TWO/INNER", "/P/TWO/MIDDLE/DEEP/ACT"}
+
+
+def test_conditions_and_clean_ups_are_refused():
+    """A condition was left out, and its case taken always; a clean-up became another branch."""
+    sm = StateMachine(["ok", "b"], name="P", userdata={"count": 0})
+    both = Concurrence(["ok"], "ok")
+    with both.opened(check=False):
+        both.add("A", CBState(lambda ud: "ok", outcomes=["ok"]))
+        both.add_cleanup("STOP", CBState(lambda ud: "ok", outcomes=["ok"]))
+    with sm:
+        sm.add("GO", CBState(lambda ud: "ok", outcomes=["ok"]), {"ok": [when("count", "b"), "TWO"]})
+        sm.add("TWO", both)
+        sm.add_cleanup("DOCK", CBState(lambda ud: "ok", outcomes=["ok"]))
+    with pytest.raises(InvalidStateError) as caught:
+        export_net(sm)
+    assert [problem.partition("; ")[0] for problem in caught.value.problems] == [
+        "/P: clean-up: got 'DOCK'",
+        "/P: condition: got 'count'",
+        "/P/TWO: clean-up: got 'STOP'",
+    ]
 
 
 @pytest.mark.slow  # pm4py takes seconds to import
