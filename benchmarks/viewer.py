@@ -50,13 +50,13 @@ def measure(page, pid, seconds):
         smachpy.page.latencies.length = 0; window.frames_ = 0; window.go_ = true;
         const frame = () => { window.frames_ += 1; if (window.go_) requestAnimationFrame(frame); };
         requestAnimationFrame(frame);
-        window.from_ = smachpy.store.run.events.length;
+        window.from_ = smachpy.store.data.run.events.length;
     }""")
     cpu, begun = processor_time(pid), time.perf_counter()
     page.wait_for_timeout(seconds * 1000)
     took = time.perf_counter() - begun
     frames, latencies, events, left = page.evaluate("""() => { window.go_ = false;
-        const fresh = smachpy.store.run.events.slice(window.from_);
+        const fresh = smachpy.store.data.run.events.slice(window.from_);
         return [window.frames_, smachpy.page.latencies, fresh.length,
             fresh.filter((e) => e.kind === "Left").length]; }""")
     cpu = (processor_time(pid) - cpu) / took

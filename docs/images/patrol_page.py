@@ -21,8 +21,8 @@ SIZE = {"width": 1200, "height": 750}
 WIDTH = 800  # of the picture [pixels]
 EVERY = 2000  # of the run [ms]
 FRAME = 250  # of the picture [ms]
-SEEK = "(ms) => smachpy.store.seek(smachpy.store.run.first() + ms)"
-LENGTH = "() => smachpy.store.run.last() - smachpy.store.run.first()"
+SEEK = "(ms) => smachpy.store.playback.seek(smachpy.store.data.run.first() + ms)"
+LENGTH = "() => smachpy.store.data.run.last() - smachpy.store.data.run.first()"
 
 
 def smachpy(*arguments: str) -> list[str]:

@@ -294,7 +294,7 @@ def shared(first_page):
         first_page.keyboard.press("Escape")
         first_page.evaluate(
             """async () => { const { page, store } = smachpy; page.setFollow(false); page.timeline.live();
-            page.select(null); store.query.value = ""; page.setDepth(9); await page.drawing; }"""
+            page.select(null); store.view.query.value = ""; page.setDepth(9); await page.drawing; }"""
         )
         return first_page
 

@@ -49,7 +49,7 @@ def test_a_goal_from_the_form_shows_its_feedback_and_can_be_cancelled(action_pag
     fill(page, "3.5", "2.0")
     page.click("#send-goal")
     page.wait_for_selector(".sent.active")
-    wait_for(page, "smachpy.store.actions.value.goals[0]?.fraction > 0.01")
+    wait_for(page, "smachpy.store.data.actions.value.goals[0]?.fraction > 0.01")
     assert "base_position" in page.text_content(".sent pre")
     assert "m left" in page.text_content(".sent")
     page.click(".sent >> text=Cancel")
@@ -66,10 +66,10 @@ def test_a_goal_to_its_end(action_page):
     page.fill('[id="$.until"]', "0.1")
     page.press('[id="$.until"]', "Control+Enter")
     page.wait_for_selector(".sent")
-    wait_for(page, "smachpy.store.actions.value.goals[0]?.ended")
+    wait_for(page, "smachpy.store.data.actions.value.goals[0]?.ended")
     # Not at the dock, the robot refuses; at the dock, it has charge enough already.
     status, text = page.evaluate(
-        "() => { const g = smachpy.store.actions.value.goals[0]; return [g.status, g.text]; }"
+        "() => { const g = smachpy.store.data.actions.value.goals[0]; return [g.status, g.text]; }"
     )
     assert status in {"ABORTED", "REJECTED", "SUCCEEDED"}
     assert text in page.text_content(".sent")
@@ -90,7 +90,7 @@ def test_bad_values_are_named_at_their_fields_and_are_not_sent(action_page):
     )
     # The first bad field has the focus, and nothing has been sent.
     assert page.evaluate("() => document.activeElement.id") == "$.target_pose.header.seq"
-    assert page.evaluate("() => smachpy.store.actions.value.goals.length") == 0
+    assert page.evaluate("() => smachpy.store.data.actions.value.goals.length") == 0
 
 
 def test_form_and_yaml_are_two_views_of_one_goal(action_page):

@@ -24,7 +24,7 @@ def no_leaks():
 
 
 def active(page):
-    return page.evaluate("() => smachpy.store.activeLeaves.value")
+    return page.evaluate("() => smachpy.store.status.activeLeaves.value")
 
 
 def group(path):
@@ -107,14 +107,14 @@ def test_events_never_move_the_view(delivery, shared):
 
 def test_time_travel_shows_graph_goals_and_userdata_of_one_instant(delivery, shared):
     page = shared()
-    wait_for(page, "smachpy.store.run.events.length > 60")
+    wait_for(page, "smachpy.store.data.run.events.length > 60")
     found = page.evaluate("""() => {
-      const { store } = smachpy, run = store.run;
+      const { store } = smachpy, run = store.data.run;
       const i = run.events.findIndex((e, n) => n > 20 && e.kind === "Left");
-      store.seek(run.events[i].stamp_ns / 1e6);
+      store.playback.seek(run.events[i].stamp_ns / 1e6);
       const path = run.events[i].path;
-      return { path, out: store.shown().states[path].outcome,
-        wrote: Object.values(store.shown().userdata).map((u) => u.writer) };
+      return { path, out: store.playback.shown().states[path].outcome,
+        wrote: Object.values(store.playback.shown().userdata).map((u) => u.writer) };
     }""")
     assert found["out"] == "succeeded"
     assert found["wrote"]
@@ -123,16 +123,16 @@ def test_time_travel_shows_graph_goals_and_userdata_of_one_instant(delivery, sha
     page.wait_for_timeout(700)
     assert active(page) == frozen
     page.keyboard.press("l")
-    wait_for(page, "smachpy.store.cursor.value === null")
+    wait_for(page, "smachpy.store.playback.cursor.value === null")
 
 
 def test_the_page_folds_events_as_the_server_does(delivery, shared):
     from smachpy.events.run_state import RunState
 
     page = shared()
-    wait_for(page, "smachpy.store.run.events.length > 40")
+    wait_for(page, "smachpy.store.data.run.events.length > 40")
     mine, theirs, base = page.evaluate(
-        "() => [smachpy.store.run.after(40), smachpy.store.run.events.slice(0, 40), JSON.parse(smachpy.store.run.base)]"
+        "() => [smachpy.store.data.run.after(40), smachpy.store.data.run.events.slice(0, 40), JSON.parse(smachpy.store.data.run.base)]"
     )
     state = RunState(base)
     for event in theirs:
@@ -150,13 +150,13 @@ def test_control_with_the_token(delivery, look):
     page = look(delivery.address.replace("/#", "/?machine=delivery#"))
     assert "token" not in page.url
     page.click("#pause")
-    wait_for(page, "smachpy.store.facts.value.control.paused")
+    wait_for(page, "smachpy.store.data.facts.value.control.paused")
     wait_for(page, "document.querySelector('g.waiting')")
     held = page.evaluate("() => document.querySelector('g.waiting').dataset.path")
     page.click("#step")
     wait_for(page, f"document.querySelector('g.waiting')?.dataset.path !== {json.dumps(held)}")
     page.click("#pause")
-    wait_for(page, "!smachpy.store.facts.value.control.paused")
+    wait_for(page, "!smachpy.store.data.facts.value.control.paused")
     page.evaluate("() => smachpy.page.goTo('/DELIVER/PLACE')")
     page.click("text=Breakpoint")
     wait_for(page, "document.querySelector('g.stopped[data-path=\"/DELIVER/PLACE\"]')")
@@ -174,7 +174,7 @@ def test_who_pauses_at_another_viewer_is_seen_here(start, look):
     page.wait_for_selector("#pause:text-is('Pause')")
     there.click("#pause")
     page.wait_for_selector("#pause:text-is('Resume')")
-    wait_for(page, "smachpy.store.runStatus.value.word.startsWith('paused')")
+    wait_for(page, "smachpy.store.status.runStatus.value.word.startsWith('paused')")
     # Until it says Resume, a click there is a second Pause.
     there.click("#pause:text-is('Resume')")
     page.wait_for_selector("#pause:text-is('Pause')")
@@ -202,32 +202,32 @@ def test_a_robot_that_dies_is_stale_and_one_that_comes_back_is_not(start, look):
     view = start.view()
     page = look(view.base + "?machine=mortal")
     robot.kill()
-    wait_for(page, "smachpy.store.runStatus.value.word === 'stale'")
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'stale'")
     assert "Stale" in page.text_content(".banner")
     start.robot("--name", "mortal", "--rate", 4)
-    wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
-    wait_for(page, "smachpy.store.activeLeaves.value.length")  # a state is entered soon
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'running'")
+    wait_for(page, "smachpy.store.status.activeLeaves.value.length")  # a state is entered soon
 
 
 def test_a_viewer_that_is_restarted_is_found_again_with_the_whole_history(start, look):
     start.robot("--name", "steady", "--rate", 8)
     view = start.view()
     page = look(view.base + "?machine=steady")
-    wait_for(page, "smachpy.store.run.events.length > 30")
-    first = page.evaluate("() => smachpy.store.run.events[0].stamp_ns")
+    wait_for(page, "smachpy.store.data.run.events.length > 30")
+    first = page.evaluate("() => smachpy.store.data.run.events[0].stamp_ns")
     view.kill()
-    wait_for(page, "smachpy.store.connection.value === 'lost'")
+    wait_for(page, "smachpy.store.data.connection.value === 'lost'")
     start.view(port=view.port)
-    wait_for(page, "smachpy.store.connection.value === 'live'", timeout=15.0)
-    wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
-    assert page.evaluate("() => smachpy.store.run.events[0].stamp_ns") == first
+    wait_for(page, "smachpy.store.data.connection.value === 'live'", timeout=15.0)
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'running'")
+    assert page.evaluate("() => smachpy.store.data.run.events[0].stamp_ns") == first
 
 
 def test_hostile_names_and_values_are_harmless(start, look):
     start.robot("--name", "hostile", "--rate", 5, "--hostile")
     view = start.view()
     page = look(view.base + "?machine=hostile")
-    wait_for(page, "Object.keys(smachpy.store.run.now.userdata).length >= 4")
+    wait_for(page, "Object.keys(smachpy.store.data.run.now.userdata).length >= 4")
     page.wait_for_timeout(500)
     assert page.title().startswith("HOSTILE")
     assert page.evaluate("() => document.querySelectorAll('img, .diagram script').length") == 0
@@ -243,8 +243,8 @@ def test_ten_clients_at_once_hear_the_same(delivery, shared):
         urllib.request.urlopen(f"{delivery.base}api/events?machine=delivery", timeout=20)
         for _ in range(9)
     ]
-    last = page.evaluate("() => smachpy.store.run.events.at(-1).seq")
-    wait_for(page, f"smachpy.store.run.events.at(-1).seq > {last + 4}")
+    last = page.evaluate("() => smachpy.store.data.run.events.at(-1).seq")
+    wait_for(page, f"smachpy.store.data.run.events.at(-1).seq > {last + 4}")
     for stream in streams:
         numbers = []
         while not numbers or numbers[-1] <= last + 4:
@@ -279,17 +279,17 @@ def test_a_preempt_is_a_process_one_can_watch(start, look):
     assert "asked to stop by operator" in page.text_content(".log")
     assert "preempt serviced" in page.text_content(".log")
     assert "cleaning up" in page.get_attribute(group(navigate), "aria-label")
-    wait_for(page, "smachpy.store.runStatus.value.word === 'ended: preempted'")
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'ended: preempted'")
     wait_for(page, "document.querySelector('.preempt').textContent.includes('longest: WATCH')")
     # The same at an earlier instant, and in the file that can be mailed.
     when = page.evaluate("""() => { const { store } = smachpy;
-        const t = store.run.preempts[0].from + 1500; store.seek(t); return t; }""")
+        const t = store.data.run.preempts[0].from + 1500; store.playback.seek(t); return t; }""")
     wait_for(page, "document.querySelector('.preempt')?.textContent.includes('held up by')")
     exported = view.get("/api/export?machine=slow&format=html")[2]
     page = look("about:blank", drawn=False)
     page.set_content(exported.decode())
     page.wait_for_selector("html[data-drawn]", timeout=20_000)
-    page.evaluate(f"() => smachpy.store.seek({when})")
+    page.evaluate(f"() => smachpy.store.playback.seek({when})")
     wait_for(page, "document.querySelector('.preempt')?.textContent.includes('held up by')")
 
 
@@ -297,15 +297,15 @@ def test_a_run_opens_as_one_file_without_a_server(start, look, tmp_path):
     start.robot("--name", "mailed", "--rate", 10)
     view = start.view()
     page = look(view.base + "?machine=mailed")
-    wait_for(page, "smachpy.store.run.events.length > 60")
+    wait_for(page, "smachpy.store.data.run.events.length > 60")
     _, _, text = view.get("/api/export?machine=mailed&format=html")
     file = tmp_path / "run.html"
     file.write_bytes(text)
     page = look(file.as_uri())
-    assert page.evaluate("() => smachpy.store.run.events.length") > 60
+    assert page.evaluate("() => smachpy.store.data.run.events.length") > 60
     assert page.query_selector(group("/DELIVER/PICK/GRASP")) is not None
     page.keyboard.press(",")
-    assert page.evaluate("() => smachpy.store.cursor.value") is not None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is not None
     assert page.foreign == []
 
 
@@ -318,7 +318,7 @@ def test_dark_small_and_by_keyboard_alone(delivery, look):
     wait_for(page, "getComputedStyle(document.body).backgroundColor === 'rgb(255, 255, 255)'")
     page.evaluate("() => smachpy.page.select('/DELIVER/INIT')")
     page.keyboard.press("ArrowDown")
-    assert page.evaluate("() => smachpy.store.selected.value") != "/DELIVER/INIT"
+    assert page.evaluate("() => smachpy.store.view.selected.value") != "/DELIVER/INIT"
     k = page.evaluate("() => smachpy.page.view.k")
     page.keyboard.press("+")
     assert page.evaluate("() => smachpy.page.view.k") > k
@@ -337,8 +337,8 @@ def test_who_stops_reading_holds_up_nobody(delivery, shared):
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
     deaf.sendall(b"GET /api/events?machine=delivery HTTP/1.1\r\nHost: localhost\r\n\r\n")
     page = shared()
-    seq = page.evaluate("() => smachpy.store.run.events.at(-1).seq")
-    wait_for(page, f"smachpy.store.run.events.at(-1).seq > {seq + 20}")
+    seq = page.evaluate("() => smachpy.store.data.run.events.at(-1).seq")
+    wait_for(page, f"smachpy.store.data.run.events.at(-1).seq > {seq + 20}")
     deaf.close()
 
 
@@ -395,16 +395,16 @@ def test_two_machines_of_one_name_are_two_machines(start, look):
     view = start.view("--control")
     page = look(view.address.replace("/#", "/?machine=twin#"))
     start.robot("--name", "twin", "--rate", 4, "--states", 12, "--control")
-    wait_for(page, "smachpy.store.machines.value.some((m) => m.name === 'twin (2)')")
-    twins = "smachpy.store.machines.value.filter((m) => m.name.startsWith('twin') && !m.after)"
+    wait_for(page, "smachpy.store.data.machines.value.some((m) => m.name === 'twin (2)')")
+    twins = "smachpy.store.data.machines.value.filter((m) => m.name.startsWith('twin') && !m.after)"
     labels = page.evaluate(f"() => {twins}.map((m) => [m.name, m.label])")
     assert labels == [["twin", "DELIVER"], ["twin (2)", "FACTORY_12"]]
     page.wait_for_timeout(1500)
     # Nothing of the one is in the other.
-    paths = "[...new Set(smachpy.store.run.events.map((e) => e.path.split('/')[1]))]"
+    paths = "[...new Set(smachpy.store.data.run.events.map((e) => e.path.split('/')[1]))]"
     assert page.evaluate(f"() => {paths}") == ["DELIVER"]
     other = look(view.base + "?machine=twin%20(2)")
-    wait_for(other, "smachpy.store.run.events.length > 5")
+    wait_for(other, "smachpy.store.data.run.events.length > 5")
     assert other.evaluate(f"() => {paths}") == ["FACTORY_12"]
     # A command would reach both, so it reaches none.
     page.click("#pause")
@@ -412,10 +412,10 @@ def test_two_machines_of_one_name_are_two_machines(start, look):
     assert "got 2 machines with the name 'twin'" in page.text_content(".notice")
     # The one goes, the other stays; a new one takes the place of the one that has gone.
     first.kill()
-    wait_for(page, "smachpy.store.runStatus.value.word === 'stale'")
-    assert other.evaluate("() => smachpy.store.runStatus.value.word") == "running"
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'stale'")
+    assert other.evaluate("() => smachpy.store.status.runStatus.value.word") == "running"
     start.robot("--name", "twin", "--rate", 4)
-    wait_for(page, "smachpy.store.runStatus.value.word === 'running'")
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'running'")
     assert page.evaluate(f"() => {twins}.length") == 2
 
 
@@ -423,7 +423,9 @@ def test_a_value_that_was_shortened_is_fetched_whole_from_the_mission(start, loo
     start.robot("--name", "hoarder", "--rate", 5, "--hostile")
     view = start.view()
     page = look(view.base + "?machine=hoarder")
-    wait_for(page, "Object.values(smachpy.store.run.now.userdata).some((u) => u.key === 'big')")
+    wait_for(
+        page, "Object.values(smachpy.store.data.run.now.userdata).some((u) => u.key === 'big')"
+    )
     page.click(".userdata tr:has(th button:text-is('big'))")
     page.press(".whole", "Enter")  # a click misses a button that moves as the page is drawn anew
     answer = "document.querySelector('.whole-value')?.innerText ?? ''"
@@ -460,7 +462,7 @@ def test_follow_shows_all_regions_that_are_active(start, look):
         '`g.active[data-path="/DELIVER/TRANSPORT/${l}"]`))',
         timeout=20.0,
     )
-    wait_for(page, "smachpy.store.activeLeaves.value.length === 2")
+    wait_for(page, "smachpy.store.status.activeLeaves.value.length === 2")
     assert "+1 active" in page.text_content(".crumbs")
     inside = """(label) => { const box = document.querySelector(`g[data-path="/DELIVER/TRANSPORT/${label}"]`)
         ?.getBoundingClientRect(), stage = document.querySelector('.diagram').getBoundingClientRect();
@@ -502,20 +504,20 @@ def test_every_key_does_what_the_help_says(delivery, look):
     page.keyboard.press("Enter")
     wait_for(page, "document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
     page.keyboard.press("Shift+ArrowLeft")  # moves the view though something is selected
-    assert page.evaluate("() => smachpy.store.selected.value") == "/DELIVER/PICK"
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/DELIVER/PICK"
     page.keyboard.press("Escape")
-    assert page.evaluate("() => smachpy.store.selected.value") is None
-    before = page.evaluate("() => smachpy.store.implicit.value")
+    assert page.evaluate("() => smachpy.store.view.selected.value") is None
+    before = page.evaluate("() => smachpy.store.view.implicit.value")
     page.keyboard.press("i")
-    assert page.evaluate("() => smachpy.store.implicit.value") != before
+    assert page.evaluate("() => smachpy.store.view.implicit.value") != before
     page.keyboard.press("i")
-    wait_for(page, "smachpy.store.run.events.length > 5")
+    wait_for(page, "smachpy.store.data.run.events.length > 5")
     page.keyboard.press(",")
-    assert page.evaluate("() => smachpy.store.cursor.value") is not None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is not None
     page.keyboard.press("l")
-    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
     page.keyboard.press("o")
-    assert page.evaluate("() => smachpy.store.follow.value") is True
+    assert page.evaluate("() => smachpy.store.view.follow.value") is True
     page.keyboard.press("o")
     page.keyboard.press("?")
     listed = page.text_content("dialog")
@@ -563,7 +565,7 @@ def test_at_first_no_more_is_open_than_can_be_read_and_a_new_size_shows_all_agai
     page = look(view.base + "?machine=wide")
     wait_for(page, "smachpy.page.drawing === null")
     assert page.evaluate("() => smachpy.page.view.k") >= 0.55
-    assert page.evaluate("() => smachpy.store.opened.value.size") < 5
+    assert page.evaluate("() => smachpy.store.view.opened.value.size") < 5
     whole = """() => { const { view, diagram } = smachpy.page, s = diagram.size;
         return view.x >= 0 && view.y >= 0 && view.x + s.w * view.k <= view.width
             && view.y + s.h * view.k <= view.height; }"""

@@ -47,7 +47,7 @@ def test_axe_finds_nothing_serious(served, look, size, colours):
         "machine": lambda: page.evaluate("() => smachpy.page.select('/JOB/A')"),
         "menu": lambda: page.click(".menu > button"),
         "palette": lambda: page.keyboard.press("Control+k"),
-        "keys": lambda: page.evaluate("() => { smachpy.store.help.value = true; }"),
+        "keys": lambda: page.evaluate("() => { smachpy.store.view.help.value = true; }"),
         "runs": lambda: page.keyboard.press("h"),
         "actions": lambda: page.keyboard.press("a"),
     }.items():

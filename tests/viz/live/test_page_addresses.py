@@ -28,7 +28,7 @@ def two(served, tmp_path):
 
 
 def shows(page, name):
-    wait_for(page, f"smachpy.store.pageShown.value === '{name}'")
+    wait_for(page, f"smachpy.store.view.pageShown.value === '{name}'")
     places = {"machine": "stage", "runs": "home", "actions": "actions-page", "fleet": "fleet"}
     page.wait_for_function(f"() => ({VISIBLE})() === '{places[name]}'")
 
@@ -43,11 +43,11 @@ def test_each_page_is_reached_from_each_and_back_leads_to_the_one_before(two, lo
     shows(page, "fleet")
     page.click(".fleet .cards button:has-text('OTHER')")
     shows(page, "machine")
-    wait_for(page, "smachpy.store.facts.value?.name === 'two'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'two'")
     for name in ("fleet", "runs", "actions", "machine"):
         page.go_back()
         shows(page, name)
-    wait_for(page, "smachpy.store.facts.value?.name === 'one'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'one'")
     page.go_forward()
     shows(page, "actions")
     page.reload()
@@ -57,9 +57,9 @@ def test_each_page_is_reached_from_each_and_back_leads_to_the_one_before(two, lo
 def test_choosing_a_machine_can_be_undone(two, look):
     page = look(f"{two.address}?machine=one#token=t")
     page.select_option(".chooser select", "two")
-    wait_for(page, "smachpy.store.facts.value?.name === 'two'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'two'")
     page.go_back()
-    wait_for(page, "smachpy.store.facts.value?.name === 'one'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'one'")
     assert page.input_value(".chooser select") == "one"
 
 
@@ -75,7 +75,7 @@ REACHED = """() => {
 def test_the_keyboard_reaches_nothing_that_is_covered(two, look, key):
     page = look(f"{two.address}?machine=one#token=t")
     page.keyboard.press(key)
-    wait_for(page, "smachpy.store.pageShown.value !== 'machine'")
+    wait_for(page, "smachpy.store.view.pageShown.value !== 'machine'")
     for _ in range(25):
         page.keyboard.press("Tab")
         assert page.evaluate(REACHED), page.evaluate("() => document.activeElement.outerHTML")
@@ -109,7 +109,7 @@ def test_phones_show_who_answered(served, look):
         page.click(f".parts button:has-text('{part}')")
         page.wait_for_selector(".question .answer:text-is('yes')")
     answered = {"service": "s", "answer": "yes", "by": "ann", "at": 0.004}
-    page.evaluate("() => { smachpy.store.robotLag.forget(); }")
+    page.evaluate("() => { smachpy.store.data.robotLag.forget(); }")
     machine.add(served.events([("QuestionAnswered", "/JOB/A", answered)], after=3))
     page.wait_for_selector(".question.over:has-text('answered yes by ann')")
     shown = page.locator(".question.over").bounding_box()

@@ -65,7 +65,7 @@ def test_a_failure_among_thousands_of_visits_is_drawn_last_and_wide_enough(serve
     machine = served.add("one", events=events)
     machine.recorded = True
     page = look(served.start())
-    wait_for(page, "smachpy.store.run.spans.length > 3000")
+    wait_for(page, "smachpy.store.data.run.spans.length > 3000")
     strokes = page.evaluate(WATCH)["strokes"]
     colour = page.evaluate(
         "() => getComputedStyle(document.documentElement).getPropertyValue('--failure').trim().toLowerCase()"
@@ -110,6 +110,6 @@ def test_follow_opens_what_runs_also_in_the_past(served, look):
     page = look(served.start())
     page.keyboard.press("1")
     page.wait_for_selector('g[data-path="/JOB/VISIT/DRIVE"]', state="detached")
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 10000)")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 10000)")
     page.keyboard.press("o")
     page.wait_for_selector('g.active[data-path="/JOB/VISIT/DRIVE"]')

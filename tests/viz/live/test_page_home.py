@@ -62,7 +62,7 @@ def test_the_page_begins_with_the_runs_and_opens_one(home, look):
     assert page.locator(".runs small:has-text('no way')").count() == 1
     assert page.locator(".runs tr.bad").count() == 1
     page.click(".runs tr:has-text('GOOD')")
-    page.wait_for_function("() => smachpy.store.facts.value?.label === 'GOOD'")
+    page.wait_for_function("() => smachpy.store.data.facts.value?.label === 'GOOD'")
     assert page.query_selector(".home") is None
     assert "machine=" in page.url
     assert "runs" not in page.url.partition("?")[2].split("&")[0]
@@ -203,7 +203,7 @@ def test_the_timeline_has_a_gap_where_no_process_ran_the_mission(served, look):
     served.add("one", events=[("Recovered", "/JOB", {**facts, "at": 10.0})])
     page = look(served.start())
     page.click(".time-tools button")
-    assert page.evaluate("() => smachpy.store.run.now.outages.length") == 1
+    assert page.evaluate("() => smachpy.store.data.run.now.outages.length") == 1
     assert page.evaluate("() => smachpy.page.timeline.gaps.length") == 1
     assert page.locator(".log >> text=resumed after an outage of 10 s").count() == 1
 
@@ -243,5 +243,5 @@ def test_live_runs_together_have_cards_lanes_and_one_map(served, look):
         "() => document.querySelector('.fleet-map canvas').getAttribute('aria-label')"
     )
     page.click(".fleet .cards button:has-text('two')")
-    page.wait_for_function("() => smachpy.store.facts.value?.name === '<b>two'")
+    page.wait_for_function("() => smachpy.store.data.facts.value?.name === '<b>two'")
     assert page.query_selector(".fleet") is None

@@ -9,7 +9,7 @@ from tests.browser import wait_for
 pytestmark = pytest.mark.browser
 
 HOUR = 3600.0
-RANGE = "[smachpy.page.strip.shown.from, smachpy.page.strip.shown.to].map((t) => Math.round((t - smachpy.store.began()) / 1000))"
+RANGE = "[smachpy.page.strip.shown.from, smachpy.page.strip.shown.to].map((t) => Math.round((t - smachpy.store.playback.began()) / 1000))"
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def drag(page, begin, end):
 
 def test_the_window_is_moved_and_stretched(page):
     page.evaluate(
-        "() => { const t = smachpy.store.began(); smachpy.page.timeline.showRange({ from: t + 600e3, to: t + 1200e3 }); }"
+        "() => { const t = smachpy.store.playback.began(); smachpy.page.timeline.showRange({ from: t + 600e3, to: t + 1200e3 }); }"
     )
     wait_for(page, f"{RANGE}[0] === 600")
     drag(page, 900, 1500)

@@ -155,7 +155,7 @@ def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(ser
     served.add("big", sm=sm, events=[("Started", "/TOP"), *(("Entered", p) for p in parts[1:])])
     page = look(served.start())
     shown = all_levels(page)
-    assert page.evaluate("() => smachpy.store.overview.value")
+    assert page.evaluate("() => smachpy.store.view.overview.value")
     assert len(shown["boxes"]) == 1111
     assert shown["ms"] < MOST_LAYOUT_MS
     assert fills(shown) < 1.6
@@ -168,11 +168,11 @@ def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(ser
     again = all_levels(page)
     assert again["boxes"] == shown["boxes"]
     page.dblclick(f'g[data-path="{path}"] .frame', force=True)  # its diagram, there
-    wait_for(page, "!smachpy.store.overview.value && !smachpy.page.drawing")
+    wait_for(page, "!smachpy.store.view.overview.value && !smachpy.page.drawing")
     assert page.evaluate(f"() => smachpy.page.diagram.boxes.has('{path}')")
     assert page.locator("path.edge").count() > 5
     page.keyboard.press("9")  # and back
-    wait_for(page, "smachpy.store.overview.value")
+    wait_for(page, "smachpy.store.view.overview.value")
 
 
 def linked(count):
@@ -191,7 +191,7 @@ def test_states_that_all_lead_to_each_other_are_drawn_in_time(served, look, coun
     served.add("linked", sm=linked(count))
     page = look(served.start())
     assert page.locator("g.leaf").count() == count
-    assert page.evaluate("() => smachpy.store.overview.value") is tiles
+    assert page.evaluate("() => smachpy.store.view.overview.value") is tiles
     assert (page.locator("path.edge").count() >= count * count) is not tiles
 
 
@@ -228,7 +228,8 @@ def test_follow_frames_all_that_runs_and_never_below_nine_pixels(served, look):
     served.add("fleet", sm=regions(24), events=[("Started", "/FLEET"), *running])
     page = look(served.start(follow=True))
     wait_for(
-        page, "smachpy.store.follow.value && !smachpy.page.drawing && smachpy.page.view.k > 0.8"
+        page,
+        "smachpy.store.view.follow.value && !smachpy.page.drawing && smachpy.page.view.k > 0.8",
     )
     # Each running state, or what it is folded into, is in view and legible.
     wait_for(
@@ -254,7 +255,7 @@ def test_a_shape_at_which_the_layouter_fails_is_left_out(served, look):
           };
           page.layout.clear();
           await page.relayout({ frame: true });
-          return [seen.includes("DOWN"), [...page.layout.chosen.values()][0], smachpy.store.failure.value,
+          return [seen.includes("DOWN"), [...page.layout.chosen.values()][0], smachpy.store.data.failure.value,
             document.querySelectorAll('g.leaf').length]; }"""
     )
     assert drawn[0]

@@ -43,7 +43,9 @@ def pin(page, text):
 def test_a_link_shows_another_browser_the_same(address, look):
     page = look(f"{address}#token=t")
     page.evaluate("async () => { smachpy.page.setDepth(9); await smachpy.page.drawing; }")
-    page.evaluate("() => { const s = smachpy.store; s.seek(s.run.first() + 5000); }")
+    page.evaluate(
+        "() => { const { data, playback } = smachpy.store; playback.seek(data.run.first() + 5000); }"
+    )
     page.evaluate("() => smachpy.page.select('/JOB/IN/GO')")
     pin(page, "<b>here</b> it hesitates")
     wait_for(page, "location.hash.includes('note=')")
@@ -55,7 +57,7 @@ def test_a_link_shows_another_browser_the_same(address, look):
     wait_for(other, "document.querySelector('g.selected[data-path=\"/JOB/IN/GO\"]')")
     assert "00:05.0" in other.text_content(".banner.past")
     assert other.text_content(".notes li span") == "<b>here</b> it hesitates"
-    assert other.evaluate("() => smachpy.store.opened.value.has('/JOB/IN')")
+    assert other.evaluate("() => smachpy.store.view.opened.value.has('/JOB/IN')")
     other.keyboard.press("l")
     other.click(".notes .link")
     wait_for(other, "document.querySelector('.banner.past')?.textContent.includes('00:05.0')")
@@ -77,7 +79,7 @@ def test_a_link_to_what_is_not_there_says_so(address, look):
     page = look(f"{address}#at=1000.5&state=/NO/SUCH&open=/NO&note=x&token=t")
     page.wait_for_selector(".notice.error")
     assert "not in this machine" in page.text_content(".notice.error")
-    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
     page.evaluate("() => { location.hash = '#state=/JOB/IN'; }")
     wait_for(page, "document.querySelector('g.selected[data-path=\"/JOB/IN\"]')")
 
@@ -88,6 +90,6 @@ def test_a_run_in_one_file_has_links_too(address, look, tmp_path):
     file = tmp_path / "run.html"
     file.write_bytes(saved.body())
     alone = look(file.as_uri() + "#state=/JOB/IN")
-    wait_for(alone, "smachpy.store.selected.value === '/JOB/IN'")
+    wait_for(alone, "smachpy.store.view.selected.value === '/JOB/IN'")
     pin(alone, "as a file")
     wait_for(alone, "location.hash.includes('as+a+file')")

@@ -81,11 +81,14 @@ def test_a_press_on_the_track_goes_to_its_instant(office, look):
     page.wait_for_selector(".map-view canvas")
     page.mouse.click(*page.evaluate(AT, [2.0, 1.0]))
     page.wait_for_selector(".banner.past")
-    assert page.evaluate("() => smachpy.store.instantText(smachpy.store.cursor.value)") == "00:03.0"
-    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/A"
+    assert (
+        page.evaluate("() => smachpy.store.clock.instantText(smachpy.store.playback.cursor.value)")
+        == "00:03.0"
+    )
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/JOB/A"
     # What comes later has not been driven yet.
     page.mouse.move(*page.evaluate(AT, [2.0, 1.8]))
-    assert page.evaluate("() => smachpy.store.hovered.value") is None
+    assert page.evaluate("() => smachpy.store.pointer.hovered.value") is None
 
 
 def test_two_fingers_zoom_the_map(office, look):
@@ -102,7 +105,7 @@ def test_two_fingers_zoom_the_map(office, look):
     factor, moved = page.evaluate(pinch)
     assert factor == pytest.approx(3)
     assert moved == pytest.approx(0, abs=1)  # what is under a finger stays there
-    assert page.evaluate("() => smachpy.store.cursor.value") is None  # and was not tapped
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None  # and was not tapped
 
 
 def test_hovering_is_linked_both_ways(office, look):
@@ -110,7 +113,7 @@ def test_hovering_is_linked_both_ways(office, look):
     page.wait_for_selector(".map-view canvas")
     page.mouse.move(*page.evaluate(AT, [2.0, 1.8]))
     page.wait_for_selector(".map-view .tip")
-    assert page.evaluate("() => smachpy.store.hovered.value.path") == "/JOB/B"
+    assert page.evaluate("() => smachpy.store.pointer.hovered.value.path") == "/JOB/B"
     assert "00:05.0 \u2013 00:09.0, 4.0 s" in page.text_content(".map-view .tip")
     page.wait_for_selector("g[data-path='/JOB/B'].linked")
     bar = """() => { const t = smachpy.page.timeline, b = t.canvas.getBoundingClientRect(),
@@ -163,7 +166,7 @@ def test_a_page_hears_of_the_robot_while_it_moves(office, look, monkeypatch):
     told = observed(served)
     for record in told:
         machine.observe([record])
-    page.wait_for_function("() => smachpy.store.scene.robots.get('')?.poses.length === 81")
+    page.wait_for_function("() => smachpy.store.data.scene.robots.get('')?.poses.length === 81")
     monkeypatch.setattr(machines, "MAX_KEPT_OBSERVATIONS", 50)
     last = told[-1]
     machine.observe(
@@ -171,9 +174,9 @@ def test_a_page_hears_of_the_robot_while_it_moves(office, look, monkeypatch):
     )  # most are known
     assert len(machine.observed()) == 51  # and the map
     late = look(f"{served.address}?machine=two")
-    late.wait_for_function("() => smachpy.store.scene.robots.get('')?.poses.length > 5")
-    assert late.evaluate("() => smachpy.store.scene.maps.length") == 1
-    assert page.evaluate("() => smachpy.store.scene.robots.get('').poses.length") == 81
+    late.wait_for_function("() => smachpy.store.data.scene.robots.get('')?.poses.length > 5")
+    assert late.evaluate("() => smachpy.store.data.scene.maps.length") == 1
+    assert page.evaluate("() => smachpy.store.data.scene.robots.get('').poses.length") == 81
 
 
 def test_a_machine_without_a_robot_has_no_map(served, look):
@@ -230,8 +233,8 @@ def test_a_floor_from_a_file_is_shown_until_a_topic_tells_one(served, look):
     machine = served.add("one", events=run())
     served.add("two", events=run(), observed=observed(served))
     page = look(f"{served.start()}?machine=one")
-    page.wait_for_function("() => smachpy.store.scene.mapAt(Date.now())?.resolution === 0.5")
+    page.wait_for_function("() => smachpy.store.data.scene.mapAt(Date.now())?.resolution === 0.5")
     machine.observe(observed(served)[:1])
-    page.wait_for_function("() => smachpy.store.scene.mapAt(Date.now())?.resolution === 2")
+    page.wait_for_function("() => smachpy.store.data.scene.mapAt(Date.now())?.resolution === 2")
     other = look(f"{served.address}?machine=two")
-    other.wait_for_function("() => smachpy.store.scene.maps.length === 1")
+    other.wait_for_function("() => smachpy.store.data.scene.maps.length === 1")

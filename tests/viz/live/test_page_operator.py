@@ -114,7 +114,7 @@ def test_the_buttons_have_one_place_and_are_never_cut_off(served, look, width):
     assert boxes(page) == running
     machine.set_control(FREE)
     page.wait_for_selector("#pause:text-is('Pause')")
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first())")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first())")
     page.wait_for_selector("#preempt[aria-disabled=true]")
     assert boxes(page) == running
 

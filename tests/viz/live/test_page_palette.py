@@ -34,18 +34,21 @@ def find(page, text):
 def test_states_instants_keys_machines_and_commands_are_found(page, served):
     find(page, "b")
     page.keyboard.press("Enter")
-    wait_for(page, "smachpy.store.selected.value === '/JOB/B'")
+    wait_for(page, "smachpy.store.view.selected.value === '/JOB/B'")
     find(page, "00:30")
     assert page.text_content(".palette .at b") == "00:30.0"
     page.keyboard.press("Enter")
-    wait_for(page, "Math.round(smachpy.store.nowMs() - smachpy.store.began()) === 30000")
+    wait_for(
+        page,
+        "Math.round(smachpy.store.playback.nowMs() - smachpy.store.playback.began()) === 30000",
+    )
     find(page, ".shelf")
     assert "7 by A" in page.text_content(".palette .at")
     page.keyboard.press("Enter")
-    wait_for(page, "smachpy.store.selected.value === '/JOB/A'")
+    wait_for(page, "smachpy.store.view.selected.value === '/JOB/A'")
     find(page, "> live")
     page.keyboard.press("Enter")
-    wait_for(page, "smachpy.store.cursor.value === null")
+    wait_for(page, "smachpy.store.playback.cursor.value === null")
     find(page, "pause")
     assert page.text_content(".palette .at b") == "Pause JOB"
     page.keyboard.press("Enter")
@@ -53,14 +56,16 @@ def test_states_instants_keys_machines_and_commands_are_found(page, served):
     assert served.commands[-1]["command"] == "pause"
     find(page, "#other")
     page.keyboard.press("Enter")
-    wait_for(page, "smachpy.store.facts.value?.name === 'two'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'two'")
 
 
 def test_it_closes_with_escape_and_gives_the_focus_back(page):
     page.focus("#preempt")
     find(page, "zzz")
     assert page.text_content(".palette .none") == "nothing of this name"
-    assert page.evaluate("() => smachpy.store.follow.value") is False  # no key reached the page
+    assert (
+        page.evaluate("() => smachpy.store.view.follow.value") is False
+    )  # no key reached the page
     page.keyboard.press("Escape")
     page.wait_for_selector(".palette", state="detached")
     assert page.evaluate("() => document.activeElement.id") == "preempt"
@@ -75,7 +80,7 @@ def test_shortcuts_of_single_keys_can_be_switched_off(page):
     find(page, "b")
     page.keyboard.press("Escape")
     assert page.query_selector(".home") is None
-    assert page.evaluate("() => smachpy.store.follow.value") is False
+    assert page.evaluate("() => smachpy.store.view.follow.value") is False
 
 
 @pytest.mark.parametrize("size", [(390, 844), (844, 390)])

@@ -18,7 +18,9 @@ CONTROL = {"paused": False, "breakpoints": []}
 
 
 def seek(page, seconds):
-    page.evaluate(f"() => smachpy.store.seek(smachpy.store.run.first() + {seconds} * 1000)")
+    page.evaluate(
+        f"() => smachpy.store.playback.seek(smachpy.store.data.run.first() + {seconds} * 1000)"
+    )
 
 
 def test_the_past_says_which_instant_and_disarms_what_commands(served, look):
@@ -48,7 +50,7 @@ def test_a_run_that_has_ended_is_shown_whole_and_commands_nothing(served, look):
     late = ("Finished", "/JOB", {"outcome": "ok", "at": 300.0})
     machine = served.add("one", events=[*BEGUN, *LATER, late], control=CONTROL)
     page = look(f"{served.start(token='t')}#token=t")
-    wait_for(page, "smachpy.store.run.now.ended")
+    wait_for(page, "smachpy.store.data.run.now.ended")
     assert page.query_selector("#pause") is None
     assert page.evaluate("() => smachpy.page.timeline.length") > 300_000
     machine.add(served.events(BEGUN, after=5))
@@ -58,7 +60,7 @@ def test_a_run_that_has_ended_is_shown_whole_and_commands_nothing(served, look):
 def test_instants_are_clocks(served, look):
     served.add("one", events=[*BEGUN, *LATER])
     page = look(served.start())
-    text = "(s) => smachpy.store.instantText(smachpy.store.run.first() + s * 1000)"
+    text = "(s) => smachpy.store.clock.instantText(smachpy.store.data.run.first() + s * 1000)"
     asked = [0, 32.04, 59.96, 3599.99, 3723.5, -1]
     shown = [page.evaluate(text, s) for s in asked]
     assert shown == ["00:00.0", "00:32.0", "01:00.0", "1:00:00.0", "1:02:03.5", "-00:01.0"]
@@ -69,7 +71,7 @@ def test_the_instant_stays_on_the_lanes(served, look):
     page = look(served.start())
     seek(page, 1)
     page.evaluate(
-        "() => { const t = smachpy.page.timeline; t.end = smachpy.store.run.last(); t.length = 2000; t.draw(); }"
+        "() => { const t = smachpy.page.timeline; t.end = smachpy.store.data.run.last(); t.length = 2000; t.draw(); }"
     )
     # The line is drawn at the left end of the lanes, not over their names.
     column = """() => { const t = smachpy.page.timeline, c = t.canvas, r = devicePixelRatio;
@@ -99,7 +101,7 @@ def test_what_is_held_back_and_why_is_said(served, look):
     paused = {"paused": True, "breakpoints": [["/JOB/B", None]]}
     served.add("one", events=[*BEGUN, LATER[0], held], control=paused)
     page = look(served.start())
-    wait_for(page, "smachpy.store.runStatus.value.word === 'paused before B (breakpoint)'")
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'paused before B (breakpoint)'")
 
 
 def test_selected_looks_like_nothing_else(served, look):
@@ -133,7 +135,7 @@ def test_a_recording_without_an_end_stands_where_it_ends(served, look):
     served.began = 978_307_200_000_000_000  # a run in virtual time
     served.add("one", events=[*BEGUN, *LATER]).recorded = True
     page = look(served.start())
-    wait_for(page, "smachpy.store.instantText(smachpy.store.nowMs()) === '00:33.0'")
+    wait_for(page, "smachpy.store.clock.instantText(smachpy.store.playback.nowMs()) === '00:33.0'")
 
 
 def test_two_fingers_zoom(served, look):
@@ -177,7 +179,7 @@ def test_the_tree_opens_on_a_small_screen(served, look):
     page.click(".menu > button")
     page.click(".sheet button:text-is('States')")
     page.click("[role=treeitem][title='/JOB/B']")
-    wait_for(page, "smachpy.store.selected.value === '/JOB/B'")
+    wait_for(page, "smachpy.store.view.selected.value === '/JOB/B'")
     assert not page.is_visible(".tree")
     page.keyboard.press("t")
     page.wait_for_selector(".tree", state="visible")
@@ -307,7 +309,8 @@ def test_why_it_ended_so_and_a_step_goes_there(served, look):
     assert page.text_content(".why pre") == "job.py:7 in go: x"
     page.click(".why .step")
     wait_for(
-        page, "smachpy.store.selected.value === '/JOB/A' && smachpy.store.cursor.value !== null"
+        page,
+        "smachpy.store.view.selected.value === '/JOB/A' && smachpy.store.playback.cursor.value !== null",
     )
     page.keyboard.press("w")
     wait_for(page, "!document.querySelector('.why')")
@@ -411,10 +414,10 @@ def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
     served.add("one", events=BEGUN)
     page = look(served.start())
     page.evaluate(
-        "() => { smachpy.store.pageShown.value = 'runs'; smachpy.store.simulateOpen.value = true; }"
+        "() => { smachpy.store.view.pageShown.value = 'runs'; smachpy.store.view.simulateOpen.value = true; }"
     )
     page.wait_for_selector(".simulate")
     page.keyboard.press("h")  # keys are for the dialog
     page.keyboard.press("Escape")
     wait_for(page, "!document.querySelector('.simulate')")
-    assert page.evaluate("() => smachpy.store.pageShown.value === 'runs'")
+    assert page.evaluate("() => smachpy.store.view.pageShown.value === 'runs'")

@@ -6,7 +6,7 @@ import pytest
 
 pytestmark = pytest.mark.browser
 
-SHOWN = "() => smachpy.store.instantText(smachpy.store.nowMs())"
+SHOWN = "() => smachpy.store.clock.instantText(smachpy.store.playback.nowMs())"
 
 
 def run():
@@ -27,7 +27,7 @@ def freeze(page):
     """Let pictures of a run that is played come when the test asks for them."""
     page.evaluate(
         """() => { let moment = performance.now(); performance.now = () => moment;
-          window.pass = (ms) => { moment += ms; smachpy.store.playOn(moment); }; }"""
+          window.pass = (ms) => { moment += ms; smachpy.store.playback.playOn(moment); }; }"""
     )
 
 
@@ -51,12 +51,14 @@ def test_a_run_is_played_at_its_rate_to_its_end(served, look):
     page.evaluate("() => pass(2000)")
     assert page.evaluate(SHOWN) == "00:18.0"
     page.evaluate(
-        "() => smachpy.store.seek(smachpy.store.run.first() + 49000)"
+        "() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 49000)"
     )  # plays on from there
     page.evaluate("() => pass(3000)")
     assert page.evaluate(SHOWN) == "00:49.8"
     page.evaluate("() => pass(2000)")
-    assert page.evaluate("() => [smachpy.store.cursor.value, smachpy.store.playing.value]") == [
+    assert page.evaluate(
+        "() => [smachpy.store.playback.cursor.value, smachpy.store.playback.playing.value]"
+    ) == [
         None,
         None,
     ]
@@ -72,7 +74,7 @@ def test_a_live_run_is_held_and_becomes_live_again(served, look):
     assert page.evaluate(SHOWN) == "00:02.0"
     page.wait_for_selector(".live-button[aria-pressed=false]")
     machine.add(served.events(run()[3:4], after=3))
-    page.wait_for_function("() => smachpy.store.run.events.length === 4")
+    page.wait_for_function("() => smachpy.store.data.run.events.length === 4")
     assert page.evaluate(SHOWN) == "00:02.0"
     page.keyboard.press(" ")
     page.evaluate("() => pass(8500)")
@@ -99,7 +101,7 @@ def test_keys_and_buttons_jump(served, look):
     assert at == ["00", "20", "40", "20", "10", "00", "02", "30", "02", "00", "00"]
     page.wait_for_selector(".notice")  # there is no goal
     page.keyboard.press("End")
-    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
     page.click(".jumps button:has-text('failure')")  # at the end the newest one is the next
     assert page.evaluate(SHOWN) == "00:40.0"
     page.wait_for_selector(".jumps button:has-text('failure')[aria-disabled=true]")
@@ -127,9 +129,9 @@ def test_space_pauses_the_mission_only_where_one_looks_at_now(served, look):
     page.wait_for_selector("#pause")
     page.keyboard.press(" ")
     page.wait_for_selector(".notice.info")
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first())")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first())")
     page.keyboard.press(" ")
-    page.wait_for_function("() => smachpy.store.playing.value !== null")
+    page.wait_for_function("() => smachpy.store.playback.playing.value !== null")
     assert [one["command"] for one in served.commands] == ["pause"]
 
 
@@ -141,14 +143,14 @@ def test_the_bar_can_be_used_on_a_phone(served, look):
     assert min(box["width"], box["height"]) >= 40
     assert box["y"] + box["height"] <= 844
     page.click("#play")
-    page.wait_for_function("() => smachpy.store.playing.value !== null")
+    page.wait_for_function("() => smachpy.store.playback.playing.value !== null")
 
 
 def at(page, seconds, lane=10):
     """Where an instant is in the timeline."""
     return page.evaluate(
         """([s, y]) => { const { canvas, scale } = smachpy.page.timeline, b = canvas.getBoundingClientRect();
-          return [b.left + scale.x(smachpy.store.run.first() + 1000 * s), b.top + y]; }""",
+          return [b.left + scale.x(smachpy.store.data.run.first() + 1000 * s), b.top + y]; }""",
         [seconds, lane],
     )
 
@@ -161,8 +163,8 @@ def drag(page, begin, end):
     page.mouse.up()
 
 
-STRETCH = """() => { const { stretch, run } = smachpy.store;
-  return stretch.value && [stretch.value.from, stretch.value.to].map((t) => Math.round((t - run.first()) / 1000)); }"""
+STRETCH = """() => { const { data, playback } = smachpy.store, stretch = playback.stretch.value;
+  return stretch && [stretch.from, stretch.to].map((t) => Math.round((t - data.run.first()) / 1000)); }"""
 
 
 def test_a_drag_over_the_lanes_selects_what_is_looped(served, look):
@@ -172,16 +174,16 @@ def test_a_drag_over_the_lanes_selects_what_is_looped(served, look):
     freeze(page)
     drag(page, at(page, 12), at(page, 22))
     assert page.evaluate(STRETCH) == [12, 22]
-    assert page.evaluate("() => smachpy.store.cursor.value") is None  # it moves nothing
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None  # it moves nothing
     page.evaluate(
-        "() => { const { from, to } = smachpy.store.stretch.value; smachpy.store.selectStretch(from - from % 1, to); }"
+        "() => { const { from, to } = smachpy.store.playback.stretch.value; smachpy.store.playback.selectStretch(from - from % 1, to); }"
     )
     page.click("#loop")
     page.wait_for_selector("#loop[aria-pressed=true]")
     first = page.evaluate(SHOWN)
     assert first.startswith("00:1")
     length = page.evaluate(
-        "() => smachpy.store.stretch.value.to - smachpy.store.stretch.value.from"
+        "() => smachpy.store.playback.stretch.value.to - smachpy.store.playback.stretch.value.from"
     )
     page.evaluate("(ms) => pass(ms - 1000)", length)
     assert page.evaluate(SHOWN) != first
@@ -211,7 +213,7 @@ def test_only_the_first_button_moves_the_instant_and_the_wheel_zooms_at_once(ser
     page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
     axis = page.evaluate("() => smachpy.page.timeline.canvas.clientHeight - 8")
     page.mouse.click(*at(page, 12, axis), button="right")
-    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
     shorter = """() => { const { timeline } = smachpy.page, { from, to } = timeline.scale;
       timeline.canvas.dispatchEvent(new WheelEvent("wheel",
         { deltaY: -100, clientX: timeline.canvas.getBoundingClientRect().left + 300, cancelable: true }));
@@ -225,7 +227,7 @@ def test_the_axis_tells_instants_as_the_clock_does(served, look):
     texts = """() => { const { timeline } = smachpy.page, { prototype } = CanvasRenderingContext2D,
       texts = [], before = prototype.fillText;
       prototype.fillText = function (text, ...place) { texts.push(text); before.call(this, text, ...place); };
-      for (const end of [50, 1]) { timeline.length = 1000 * end; timeline.end = smachpy.store.run.first() + 1000 * end;
+      for (const end of [50, 1]) { timeline.length = 1000 * end; timeline.end = smachpy.store.data.run.first() + 1000 * end;
         timeline.draw(); }
       prototype.fillText = before; return texts.filter((text) => /[0-9]/.test(text)); }"""
     told = page.evaluate(texts)
@@ -235,12 +237,12 @@ def test_the_axis_tells_instants_as_the_clock_does(served, look):
 def test_the_stretch_is_chosen_by_keys_by_the_selected_state_and_by_a_link(served, look):
     served.add("one", events=run())
     page = look(served.start())
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 5000)")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 5000)")
     page.keyboard.press("[")
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 15000)")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 15000)")
     page.keyboard.press("]")
     assert page.evaluate(STRETCH) == [5, 15]
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first() + 2000)")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 2000)")
     page.keyboard.press("]")  # it would end before it begins
     assert page.evaluate(STRETCH) == [5, 15]
     address = page.evaluate("() => smachpy.page.address()")
@@ -250,7 +252,7 @@ def test_the_stretch_is_chosen_by_keys_by_the_selected_state_and_by_a_link(serve
     assert page.evaluate(STRETCH) == [5, 15]
     page.keyboard.press("Escape")
     page.evaluate(
-        "() => { smachpy.page.select('/JOB/B'); smachpy.store.seek(smachpy.store.run.first() + 30000); }"
+        "() => { smachpy.page.select('/JOB/B'); smachpy.store.playback.seek(smachpy.store.data.run.first() + 30000); }"
     )
     page.keyboard.press("r")
     assert page.evaluate(STRETCH) == [20, 40]
@@ -260,13 +262,15 @@ def test_the_last_seconds_are_saved_as_a_gif_without_moving_anything(served, loo
     served.add("one", events=run())
     page = look(served.start())
     page.evaluate(
-        "() => { const { store } = smachpy; store.seek(store.run.first() + 30000);"
-        " store.selectStretch(store.run.first() + 19000, store.run.first() + 21000);"
-        " store.togglePlaying(); store.seek(store.run.first() + 30000); }"
+        "() => { const { store } = smachpy; store.playback.seek(store.data.run.first() + 30000);"
+        " store.playback.selectStretch(store.data.run.first() + 19000, store.data.run.first() + 21000);"
+        " store.playback.togglePlaying(); store.playback.seek(store.data.run.first() + 30000); }"
     )
     with page.expect_download() as download:
         page.click(".share button:has-text('GIF')")
-    assert page.evaluate("() => smachpy.store.playing.value") is None  # pictures are of one instant
+    assert (
+        page.evaluate("() => smachpy.store.playback.playing.value") is None
+    )  # pictures are of one instant
     assert download.value.suggested_filename.startswith("JOB-00-3")
     download.value.save_as(tmp_path / "run.gif")
     film = (tmp_path / "run.gif").read_bytes()
@@ -283,7 +287,7 @@ def test_a_film_can_be_stopped_and_freezes_nothing(served, look):
     served.add("one", events=run())
     page = look(served.start())
     page.evaluate(
-        "() => { const { store } = smachpy; store.selectStretch(store.run.first(), store.run.last()); }"
+        "() => { const { store } = smachpy; store.playback.selectStretch(store.data.run.first(), store.data.run.last()); }"
     )
     downloads = []
     page.on("download", lambda one: downloads.append(one))
@@ -291,7 +295,7 @@ def test_a_film_can_be_stopped_and_freezes_nothing(served, look):
     page.wait_for_selector(".share button:has-text('%')")
     page.click(".share button:has-text('%')")  # it takes clicks while it encodes
     page.wait_for_selector(".share button:text-is('GIF')")
-    assert page.evaluate("() => smachpy.store.filmed.value") is None
+    assert page.evaluate("() => smachpy.store.playback.filmed.value") is None
     assert downloads == []
 
 

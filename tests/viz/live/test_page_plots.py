@@ -53,7 +53,9 @@ def page(served, look):
 
 
 def seek(page, seconds):
-    page.evaluate("(s) => smachpy.store.seek(smachpy.store.run.first() + 1000 * s)", seconds)
+    page.evaluate(
+        "(s) => smachpy.store.playback.seek(smachpy.store.data.run.first() + 1000 * s)", seconds
+    )
 
 
 def values(page):
@@ -94,7 +96,7 @@ def test_a_plot_draws_its_line_and_a_click_in_it_goes_to_the_instant(page):
     assert painted > 50
     x = page.evaluate(
         """() => { const { x } = smachpy.page.timeline.scale; const [plot] = smachpy.page.plots;
-          const first = smachpy.store.run.first();
+          const first = smachpy.store.data.run.first();
           const { left, width } = plot.chart.over.getBoundingClientRect(); const { from, to } = plot.range;
           const canvas = smachpy.page.timeline.canvas.getBoundingClientRect();
           return [left + (first + 5000 - from) / (to - from) * width, canvas.left + x(first + 5000)]; }"""
@@ -102,7 +104,7 @@ def test_a_plot_draws_its_line_and_a_click_in_it_goes_to_the_instant(page):
     assert x[0] == pytest.approx(x[1], abs=1.5)  # the plot stands on the timeline's axis
     box = page.locator(".plot-area").first.bounding_box()
     page.mouse.click(x[0], box["y"] + 30)
-    shown = page.evaluate("() => smachpy.store.nowMs() - smachpy.store.run.first()")
+    shown = page.evaluate("() => smachpy.store.playback.nowMs() - smachpy.store.data.run.first()")
     assert shown == pytest.approx(5000, abs=40)
 
 
@@ -128,12 +130,12 @@ def test_any_number_is_plotted_and_the_choice_is_kept_and_linked(page):
     page.wait_for_function("() => location.hash === new URL(smachpy.page.address()).hash")
     page.reload()
     page.wait_for_selector(".plot")
-    assert page.evaluate("() => smachpy.store.plotsChosen.value") == chosen
+    assert page.evaluate("() => smachpy.store.panels.plotsChosen.value") == chosen
     page.evaluate("() => { localStorage.clear(); }")
     page.goto("about:blank")
     page.goto(address)
     page.wait_for_selector(".plot")
-    assert page.evaluate("() => smachpy.store.plotsChosen.value") == chosen
+    assert page.evaluate("() => smachpy.store.panels.plotsChosen.value") == chosen
 
 
 def test_a_plot_of_hostile_names_is_text(served, look):
@@ -160,10 +162,10 @@ def test_a_plot_of_hostile_names_is_text(served, look):
 
 def test_more_plots_than_there_is_room_for_are_refused_with_the_reason(page):
     page.evaluate(
-        "() => smachpy.store.setPlots(Array.from({ length: 6 }, (_, i) => [`topic,t${i}`]))"
+        "() => smachpy.store.panels.setPlots(Array.from({ length: 6 }, (_, i) => [`topic,t${i}`]))"
     )
     page.hover("[aria-label='plot a number of the run']")
     page.wait_for_selector("optgroup[label='topics']", state="attached")
     page.select_option("[aria-label='plot a number of the run']", "topic,battery")
     page.wait_for_selector(".notice.error:has-text('6 plots')")
-    assert page.evaluate("() => smachpy.store.plotsShown.value.length") == 6
+    assert page.evaluate("() => smachpy.store.panels.plotsShown.value.length") == 6

@@ -56,7 +56,7 @@ def no_leaks():
 def test_a_question_is_answered_on_one_page_and_closes_on_all(errand, look):
     """The mission itself takes no commands; its questions do."""
     one, two = (look(f"{errand.base}?machine=errand#token={errand.token}") for _ in range(2))
-    one.evaluate("() => { smachpy.store.operator.value = 'ann'; }")
+    one.evaluate("() => { smachpy.store.view.operator.value = 'ann'; }")
     for page in (one, two):
         page.wait_for_selector(OPEN)
         assert "may I hand it over?" in page.text_content(f"{OPEN} h3")
@@ -83,7 +83,7 @@ def test_of_two_answers_at_once_one_counts(errand, look):
     note_answers(page)
     answers = page.evaluate(
         """async () => {
-          const [[path]] = Object.entries(smachpy.store.run.now.states).filter(([,
+          const [[path]] = Object.entries(smachpy.store.data.run.now.states).filter(([,
             s]) => s.question?.answered === null);
           const give = (answer) => fetch("/api/control?machine=errand", {
             method: "POST", headers: { "x-smachpy-token": sessionStorage.getItem("smachpy.token") },
@@ -117,9 +117,9 @@ def test_the_buttons_do_nothing_without_a_token_or_in_the_past(served, look):
     assert "smachpy answer" in page.text_content(OPEN)
     page = look(f"{served.address}#token=t")
     page.wait_for_selector(OPEN)
-    page.evaluate("() => smachpy.store.seek(smachpy.store.run.first())")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first())")
     page.click(f"{OPEN} .answer:text('Back to live to answer')")
-    wait_for(page, "smachpy.store.cursor.value === null")
+    wait_for(page, "smachpy.store.playback.cursor.value === null")
     with page.expect_response("**/api/control*"):
         page.click(f"{OPEN} .answer.primary")
     (sent,) = served.commands

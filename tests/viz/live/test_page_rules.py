@@ -48,7 +48,7 @@ def test_single_events_back_and_on_though_they_share_an_instant(served, look):
         page.keyboard.press(",")
         seen.append(lit(page))
         # The panels and the picture show the same.
-        assert page.evaluate("() => smachpy.store.activePaths.value") == seen[-1]
+        assert page.evaluate("() => smachpy.store.status.activePaths.value") == seen[-1]
     assert seen == [["/JOB"], ["/JOB", "/JOB/B"], ["/JOB"], ["/JOB", "/JOB/A"], ["/JOB"]]
     page.keyboard.press(",")  # there is nothing before the first
     assert lit(page) == ["/JOB"]
@@ -58,7 +58,7 @@ def test_single_events_back_and_on_though_they_share_an_instant(served, look):
         on.append(lit(page))
     assert on == seen[3::-1]
     page.keyboard.press(".")
-    assert page.evaluate("() => smachpy.store.cursor.value") is None
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
 
 
 def test_a_restart_keeps_the_run_before_to_look_at(served, look):
@@ -67,11 +67,11 @@ def test_a_restart_keeps_the_run_before_to_look_at(served, look):
     history = {"problems": [], "base": None, "control": None, "description": asdict(machine.record)}
     machine.reset({**history, "epoch": "another program", "events": served.events(run()[:1])})
     page.click(".restarted button:text-is('Look at the one before')")
-    wait_for(page, "smachpy.store.facts.value?.after === 'one'")
+    wait_for(page, "smachpy.store.data.facts.value?.after === 'one'")
     assert lit(page) == ["/JOB", "/JOB/A"]
     assert page.text_content("[data-testid=status]") == "recording ends here"
     page.click("button:text-is('Show the newest')")
-    wait_for(page, "smachpy.store.facts.value?.name === 'one'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'one'")
     wait_for(page, "!document.querySelector('.diagram g.active[data-path=\"/JOB/A\"]')")
     page.click(".restarted [aria-label=dismiss]")
     wait_for(page, "!document.querySelector('.restarted')")
@@ -149,7 +149,7 @@ def test_a_hidden_page_gathers_nothing_to_draw(served, look):
     page.evaluate("() => Object.defineProperty(document, 'hidden', { value: true })")
     page.evaluate("() => { smachpy.page.frame = 1; }")  # asked for, and never drawn
     machine.add(served.events([("Entered", "/JOB/A"), ("Left", "/JOB/A", {"outcome": "ok"})], 1))
-    wait_for(page, "smachpy.store.run.events.length === 3")
+    wait_for(page, "smachpy.store.data.run.events.length === 3")
     assert page.evaluate("() => [smachpy.page.flashes.length, smachpy.page.arrived.length]") == [
         0,
         0,
@@ -210,10 +210,10 @@ def test_the_tree_by_keyboard(served, look):
     assert press("ArrowDown", "ArrowDown") == "/JOB/B"
     assert press("ArrowDown") == "/JOB/B"
     page.keyboard.press("Space")
-    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/B"
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/JOB/B"
     assert press("ArrowUp") == "/JOB/A"
     page.keyboard.press("Enter")
-    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/A"
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/JOB/A"
     assert press("ArrowLeft") == "/JOB"
     assert press("ArrowLeft") == "/JOB"
     wait_for(page, "document.querySelectorAll('[role=treeitem]').length === 1")
@@ -240,14 +240,14 @@ def test_a_row_of_userdata_by_keyboard(served, look):
 def test_a_server_that_says_nothing_is_lost_and_found_again(start, look):
     view = start.view()
     page = look(view.base, drawn=False)
-    wait_for(page, "smachpy.store.connection.value === 'live'")
+    wait_for(page, "smachpy.store.data.connection.value === 'live'")
     os.kill(view.pid, signal.SIGSTOP)
     try:
-        wait_for(page, "smachpy.store.connection.value === 'lost'")
+        wait_for(page, "smachpy.store.data.connection.value === 'lost'")
         page.wait_for_selector("text=does not answer")
     finally:
         os.kill(view.pid, signal.SIGCONT)
-    wait_for(page, "smachpy.store.connection.value === 'live'")
+    wait_for(page, "smachpy.store.data.connection.value === 'live'")
 
 
 def test_a_message_that_comes_slowly_is_waited_for(served, look, monkeypatch):
@@ -271,7 +271,7 @@ def test_a_message_that_comes_slowly_is_waited_for(served, look, monkeypatch):
     served.add("one", events=run())
     page = look(served.start())
     assert len(opened) > 1  # it was cut at first
-    wait_for(page, "smachpy.store.connection.value === 'live'")
+    wait_for(page, "smachpy.store.data.connection.value === 'live'")
 
 
 def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
@@ -279,10 +279,12 @@ def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
     page = look(served.start())
     page.keyboard.press(",")
     page.evaluate("() => smachpy.reconnect()")
-    wait_for(page, "smachpy.store.connection.value === 'live'")
+    wait_for(page, "smachpy.store.data.connection.value === 'live'")
     machine.add(served.events(run()[2:4], after=2))
-    wait_for(page, "smachpy.store.run.events.length === 4")
-    assert page.evaluate("() => smachpy.store.cursor.value") is not None  # still looking back
+    wait_for(page, "smachpy.store.data.run.events.length === 4")
+    assert (
+        page.evaluate("() => smachpy.store.playback.cursor.value") is not None
+    )  # still looking back
 
 
 def test_a_busy_network_does_not_hold_the_beat_up(served):
@@ -308,15 +310,15 @@ def test_the_machine_chosen_last_is_shown_however_late_the_first_answers(served,
     page.evaluate(choose, "two")
     page.wait_for_selector('g[data-path="/TWO/Z"]')
     page.evaluate(choose, "one")
-    wait_for(page, "smachpy.store.facts.value?.name === 'one'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'one'")
     page.evaluate(choose, "two")
     page.wait_for_selector('g[data-path="/TWO/Z"]')
-    wait_for(page, "smachpy.store.facts.value?.name === 'two'")
+    wait_for(page, "smachpy.store.data.facts.value?.name === 'two'")
     page.wait_for_timeout(100)
     assert len(held) == 1
     held[0].continue_()
     page.wait_for_timeout(300)
-    assert page.evaluate("() => smachpy.store.model.value.root.path") == "/TWO"
+    assert page.evaluate("() => smachpy.store.data.model.value.root.path") == "/TWO"
     assert page.query_selector('g[data-path="/TWO/Z"]') is not None
 
 
@@ -355,7 +357,10 @@ def test_a_clock_that_differs_is_known_before_anything_happens(served, look):
     served.began -= 3_600_000_000_000
     served.add("one", events=run()[:2]).behind = 3_600_000_000_000
     page = look(served.start())
-    assert page.evaluate("() => smachpy.store.nowMs() - smachpy.store.run.last()") < 60_000
+    assert (
+        page.evaluate("() => smachpy.store.playback.nowMs() - smachpy.store.data.run.last()")
+        < 60_000
+    )
     assert "min" not in page.text_content('g[data-path="/JOB/A"] .badge')
 
 
@@ -364,19 +369,21 @@ def test_clocks_that_differ_do_not_show_as_time_spent(served, look, hours):
     served.began += hours * 3_600_000_000_000
     machine = served.add("one", events=run()[:2])
     page = look(served.start())
-    off = "Math.abs(smachpy.store.nowMs() - smachpy.store.run.last())"
+    off = "Math.abs(smachpy.store.playback.nowMs() - smachpy.store.data.run.last())"
     if hours < 0:
         assert page.evaluate(f"() => {off}") > 3_000_000  # nothing has been heard yet
     deadline = time.monotonic() + 10.0
     seq = 2
-    while page.evaluate(f"() => smachpy.store.robotLag.value === null || {off} > 1000"):
+    while page.evaluate(f"() => smachpy.store.data.robotLag.value === null || {off} > 1000"):
         assert time.monotonic() < deadline
         since = (time.time_ns() - served.began) / 1e9 + hours * 3600
         done = [("Iterated", "/JOB/A", {"number": seq, "at": since})]
         machine.add(served.events(done, after=seq))
         seq += 1
         page.wait_for_timeout(100)
-    wait_for(page, "smachpy.store.nowMs() - smachpy.store.run.last() > 200")  # it goes on
+    wait_for(
+        page, "smachpy.store.playback.nowMs() - smachpy.store.data.run.last() > 200"
+    )  # it goes on
 
 
 def test_a_machine_that_is_not_there_is_named_and_another_can_be_chosen(served, look):
@@ -431,7 +438,7 @@ def test_events_that_the_mission_had_to_drop_are_missed(served, look):
         )
     wait_for(page, "document.querySelector('.gap')?.textContent.includes('398 events')")
     assert "398 events missing here" in page.text_content(".log")
-    wait_for(page, "smachpy.store.runStatus.value.word === 'ended: done'")
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'ended: done'")
 
 
 def test_a_saved_picture_has_the_colours_and_the_active_states_of_the_page(served, look):
@@ -447,7 +454,7 @@ def test_a_saved_picture_has_the_colours_and_the_active_states_of_the_page(serve
     page.evaluate("() => smachpy.page.setTheme('light')")
     wait_for(page, "document.querySelector('.sheet a').href.includes('&theme=light')")
     # Of the instant that is shown.
-    page.evaluate("() => smachpy.store.seekTo(2)")
+    page.evaluate("() => smachpy.store.playback.seekTo(2)")
     wait_for(page, "document.querySelector('.sheet a').href.endsWith('&active=%2FJOB%2FA')")
     with page.expect_download() as download:
         page.click(".sheet a:text-is('svg')")
@@ -481,7 +488,7 @@ def test_what_the_page_keeps_has_an_end(served, look):
     )
     kept = page.evaluate(
         """(events) => {
-          const run = new smachpy.store.run.constructor(null, []);
+          const run = new smachpy.store.data.run.constructor(null, []);
           let gone = 0;
           for (let i = 0; i < events.length; i += 10) {
             run.push(events.slice(i, i + 10));
@@ -513,23 +520,25 @@ def test_looking_back_stays_where_it_is_while_older_events_are_forgotten(served,
     machine = served.add("one", events=run()[:2])
     page = look(served.start())
     page.evaluate(
-        "() => { smachpy.store.settings.value = { ...smachpy.store.settings.value, kept: 1000 }; }"
+        "() => { smachpy.store.data.settings.value = { ...smachpy.store.data.settings.value, kept: 1000 }; }"
     )
     pairs = [("Left", "/JOB/A", {"outcome": "ok"}), ("Entered", "/JOB/A")]
     seq = 2
     for turn in range(8):
         machine.add(served.events(pairs * 150, after=seq))
         seq += 300
-        wait_for(page, f"smachpy.store.run.events.at(-1).seq === {seq}")
+        wait_for(page, f"smachpy.store.data.run.events.at(-1).seq === {seq}")
         if turn == 5:
             shown = page.evaluate(
-                """() => { const { store } = smachpy; store.seekTo(store.run.events.length - 11);
-                  return store.shown().states; }"""
+                """() => { const { store } = smachpy; store.playback.seekTo(store.data.run.events.length - 11);
+                  return store.playback.shown().states; }"""
             )
-    assert page.evaluate("() => smachpy.store.run.events.length") < 1400
-    assert page.evaluate("() => smachpy.store.shown().states") == shown
-    page.evaluate("() => { smachpy.store.seekEvent(-1); smachpy.store.seekEvent(1); }")
-    assert page.evaluate("() => smachpy.store.shown().states") == shown
+    assert page.evaluate("() => smachpy.store.data.run.events.length") < 1400
+    assert page.evaluate("() => smachpy.store.playback.shown().states") == shown
+    page.evaluate(
+        "() => { smachpy.store.playback.seekEvent(-1); smachpy.store.playback.seekEvent(1); }"
+    )
+    assert page.evaluate("() => smachpy.store.playback.shown().states") == shown
     wait_for(page, "smachpy.page.flashes.length === 0")
 
 
@@ -538,10 +547,10 @@ def test_what_comes_just_before_one_looks_back_does_not_flash_later(served, look
     page = look(served.start())
     page.evaluate(
         """() => { const { page, store } = smachpy;
-          const newest = store.run.events.at(-1);
+          const newest = store.data.run.events.at(-1);
           page.takeEvents([{ ...newest, kind: "Left", outcome: "ok", seq: newest.seq + 1 }]);
           window.waiting = page.flashes.length;
-          store.seekTo(1); }"""  # before the next frame
+          store.playback.seekTo(1); }"""  # before the next frame
     )
     assert page.evaluate("() => window.waiting") == 1
     wait_for(page, "smachpy.page.flashes.length === 0")
@@ -659,14 +668,14 @@ def test_the_arrows_of_the_search_stay_on_what_it_shows(served, look):
     root = StateRecord("/JOB", "JOB", "machine", "StateMachine", ("done",), children=leaves)
     served.add("one").describe(root)
     page = look(served.start())
-    wait_for(page, "smachpy.store.model.value.order.length === 21")
+    wait_for(page, "smachpy.store.data.model.value.order.length === 21")
     page.fill("#search", "step")
     assert "and 8 more" in page.text_content(".results")
     for _ in range(16):
         page.press("#search", "ArrowDown")
     assert page.text_content(".results .at b") == "STEP_11"
     page.press("#search", "Enter")
-    assert page.evaluate("() => smachpy.store.selected.value") == "/JOB/STEP_11"
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/JOB/STEP_11"
 
 
 def test_breakpoints_after_an_outcome_and_a_pause_that_stops_what_runs(served, look):
@@ -715,7 +724,7 @@ def test_half_a_character_in_a_name_breaks_nothing(served, look):
         "one", labels=["A\ud800", "B"], events=[("Started", "/JOB"), ("Entered", "/JOB/A\ud800")]
     )
     page = look(served.start())
-    wait_for(page, "smachpy.store.activeLeaves.value.length === 1")
+    wait_for(page, "smachpy.store.status.activeLeaves.value.length === 1")
     page.click(".menu > button")
     page.wait_for_selector(".sheet a:text-is('svg')")
     with page.expect_download():

@@ -20,7 +20,7 @@ def machines(served, count):
 
 
 def has_events(page, count):
-    wait_for(page, f"smachpy.store.run.events.length === {count}")
+    wait_for(page, f"smachpy.store.data.run.events.length === {count}")
 
 
 def test_more_tabs_of_one_browser_than_it_has_connections_work(served, look):
@@ -38,7 +38,7 @@ def test_more_tabs_of_one_browser_than_it_has_connections_work(served, look):
         served.machines.get(f"robot_{n}/job").add(served.events([ENTERED], after=2))
     for tab in tabs:
         has_events(tab, 3)
-        assert tab.evaluate("() => smachpy.store.connection.value") == "live"
+        assert tab.evaluate("() => smachpy.store.data.connection.value") == "live"
     tabs[-1].click("#pause")
     tabs[-1].wait_for_selector(".notice.info")
     assert [one["command"] for one in served.commands] == ["pause"]
@@ -52,7 +52,7 @@ def test_a_second_tab_of_a_machine_moves_nothing_in_the_first(served, look):
     address = machines(served, 1)
     first = look(address)
     first.keyboard.press(",")
-    before = first.evaluate("() => smachpy.store.cursor.value")
+    before = first.evaluate("() => smachpy.store.playback.cursor.value")
     assert before is not None
     second = first.context.new_page()
     second.goto(address)
@@ -60,7 +60,7 @@ def test_a_second_tab_of_a_machine_moves_nothing_in_the_first(served, look):
     served.machines.get("robot_0/job").add(served.events([ENTERED], after=2))
     for tab in (first, second):
         has_events(tab, 3)
-    assert first.evaluate("() => smachpy.store.cursor.value") == before
+    assert first.evaluate("() => smachpy.store.playback.cursor.value") == before
 
 
 HIDE = """(hidden) => {
@@ -84,4 +84,4 @@ def test_a_hidden_tab_has_no_stream_and_goes_on_where_it_was(served, look, share
     has_events(page, 3)
     machine.add(served.events([("Left", "/JOB/B", {"outcome": "ok"})], after=3))
     has_events(page, 4)
-    assert page.evaluate("() => smachpy.store.gap.value") is None
+    assert page.evaluate("() => smachpy.store.data.gap.value") is None

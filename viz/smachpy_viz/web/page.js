@@ -1,9 +1,3 @@
-var __defProp = Object.defineProperty;
-var __export = (target, all) => {
-  for (var name in all)
-    __defProp(target, name, { get: all[name], enumerable: true });
-};
-
 // node_modules/preact/dist/preact.mjs
 var n;
 var t;
@@ -1191,12 +1185,12 @@ var Hub = class {
     port.postMessage({ event: "standing", standing: this.#standing });
   }
   #tellAll(message) {
-    for (const [port, { follow: follow3 }] of this.#pages) if (follow3) port.postMessage(message);
+    for (const [port, { follow: follow2 }] of this.#pages) if (follow2) port.postMessage(message);
   }
   /** The pages that are to get the events of their machine. */
   get #looking() {
     for (const [port, { heard }] of this.#pages) if (Date.now() - heard > GONE_MS) this.#pages.delete(port);
-    return [...this.#pages.values()].filter(({ follow: follow3 }) => follow3 && !follow3.hidden);
+    return [...this.#pages.values()].filter(({ follow: follow2 }) => follow2 && !follow2.hidden);
   }
   /** Open a stream for what the pages follow now, in a moment. @param pause [ms] */
   #open(pause, anyway = false) {
@@ -1217,7 +1211,7 @@ var Hub = class {
     if (!looking.length && (!this.isShared || !this.#pages.size)) return;
     const words2 = ["actions=1"];
     for (const name of names) {
-      const of = looking.filter(({ follows }) => follows === name).map(({ follow: follow3 }) => follow3);
+      const of = looking.filter(({ follows }) => follows === name).map(({ follow: follow2 }) => follow2);
       const last = of.map((one) => one.last).reduce(older);
       words2.push(`machine=${encoded(name)}`, `last=${encoded(last)}`);
       words2.push(`seen=${last ? of.reduce((least, one) => Math.min(least, one.seen), Infinity) : -1}`);
@@ -1253,8 +1247,8 @@ var Hub = class {
     const words2 = id.split(" ");
     if (!id || words2.length !== this.#names.length) return;
     for (const [i4, name] of this.#names.entries()) this.#lasts.set(name, decodeURIComponent(words2[i4]));
-    for (const { follow: follow3, follows, hasAll } of this.#looking)
-      if (follow3 && hasAll) follow3.last = this.#lasts.get(follows) ?? follow3.last;
+    for (const { follow: follow2, follows, hasAll } of this.#looking)
+      if (follow2 && hasAll) follow2.last = this.#lasts.get(follows) ?? follow2.last;
   }
   #pass(event, text2) {
     const message = { event, text: text2 };
@@ -1267,8 +1261,8 @@ var Hub = class {
       this.#watch(JSON.parse(text2).beat);
     } else if (event === "actions") this.#actions = text2;
     else if (event === "machines") {
-      const { machines: machines2, gone } = JSON.parse(text2);
-      for (const one of machines2) this.#machines.set(one.name, one);
+      const { machines, gone } = JSON.parse(text2);
+      for (const one of machines) this.#machines.set(one.name, one);
       for (const name of gone) this.#machines.delete(name);
       message.text = JSON.stringify([...this.#machines.values()]);
       if (this.#looking.some(({ follows }) => !follows) && this.#firstMachine()) this.#open(0);
@@ -1288,9 +1282,9 @@ var Hub = class {
     const all = [...this.#machines.values()].sort((a5, b3) => a5.name < b3.name ? -1 : 1);
     return (all.find((one) => one.stale === null) ?? all[0])?.name ?? "";
   }
-  #set(state, problem2 = "", wantsToken = false) {
-    const isSame = this.#standing.state === state && this.#standing.problem === problem2;
-    this.#standing = { state, problem: problem2, wantsToken };
+  #set(state, problem = "", wantsToken = false) {
+    const isSame = this.#standing.state === state && this.#standing.problem === problem;
+    this.#standing = { state, problem, wantsToken };
     if (!isSame) this.#tellAll({ event: "standing", standing: this.#standing });
   }
   /** The server refused the stream: an EventSource does not tell why. */
@@ -1333,141 +1327,62 @@ function older(a5, b3) {
 }
 var encoded = (text2) => encodeURIComponent(text2.replace(/\p{Surrogate}/gu, "�"));
 
-// src/core/store.ts
-var store_exports = {};
-__export(store_exports, {
-  CLOCKS: () => CLOCKS,
-  actions: () => actions,
-  activeLeaves: () => activeLeaves,
-  activePaths: () => activePaths,
-  addEvents: () => addEvents,
-  addLine: () => addLine,
-  addNotes: () => addNotes,
-  addObserved: () => addObserved,
-  arrange: () => arrange,
-  arrangement: () => arrangement,
-  arrangementShown: () => arrangementShown,
-  askForNote: () => askForNote,
-  began: () => began,
-  chosenAction: () => chosenAction,
-  clock: () => clock,
-  comparison: () => comparison,
-  connection: () => connection,
-  cursor: () => cursor,
-  dismissed: () => dismissed,
-  eventsShown: () => eventsShown,
-  facts: () => facts,
-  failure: () => failure,
-  filmed: () => filmed,
-  follow: () => follow,
-  followedKey: () => followedKey,
-  gap: () => gap,
-  goes: () => goes,
-  hasMap: () => hasMap,
-  hasNoServer: () => hasNoServer,
-  help: () => help,
-  hover: () => hover,
-  hoverAt: () => hoverAt,
-  hoverHandlers: () => hoverHandlers,
-  hovered: () => hovered,
-  hoveredSpan: () => hoveredSpan,
-  implicit: () => implicit,
-  instant: () => instant2,
-  instantText: () => instantText,
-  isLit: () => isLit,
-  isMissing: () => isMissing,
-  isPhone: () => isPhone,
-  jump: () => jump,
-  jumpOf: () => jumpOf,
-  keepOpened: () => keepOpened,
-  laidOut: () => laidOut,
-  laneFilter: () => laneFilter,
-  lastLeaves: () => lastLeaves,
-  liveMs: () => liveMs,
-  loadNotes: () => loadNotes,
-  loadPlots: () => loadPlots,
-  logFilter: () => logFilter,
-  looping: () => looping,
-  machines: () => machines,
-  marks: () => marks,
-  model: () => model,
-  moveStretch: () => moveStretch,
-  nameOf: () => nameOf,
-  noteAt: () => noteAt,
-  notes: () => notes,
-  notice: () => notice,
-  notify: () => notify,
-  nowMs: () => nowMs,
-  numbers: () => numbers,
-  openAround: () => openAround,
-  openOneLevelLess: () => openOneLevelLess,
-  opened: () => opened2,
-  operator: () => operator,
-  overview: () => overview,
-  pageShown: () => pageShown,
-  paletteOpen: () => paletteOpen,
-  panelsThere: () => panelsThere,
-  part: () => part,
-  pins: () => pins,
-  playOn: () => playOn,
-  playing: () => playing,
-  plotsChosen: () => plotsChosen,
-  plotsShown: () => plotsShown,
-  pointed: () => pointed,
-  problem: () => problem,
-  problems: () => problems,
-  query: () => query,
-  rate: () => rate,
-  removeLine: () => removeLine,
-  removeNote: () => removeNote,
-  reveal: () => reveal,
-  robotLag: () => robotLag,
-  robotNames: () => robotNames,
-  run: () => run,
-  runStatus: () => runStatus,
-  runText: () => runText,
-  runningLeaves: () => runningLeaves,
-  runs: () => runs,
-  runsKnown: () => runsKnown,
-  runsProblem: () => runsProblem,
-  save: () => save,
-  scene: () => scene,
-  seek: () => seek,
-  seekEvent: () => seekEvent,
-  seekTo: () => seekTo,
-  selectStretch: () => selectStretch,
-  selected: () => selected,
-  serversSeen: () => serversSeen,
-  setClock: () => setClock,
-  setImplicit: () => setImplicit,
-  setModel: () => setModel,
-  setOpened: () => setOpened,
-  setPlots: () => setPlots,
-  setRate: () => setRate,
-  settings: () => settings,
-  shortcuts: () => shortcuts,
-  shown: () => shown,
-  simulateOpen: () => simulateOpen,
-  simulations: () => simulations,
-  slowTick: () => slowTick,
-  sound: () => sound,
-  startRun: () => startRun,
-  statistics: () => statistics,
-  stretch: () => stretch,
-  theme: () => theme,
-  tick: () => tick,
-  toggle: () => toggle,
-  toggleLoop: () => toggleLoop,
-  togglePin: () => togglePin,
-  togglePlaying: () => togglePlaying,
-  tokenAsked: () => tokenAsked,
-  treeOpen: () => treeOpen,
-  viewerLag: () => viewerLag,
-  wanted: () => wanted,
-  wayShown: () => wayShown,
-  why: () => why,
-  whyDisarmed: () => whyDisarmed
-});
+// src/core/storage.ts
+function saved(name, fallback) {
+  try {
+    return JSON.parse(localStorage.getItem(`smachpy.${name}`) ?? "null") ?? fallback;
+  } catch {
+    return fallback;
+  }
+}
+function save(name, value) {
+  try {
+    localStorage.setItem(`smachpy.${name}`, JSON.stringify(value));
+  } catch {
+  }
+}
+
+// src/core/store/clock.ts
+var CLOCKS = ["run", "wall", "relative"];
+var Clock = class {
+  chosen = y3(saved("clock", "run"));
+  #data;
+  #playback;
+  constructor(data, playback) {
+    this.#data = data;
+    this.#playback = playback;
+  }
+  choose(name) {
+    this.chosen.value = name;
+    save("clock", name);
+    this.#playback.slowTick.value += 1;
+  }
+  /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */
+  instantText(t4, digits = 1) {
+    if (this.chosen.value === "wall") return wallText(t4, digits);
+    if (this.chosen.value !== "relative") return this.runText(t4, digits);
+    const live = this.#data.liveMs();
+    const seconds = (t4 - live) / 1e3;
+    return Math.abs(seconds) < 60 ? `${seconds.toFixed(digits)} s` : this.runText(t4, digits, live);
+  }
+  /** An instant as time since another one, by default the beginning of the run, such as 00:32.0. */
+  runText(t4, digits = 1, since = this.#playback.began() ?? t4) {
+    const seconds = (t4 - since) / 1e3;
+    const unit = 10 ** digits;
+    const all = Math.round(Math.abs(seconds) * unit);
+    const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
+    const hours = Math.floor(all / (3600 * unit));
+    const part = digits ? `.${String(all % unit).padStart(digits, "0")}` : "";
+    const minutes = `${two(all / unit / 60 % 60)}:${two(all / unit % 60)}${part}`;
+    return `${seconds < 0 && all ? "-" : ""}${hours ? `${hours}:` : ""}${minutes}`;
+  }
+};
+function wallText(t4, digits) {
+  const unit = 10 ** digits;
+  const rounded2 = new Date(Math.round(t4 * unit / 1e3) * (1e3 / unit));
+  const part = digits ? `.${String(Math.round(rounded2.getMilliseconds() * (unit / 1e3))).padStart(digits, "0")}` : "";
+  return `${rounded2.toLocaleTimeString("en-GB", { hour12: false })}${part}`;
+}
 
 // src/core/fold.ts
 var RAISED = "exception";
@@ -1498,10 +1413,10 @@ function put(map, key, value) {
   else Object.defineProperty(map, key, { value, writable: true, enumerable: true, configurable: true });
   return value;
 }
-var requestOf = ({ source, by, why: why2, grace }) => ({
+var requestOf = ({ source, by, why, grace }) => ({
   source: source ?? null,
   by: by ?? null,
-  why: why2 ?? null,
+  why: why ?? null,
   grace: grace ?? null
 });
 function foldOne(data, e4) {
@@ -1681,841 +1596,6 @@ function countWhile(list, holds) {
 }
 var innermost = (list, pathOf2) => list.filter((one) => !list.some((other) => pathOf2(other).startsWith(`${pathOf2(one)}/`)));
 
-// src/core/values.ts
-var MOST = 2e4;
-var ROUNDED = 6;
-var WIDE = 88;
-var QUOTED = /[\\\p{Cc}\u00a0\u2028\u2029]/gu;
-var ESCAPES = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "	": "\\t" };
-function quoted(text2) {
-  const quote = text2.includes("'") && !text2.includes('"') ? '"' : "'";
-  const hex = (c4) => c4.charCodeAt(0).toString(16);
-  const inside = text2.replace(QUOTED, (c4) => {
-    const long = c4.charCodeAt(0) > 255;
-    return ESCAPES[c4] ?? (long ? `\\u${hex(c4)}` : `\\x${hex(c4).padStart(2, "0")}`);
-  });
-  return `${quote}${quote === "'" ? inside.replaceAll("'", "\\'") : inside}${quote}`;
-}
-var isTree = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
-var items = (value) => {
-  if (!Array.isArray(value)) throw new TypeError("no list");
-  return value;
-};
-var className = (value) => String(value.$object ?? String(value.$msg).split("/").at(-1));
-function fieldsOf(value) {
-  if (!isTree(value)) return null;
-  if ("$msg" in value || "$object" in value) return isTree(value.fields) ? value.fields : {};
-  return formOf(value) === null ? value : null;
-}
-var FORMS = {
-  $tuple: ({ $tuple }) => listed("tuple", "(", items($tuple), items($tuple).length === 1 ? ",)" : ")"),
-  $set: ({ $set }) => items($set).length ? listed("set", "{", items($set), "}") : "set()",
-  $items: ({ $items }) => ({
-    ...{ name: "dict", begin: "{", end: "}", sign: ": " },
-    parts: items($items).map((item) => [brief(items(item)[0]), items(item)[1]])
-  }),
-  $float: ({ $float }) => String($float),
-  $int: ({ $int }) => String($int),
-  $bytes: ({ $bytes }) => `b${quoted(atob(String($bytes)))}`,
-  $msg: (value) => called(value),
-  $object: (value) => called(value),
-  $array: ({ $array, dtype }) => listed("array", "array([", items($array), `], dtype=${dtype})`),
-  $cut: ({ $cut }) => `${quoted(String($cut))}…`,
-  $large: ({ $large, length }) => `<${$large} of ${length} elements>`,
-  $repr: ({ $repr }) => String($repr)
-};
-var listed = (name, begin, parts, end) => ({
-  name,
-  begin,
-  end,
-  sign: "",
-  parts: parts.map((one) => [null, one])
-});
-var called = (value) => ({
-  ...{ name: className(value), begin: `${className(value)}(`, end: ")", sign: "=" },
-  parts: Object.entries(fieldsOf(value) ?? {})
-});
-var formOf = (value) => Object.keys(FORMS).find((mark) => Object.hasOwn(value, mark)) ?? null;
-function opened(value, numberText2) {
-  if (value === null || value === void 0) return "None";
-  if (typeof value === "boolean") return value ? "True" : "False";
-  if (typeof value === "number") return numberText2(value);
-  if (typeof value === "string") return quoted(value);
-  if (Array.isArray(value)) return listed("list", "[", value, "]");
-  if (!isTree(value)) return String(value);
-  const form = formOf(value);
-  try {
-    if (form) return FORMS[form](value);
-  } catch {
-  }
-  const parts = Object.entries(value).map(([key, part2]) => [quoted(key), part2]);
-  return { name: "dict", begin: "{", end: "}", sign: ": ", parts };
-}
-var rounded = (number) => String(Number.isInteger(number) ? number : Number(number.toPrecision(ROUNDED)));
-var branchOf = (value) => opened(value, rounded);
-var brief = (value) => text(value, rounded);
-function text(value, numberText2) {
-  const one = opened(value, numberText2);
-  if (typeof one === "string") return one;
-  const parts = one.parts.map(([name, part2]) => `${head(one, name)}${text(part2, numberText2)}`);
-  return `${one.begin}${parts.join(", ")}${one.end}`;
-}
-var head = ({ sign: sign2 }, name) => name === null ? "" : `${name}${sign2}`;
-var pretty = (value) => wrapped(value, "").slice(0, MOST);
-function wrapped(value, indent) {
-  const line = text(value, String);
-  const one = opened(value, String);
-  if (typeof one === "string" || line.length + indent.length <= WIDE) return line;
-  const inner = `${indent}  `;
-  const parts = one.parts.map(([name, part2]) => `${inner}${head(one, name)}${wrapped(part2, inner)}`);
-  return `${one.begin}
-${parts.join(",\n")}
-${indent}${one.end}`;
-}
-function wasShortened(value) {
-  if (Array.isArray(value)) return value.some(wasShortened);
-  if (!isTree(value)) return false;
-  if ("$cut" in value || "$large" in value || String(value.$repr ?? "").endsWith("…")) return true;
-  return Object.values(value).some(wasShortened);
-}
-
-// src/core/scene.ts
-var COLOURS = 8;
-var MOST_POSES = 6e4;
-var MOST_SEEN = 4e3;
-var MOST_SERIES = 400;
-var NEAR = 0.3;
-var ENDED = { Left: 1, Failed: 1, Finished: 1 };
-var robotOf = (action) => String(action ?? "").replace(/^\//, "").replace(/\/?[^/]*$/, "");
-var fields = (value) => fieldsOf(value) ?? {};
-var isNumber = (value) => Number.isFinite(value);
-function placeOf2(stamped) {
-  const outer = fields(stamped);
-  const { position: position2, orientation } = fields(outer.pose ?? stamped);
-  const { x: x3, y: y5 } = fields(position2);
-  if (!isNumber(x3) || !isNumber(y5)) return null;
-  const turn = fields(orientation);
-  const [qx, qy, qz, qw] = [turn.x, turn.y, turn.z, turn.w].map((v4) => isNumber(v4) ? v4 : 0);
-  const frame = fields(outer.header).frame_id ?? "map";
-  const yaw = Math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz));
-  return /(^|\/)map$/.test(String(frame)) ? { x: x3, y: y5, yaw } : null;
-}
-var placeIn = (message, names) => names.map((name) => placeOf2(own(fields(message), name))).find((place) => place !== null) ?? null;
-var GOALS = ["target_pose", "pose", "goal_pose", "goal"];
-var FEEDBACK = ["base_position", "current_pose"];
-var LONGEST_NAME = 40;
-var MOST_NAMES = 200;
-function namedPlaces(value) {
-  const one = namedPlace(value, null);
-  if (one) return [one];
-  const parts = isTree(value) ? value.$tuple : value;
-  const named = Array.isArray(parts) ? parts.slice(0, MOST_NAMES).map((part2) => namedPlace(part2, null)) : Object.entries(fields(value)).slice(0, MOST_NAMES).map(([key, part2]) => namedPlace(part2, key));
-  return named.filter((place) => place !== null);
-}
-function namedPlace(value, key) {
-  const { name, label, x: x3, y: y5, pose } = fields(value);
-  const called2 = name ?? label ?? key;
-  if (typeof called2 !== "string" || !called2 || called2.length > LONGEST_NAME) return null;
-  const place = isNumber(x3) && isNumber(y5) ? { x: x3, y: y5 } : placeOf2(pose ?? value) ?? fields(pose);
-  return isNumber(place.x) && isNumber(place.y) ? { name: called2, x: place.x, y: place.y } : null;
-}
-var countUntil = (list, t4) => countWhile(list, (one) => one.t <= t4);
-function newestAt(goals, t4) {
-  const goal = goals[countUntil(goals, t4) - 1];
-  return goal && (goal.to === null || t4 <= goal.to) ? goal : null;
-}
-var newRobot = () => ({
-  poses: [],
-  observed: null,
-  scans: [],
-  plans: [],
-  goals: [],
-  tasks: [],
-  pieces: [],
-  done: 0
-});
-var Scene = class {
-  robots = /* @__PURE__ */ new Map();
-  maps = [];
-  /** values of topics, for plots */
-  series = /* @__PURE__ */ new Map();
-  /** beginning of the visit of each running state, by path */
-  entered = /* @__PURE__ */ new Map();
-  /** paths of the states that drive, in order of their first drive, which determines their colours */
-  drivers = [];
-  names = [];
-  revision = 0;
-  // counts the changes
-  #robot(name) {
-    let robot = this.robots.get(name);
-    if (!robot) {
-      robot = newRobot();
-      this.robots.set(name, robot);
-    }
-    return robot;
-  }
-  addEvents(events) {
-    for (const e4 of events) this.#event(e4, e4.stamp_ns / 1e6);
-    if (events.length) this.revision += 1;
-  }
-  #event(e4, t4) {
-    if (e4.kind === "Entered" || e4.kind === "Started") this.entered.set(e4.path, t4);
-    else if (Object.hasOwn(ENDED, e4.kind)) this.entered.delete(e4.path);
-    else if (e4.kind === "UserdataWritten") {
-      for (const named of namedPlaces(e4.value)) this.names.push({ t: t4, ...named });
-    } else if (e4.kind === "GoalSent") this.#goalSent(e4, t4);
-    else if (e4.kind === "GoalFeedback") {
-      const place = placeIn(e4.feedback, FEEDBACK);
-      if (place) this.#pose(robotOf(e4.action), { t: t4, ...place }, false);
-    } else if (e4.kind === "GoalDone") {
-      const robot = this.robots.get(robotOf(e4.action));
-      const goal = robot?.goals.findLast((one) => one.id === e4.goal_id);
-      if (goal) Object.assign(goal, { to: t4, status: e4.status, text: e4.text });
-      const task = robot?.tasks.findLast((one) => one.id === e4.goal_id);
-      if (task) task.to = t4;
-    }
-  }
-  #goalSent(e4, t4) {
-    const place = placeIn(e4.goal, GOALS);
-    const robot = this.#robot(robotOf(e4.action));
-    const from = this.entered.get(e4.path) ?? t4;
-    if (!place) {
-      robot.tasks.push({ id: e4.goal_id, path: e4.path, visit: from, t: t4, to: null });
-      if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t4) this.#resetPieces(robot);
-      return;
-    }
-    const goal = {
-      id: e4.goal_id,
-      path: e4.path,
-      visit: from,
-      t: t4,
-      to: null,
-      status: "ACTIVE",
-      text: "",
-      ...place
-    };
-    robot.goals.push(goal);
-    if (!this.drivers.includes(e4.path)) this.drivers.push(e4.path);
-    if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t4) this.#resetPieces(robot);
-  }
-  /** Make the pieces of a robot's track anew. */
-  #resetPieces(robot) {
-    robot.pieces = [];
-    robot.done = 0;
-  }
-  #pose(name, pose, observed) {
-    const robot = this.#robot(name);
-    if (observed && robot.observed === null) {
-      robot.observed = pose.t;
-      robot.poses.length = countUntil(robot.poses, pose.t);
-      this.#resetPieces(robot);
-    }
-    if (!observed && robot.observed !== null && pose.t >= robot.observed) return;
-    const last = robot.poses.at(-1);
-    if (last && last.t > pose.t) {
-      robot.poses.splice(countUntil(robot.poses, pose.t), 0, pose);
-      this.#resetPieces(robot);
-    } else if (!last || last.t < pose.t || last.x !== pose.x || last.y !== pose.y) robot.poses.push(pose);
-    if (robot.poses.length > MOST_POSES) {
-      robot.poses.splice(0, MOST_POSES / 4);
-      this.#resetPieces(robot);
-    }
-  }
-  addObserved(records) {
-    for (const record of records) {
-      const t4 = record.stamp_ns / 1e6;
-      const take = own(OBSERVERS, record.what);
-      take?.(this, record, t4, this.#robot(record.robot));
-      if (record.what === "pose") {
-        const [x3, y5, yaw] = record.at;
-        this.#pose(record.robot, { t: t4, x: x3, y: y5, yaw }, true);
-      }
-    }
-    if (records.length) this.revision += 1;
-  }
-  /** Whether there is anything to show on a map. */
-  get isEmpty() {
-    return !this.maps.length && ![...this.robots.values()].some((robot) => robot.poses.length || robot.goals.length);
-  }
-  /** The track of a robot, cut where another visit, or none, drives it. */
-  piecesOf(robot) {
-    for (; robot.done < robot.poses.length; robot.done++) {
-      const pose = robot.poses[robot.done];
-      const goal = newestAt(robot.goals, pose.t) ?? newestAt(robot.tasks, pose.t);
-      const path = goal?.path ?? null;
-      const visit = goal?.visit ?? null;
-      const last = robot.pieces.at(-1);
-      const moved2 = robot.done > 0 && robot.poses[robot.done - 1].x !== pose.x;
-      if (path !== null && moved2 && !this.drivers.includes(path)) this.drivers.push(path);
-      if (last && last.path === path && last.visit === visit) last.poses.push(pose);
-      else {
-        const before = last?.poses.at(-1);
-        robot.pieces.push({ path, visit, poses: before ? [before, pose] : [pose] });
-      }
-    }
-    return robot.pieces;
-  }
-  /** The number of the colour of a state's tracks; -1 if it has not driven. */
-  colourOf(path) {
-    return this.drivers.indexOf(path);
-  }
-  /** The pose of a robot at an instant; null if it is not known yet. */
-  poseAt(robot, t4) {
-    return robot.poses[countUntil(robot.poses, t4) - 1] ?? null;
-  }
-  /** The map at an instant; before the first one, the first one. */
-  mapAt(t4) {
-    return (this.maps[countUntil(this.maps, t4) - 1] ?? this.maps[0])?.map ?? null;
-  }
-  /** The name of a goal's place; "" if it has none. */
-  placeName(goal) {
-    const near = (one) => Math.hypot(one.x - goal.x, one.y - goal.y) < NEAR;
-    return this.names.findLast(near)?.name ?? "";
-  }
-  /** The newest goal of a visit. */
-  goalOf(path, visit) {
-    for (const robot of this.robots.values()) {
-      const goal = robot.goals.findLast((one) => one.path === path && one.visit === visit);
-      if (goal) return goal;
-    }
-    return null;
-  }
-  /** The goal with an id, if it leads to a place. */
-  goalWithId(id) {
-    for (const robot of this.robots.values()) {
-      const goal = robot.goals.findLast((one) => one.id === id);
-      if (goal) return goal;
-    }
-    return null;
-  }
-  /**
-   * The piece of a track nearest to a place, and the time at which the robot was there.
-   * @param within [m]
-   * @param until later poses are ignored [ms]
-   */
-  nearest(x3, y5, within3, until = Infinity) {
-    let best = null;
-    for (const robot of this.robots.values())
-      for (const piece of this.piecesOf(robot))
-        for (let i4 = 0; i4 < piece.poses.length && piece.poses[i4].t <= until; i4++) {
-          const a5 = piece.poses[Math.max(0, i4 - 1)];
-          const b3 = piece.poses[i4];
-          const { far, part: part2 } = toSegment(x3, y5, a5, b3);
-          if (far > within3 || best && far > best.far + 1e-6) continue;
-          best = { piece, t: a5.t + part2 * (b3.t - a5.t), far };
-        }
-    return best;
-  }
-  /** The box around all places, and the map. */
-  extent(t4) {
-    const xs = [];
-    const ys = [];
-    const map = this.mapAt(t4);
-    if (map)
-      for (const [u4, v4] of [
-        [0, 0],
-        [map.width, 0],
-        [0, map.height],
-        [map.width, map.height]
-      ]) {
-        const place = cellAt(map, u4, v4);
-        xs.push(place.x);
-        ys.push(place.y);
-      }
-    else
-      for (const robot of this.robots.values())
-        for (const { x: x4, y: y6 } of [...robot.poses, ...robot.goals]) {
-          xs.push(x4);
-          ys.push(y6);
-        }
-    if (!xs.length) return null;
-    const least = (all) => all.reduce((a5, b3) => Math.min(a5, b3));
-    const most = (all) => all.reduce((a5, b3) => Math.max(a5, b3));
-    const [x3, y5] = [least(xs), least(ys)];
-    return { x: x3, y: y5, w: Math.max(1, most(xs) - x3), h: Math.max(1, most(ys) - y5) };
-  }
-};
-function cellAt({ resolution, origin: [x3, y5, yaw] }, u4, v4) {
-  const [c4, s4] = [Math.cos(yaw) * resolution, Math.sin(yaw) * resolution];
-  return { x: x3 + c4 * u4 - s4 * v4, y: y5 + s4 * u4 + c4 * v4 };
-}
-function toSegment(x3, y5, a5, b3) {
-  const [dx, dy] = [b3.x - a5.x, b3.y - a5.y];
-  const long = dx * dx + dy * dy;
-  const part2 = long ? Math.max(0, Math.min(1, ((x3 - a5.x) * dx + (y5 - a5.y) * dy) / long)) : 1;
-  return { far: Math.hypot(a5.x + part2 * dx - x3, a5.y + part2 * dy - y5), part: part2 };
-}
-function pushLimited(list, one) {
-  list.push(one);
-  if (list.length > MOST_SEEN) list.splice(0, MOST_SEEN / 4);
-}
-function pushSeries(scene2, name, unit, point) {
-  const known2 = scene2.series.get(name);
-  if (known2) pushLimited(known2.points, point);
-  else if (scene2.series.size < MOST_SERIES) scene2.series.set(name, { name, unit, points: [point] });
-}
-var OBSERVERS = {
-  scan: (_scene, { at, first, step, ranges }, t4, robot) => pushLimited(robot.scans, { t: t4, at, first, step, ranges }),
-  plan: (_scene, { points: points2 }, t4, robot) => pushLimited(robot.plans, { t: t4, points: points2 }),
-  map(scene2, { robot, resolution, width, height, origin, cells }, t4) {
-    scene2.maps.push({ t: t4, robot, map: { resolution, width, height, origin, cells } });
-    scene2.maps.sort((a5, b3) => a5.t - b3.t);
-    if (scene2.maps.length > 20) scene2.maps.splice(1, 1);
-  },
-  value: (scene2, { robot, name, value, unit }, t4) => pushSeries(scene2, [robot, name].filter(Boolean).join("/"), unit, { t: t4, value }),
-  values(scene2, { topic, values }, t4) {
-    for (const [path, value] of Object.entries(values))
-      pushSeries(scene2, path === "data" ? topic : `${topic}.${path}`, "", { t: t4, value });
-  }
-};
-function scanPoints({ at: [x3, y5, yaw], first, step, ranges }) {
-  const points2 = [];
-  ranges.forEach((cm, i4) => {
-    const turn = yaw + first + i4 * step;
-    if (cm >= 0) points2.push({ x: x3 + cm / 100 * Math.cos(turn), y: y5 + cm / 100 * Math.sin(turn) });
-  });
-  return points2;
-}
-
-// src/core/series.ts
-var MOST_POINTS = 2e4;
-var MOST_FIELDS = 60;
-var MOST_ITEMS = 8;
-var MOST_DEPTH = 6;
-var MOST_CHOICES = 400;
-var LONGEST_ID = 400;
-var MOST_PLOTS = 6;
-var JUST_MS = 1e-3;
-var MOST_LINES = 8;
-var SOURCES = ["feedback", "progress", "userdata", "topic"];
-var PROGRESS = {
-  distance: ["distance left", "m", ({ distance }) => distance],
-  fraction: ["progress", "%", ({ fraction }) => fraction === null ? null : 100 * fraction]
-};
-var idOf = ({ source, owner, path }) => [source, owner, ...path].map(encodeURIComponent).join(",");
-function originOf(id) {
-  if (id.length > LONGEST_ID) return null;
-  try {
-    const [word, owner, ...path] = id.split(",").map(decodeURIComponent);
-    const source = SOURCES.find((one) => one === word);
-    const needsPath = source === "userdata" || source === "feedback" || source === "progress";
-    if (!source || !owner || needsPath && !path.length) return null;
-    return source === "progress" && !Object.hasOwn(PROGRESS, path[0]) ? null : { source, owner, path };
-  } catch {
-    return null;
-  }
-}
-function knownPlots(plots) {
-  if (!Array.isArray(plots)) return [];
-  const lines = (plot) => (Array.isArray(plot) ? plot : []).filter((id) => typeof id === "string" && originOf(id)).slice(0, MOST_LINES);
-  return plots.map(lines).filter((plot) => plot.length).slice(0, MOST_PLOTS);
-}
-function labelOf({ source, owner, path }) {
-  if (source === "progress") return PROGRESS[path[0]][0];
-  if (source === "feedback") return path.slice(-2).join(".");
-  return source === "userdata" ? path.join(".") : [owner, ...path].join(".");
-}
-var ownerOf = ({ source, owner }) => source === "topic" ? "" : owner;
-var unitOf = ({ source, path }) => source === "progress" ? PROGRESS[path[0]][1] : "";
-function partsOf(value) {
-  const fields2 = fieldsOf(value);
-  if (fields2) return Object.entries(fields2).slice(0, MOST_FIELDS);
-  const branch = branchOf(value);
-  if (typeof branch === "string") return null;
-  const most = Array.isArray(value) ? MOST_ITEMS : MOST_FIELDS;
-  return branch.parts.slice(0, most).map(([name, part2], i4) => [unquoted(name) ?? String(i4), part2]);
-}
-var unquoted = (name) => name?.replace(/^(['"])(.*)\1$/, "$2");
-function numberOf(value) {
-  if (typeof value === "boolean") return value ? 1 : 0;
-  const number = isTree(value) && typeof value.$int === "string" ? Number(value.$int) : value;
-  return typeof number === "number" && Number.isFinite(number) ? number : null;
-}
-function numberAt(whole2, path) {
-  let value = whole2;
-  for (const name of path) {
-    const part2 = partsOf(value)?.find(([one]) => one === name);
-    if (!part2) return null;
-    value = part2[1];
-  }
-  return numberOf(value);
-}
-function numbersIn(value) {
-  const found = [];
-  const look = (one, path) => {
-    if (found.length >= MOST_FIELDS) return;
-    if (numberOf(one) !== null) found.push(path);
-    else if (path.length < MOST_DEPTH) for (const [name, part2] of partsOf(one) ?? []) look(part2, [...path, name]);
-  };
-  look(value, []);
-  return found;
-}
-function originsIn(data, topics) {
-  const found = /* @__PURE__ */ new Map();
-  const add = (source, owner, path) => {
-    const origin = { source, owner, path };
-    if (found.size < MOST_CHOICES) found.set(idOf(origin), origin);
-  };
-  for (const name of topics) add("topic", name, []);
-  for (const goal of Object.values(data.goals))
-    for (const name of Object.keys(PROGRESS))
-      if (goal.progress && PROGRESS[name][2](goal.progress) !== null) add("progress", goal.action, [name]);
-  for (const { container, key, value } of Object.values(data.userdata))
-    for (const path of numbersIn(value)) add("userdata", container, [key, ...path]);
-  for (const goal of Object.values(data.goals))
-    for (const path of numbersIn(goal.feedback)) if (path.length) add("feedback", goal.action, path);
-  return [...found.values()].filter((origin) => originOf(idOf(origin)));
-}
-function usualPlots(data, topics) {
-  const batteries = [...topics].filter((name) => /(^|\/)battery$/.test(name));
-  const actions2 = new Set(
-    Object.values(data.goals).filter((goal) => goal.progress?.distance != null).map((goal) => goal.action)
-  );
-  return knownPlots([
-    batteries.sort().map((owner) => idOf({ source: "topic", owner, path: [] })),
-    [...actions2].sort().map((owner) => idOf({ source: "progress", owner, path: ["distance"] }))
-  ]);
-}
-var Samples = class {
-  id;
-  origin;
-  isStep;
-  list = [];
-  #read = 0;
-  // number of events that were read, including those the run has dropped since
-  #run = null;
-  #goal = "";
-  // id of the goal with the newest feedback
-  constructor(id) {
-    this.id = id;
-    this.origin = originOf(id);
-    this.isStep = this.origin.source === "userdata";
-  }
-  update(run2, topics) {
-    const { source, owner } = this.origin;
-    if (source === "topic") {
-      this.list = topics.get(owner)?.points ?? [];
-      return this.list;
-    }
-    if (this.#run !== run2) {
-      this.#run = run2;
-      this.#read = run2.forgotten;
-      this.list = [];
-    }
-    const first = Math.max(0, this.#read - run2.forgotten);
-    for (let i4 = first; i4 < run2.events.length; i4++) this.#take(run2.events[i4]);
-    this.#read = run2.forgotten + run2.events.length;
-    if (this.list.length > MOST_POINTS) this.list.splice(0, MOST_POINTS / 4);
-    return this.list;
-  }
-  #take(e4) {
-    const { source, owner, path } = this.origin;
-    if (source === "userdata") {
-      if (e4.kind === "UserdataWritten" && e4.key === path[0] && containerOf(e4.path) === owner)
-        this.#put(e4, numberAt(e4.value, path.slice(1)));
-      return;
-    }
-    if (!("action" in e4) || e4.action !== owner) return;
-    if (e4.kind === "GoalFeedback") {
-      if (e4.goal_id !== this.#goal) this.#put(e4, null, -JUST_MS);
-      this.#goal = e4.goal_id;
-      if (source === "feedback") this.#put(e4, numberAt(e4.feedback, path));
-      else if (e4.progress) this.#put(e4, PROGRESS[path[0]][2](e4.progress));
-    } else if (e4.kind === "GoalDone" && e4.goal_id === this.#goal) this.#put(e4, null, JUST_MS);
-  }
-  /** @param later [ms] */
-  #put(e4, value, later = 0) {
-    if (value !== null || this.list.length) this.list.push({ t: e4.stamp_ns / 1e6 + later, value });
-  }
-};
-var valueAt = (list, t4) => list[countUntil(list, t4) - 1]?.value ?? null;
-function numberText(value) {
-  const size = Math.abs(value);
-  if (value === 0 || Number.isInteger(value) && size < 1e6) return String(value);
-  if (size >= 1e6 || size < 1e-3) return value.toExponential(2);
-  return String(Number(value.toPrecision(size < 0.01 ? 2 : 4)));
-}
-function aligned(all, from, to, now) {
-  const windows = all.map(({ list, isStep }) => {
-    const shown2 = list.slice(Math.max(0, countUntil(list, from) - 1), countUntil(list, to) + 1);
-    const last = shown2.at(-1);
-    return isStep && last && last.t < now ? [...shown2, { t: now, value: last.value }] : shown2;
-  });
-  const instants2 = [...new Set(windows.flatMap((list) => list.map((one) => one.t)))].sort((a5, b3) => a5 - b3);
-  const place = new Map(instants2.map((t4, i4) => [t4, i4]));
-  const columns = windows.map((list) => {
-    const column = new Array(instants2.length).fill(void 0);
-    for (const { t: t4, value } of list) column[place.get(t4)] = value;
-    return column;
-  });
-  return [instants2, ...columns];
-}
-
-// src/core/links.ts
-var MOST_OPEN = 100;
-var LONGEST_OPEN = 6e3;
-var MOST_NOTES = 20;
-var LONGEST_NOTE = 300;
-var LATEST = 1e15;
-var instant = (at) => (Math.ceil(at * 1e3) / 1e6).toFixed(6);
-function instantOf(text2) {
-  if (!text2 || !/^\d{1,12}(\.\d{1,6})?$/.test(text2)) return null;
-  const at = Number(text2) * 1e3;
-  return at < LATEST ? at : null;
-}
-function fragmentOf({ at, selected: selected2, opened: opened3, notes: notes2, stretch: stretch2, panels: panels2, plots }) {
-  const words2 = new URLSearchParams();
-  if (at !== null) words2.append("at", instant(at));
-  if (selected2 !== null) words2.append("state", selected2);
-  const paths = opened3 ?? [];
-  const fits = paths.length <= MOST_OPEN && paths.join("").length <= LONGEST_OPEN;
-  for (const path of fits ? paths : []) words2.append("open", path);
-  for (const note of notes2.slice(-MOST_NOTES)) words2.append("note", `${instant(note.at)} ${note.text}`);
-  if (stretch2) words2.append("stretch", stretch2.map(instant).join(" "));
-  if (panels2) words2.append("panels", wordOf(panels2));
-  for (const plot of plots ?? []) words2.append("plot", plot.join(";"));
-  if (plots && !plots.length) words2.append("plot", "");
-  return words2.toString();
-}
-function viewOf(text2) {
-  const words2 = new URLSearchParams(text2.replace(/^#/, ""));
-  const notes2 = [];
-  for (const word of words2.getAll("note").slice(0, MOST_NOTES)) {
-    const [, when, what] = /^(\S+) (.+)$/s.exec(word) ?? [];
-    const at = instantOf(when ?? null);
-    if (at !== null) notes2.push({ at, text: what.slice(0, LONGEST_NOTE) });
-  }
-  const opened3 = words2.getAll("open").slice(0, MOST_OPEN);
-  const view2 = {
-    at: instantOf(words2.get("at")),
-    selected: words2.get("state"),
-    opened: null,
-    notes: notes2,
-    stretch: null,
-    panels: arrangementOf(words2.get("panels")),
-    plots: null
-  };
-  const [from, to] = (words2.get("stretch") ?? "").split(" ").map(instantOf);
-  if (from && to && from < to) view2.stretch = [from, to];
-  if (opened3.length) view2.opened = opened3;
-  if (words2.has("plot")) view2.plots = knownPlots(words2.getAll("plot").map((plot) => plot.split(";")));
-  return view2;
-}
-function withNotes(notes2, more) {
-  const clean = more.map(({ at, text: text2 }) => ({ at, text: text2.trim().slice(0, LONGEST_NOTE) })).filter((one) => one.text);
-  const isKnown = (one) => notes2.some((other) => other.text === one.text && same(other, one));
-  const all = [...notes2, ...clean.filter((one) => !isKnown(one))].slice(-MOST_NOTES);
-  return all.sort((a5, b3) => a5.at - b3.at);
-}
-var same = (a5, b3) => Math.abs(a5.at - b3.at) < 0.01;
-
-// src/core/text.ts
-var SPACE = /[\t-\r\u0085\p{Z}]+/u;
-var UNPRINTABLE = /[\p{C}\p{Z}]/gu;
-function shorten(text2, length = 34) {
-  const start = [...String(text2).slice(0, 8 * length)].slice(0, 4 * length).join("");
-  const words2 = start.split(SPACE).filter(Boolean);
-  const line = [...words2.map((word) => word.replace(UNPRINTABLE, "�")).join(" ")];
-  return line.length <= length ? line.join("") : `${line.slice(0, length - 1).join("")}…`;
-}
-function shortenLines(text2, length) {
-  const lines = [];
-  let left = length;
-  for (const line of text2.trim().split(/\r?\n/)) {
-    if (left <= 0) return [...lines, "…"].join("\n");
-    lines.push(shorten(line, left));
-    left -= line.length + 1;
-  }
-  return lines.join("\n");
-}
-function duration(seconds) {
-  if (seconds < 10) return `${seconds.toFixed(1)} s`;
-  if (seconds < 120) return `${Math.floor(seconds)} s`;
-  const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
-  if (seconds < 7200) return `${Math.floor(seconds / 60)} min ${two(seconds % 60)}`;
-  return `${Math.floor(seconds / 3600)} h ${two(seconds % 3600 / 60)}`;
-}
-var countOfEvents = (count) => `${count.toLocaleString("en")} event${count === 1 ? "" : "s"}`;
-var SOURCES2 = {
-  signal: "signal",
-  shutdown: "the program's end",
-  operator: "operator",
-  timeout: "timeout of",
-  concurrence: "concurrence, after",
-  plan: "plan",
-  action: "action",
-  state: "state",
-  test: "test",
-  program: "program"
-};
-function askerText(asked2) {
-  if (!asked2?.source) return null;
-  const who = `${own(SOURCES2, asked2.source) ?? asked2.source} ${asked2.by ?? ""}`.trim();
-  return asked2.why ? `${who}: ${asked2.why}` : who;
-}
-function holdText(row, now) {
-  const grace = row.asked?.grace;
-  const limit = grace != null ? ` of ${duration(grace)}` : "";
-  return `${duration((now - row.preempt) / 1e3)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
-}
-
-// src/core/model.ts
-var CHANGE_SIGNS = {
-  added: "+",
-  removed: "−",
-  changed: "≠",
-  numbers: "×"
-};
-var signed = (change2, name) => change2 ? `${CHANGE_SIGNS[change2]} ${name}` : name;
-var KIND_NAMES = {
-  state: "state",
-  callback: "function",
-  action: "action",
-  service: "service call",
-  monitor: "monitor",
-  condition: "condition",
-  machine: "state machine",
-  sequence: "sequence",
-  concurrence: "concurrence",
-  iterator: "iterator",
-  plan: "Petri net plan",
-  place: "place",
-  "goal place": "goal",
-  "fail place": "failed plan",
-  transition: "transition",
-  missing: "missing state"
-};
-var isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
-var MANY = 7;
-var READABLE = 40;
-var Model = class {
-  payload;
-  keys;
-  root;
-  byPath = /* @__PURE__ */ new Map();
-  order = [];
-  // parents first
-  /** @param implicit whether to show implicit transitions */
-  constructor(payload, implicit2) {
-    this.payload = payload;
-    this.keys = payload.keys;
-    this.root = implicit2 ? payload.implicit : payload.explicit;
-    this.#index(this.root, null, 0);
-    const counts = /* @__PURE__ */ new Map();
-    for (const { name } of this.order) counts.set(name, (counts.get(name) ?? 0) + 1);
-    for (const node of this.order) node.isRepeated = counts.get(node.name) > 1;
-  }
-  #index(node, parent, depth) {
-    Object.assign(node, { parent, depth, number: this.order.length });
-    node.name = shorten(node.caption || node.label);
-    node.shown = signed(node.change, node.name);
-    this.byPath.set(node.path, node);
-    this.order.push(node);
-    node.total = 1;
-    for (const child of node.children) {
-      this.#index(child, node, depth + 1);
-      node.total += child.total;
-    }
-    node.joins = joinsOf(node);
-    node.links = linksOf(node);
-    const wired = /* @__PURE__ */ new Map();
-    for (const link2 of node.links)
-      for (const outcome of link2.outcomes) wired.set(link2.source, (wired.get(link2.source) ?? /* @__PURE__ */ new Set()).add(outcome));
-    for (const child of node.children) child.wired = child.outcomes.filter((o5) => wired.get(child.label)?.has(o5));
-  }
-  get(path) {
-    return path == null ? void 0 : this.byPath.get(path);
-  }
-  /** The containers around a state, outermost first. */
-  ancestors(path) {
-    const found = [];
-    for (let node = this.get(path)?.parent; node; node = node.parent) found.unshift(node);
-    return found;
-  }
-  /** The arrow of an outcome of a state. */
-  linkOf(node, outcome) {
-    return node.parent?.links.find((link2) => link2.source === node.label && link2.outcomes.includes(outcome));
-  }
-  search(text2) {
-    const words2 = text2.toLowerCase().split(/\s+/).filter(Boolean);
-    if (!words2.length) return [];
-    const found = this.order.filter((node) => words2.every((word) => node.path.toLowerCase().includes(word)));
-    const rank = (node) => node.label.toLowerCase().startsWith(words2[0]) ? 0 : 1;
-    return found.sort((a5, b3) => rank(a5) - rank(b3) || a5.number - b3.number);
-  }
-  /** Paths of the containers down to `depth` levels, or of all; up to there many branches of one stay closed. */
-  toDepth(depth) {
-    const isWanted = (node) => node.children.length > 0 && node.depth < depth && (depth >= ALL_LEVELS || !this.isBranch(node));
-    return new Set(this.order.filter(isWanted).map((node) => node.path));
-  }
-  /** Whether a state is one of many branches, or within one. */
-  isBranch(node) {
-    for (let one = node; one.parent; one = one.parent) if (hasManyBranches(one.parent)) return true;
-    return false;
-  }
-  /** The greatest depth at which a page is readable at a glance. */
-  readableDepth(most = READABLE, from = this.root) {
-    let visible = 0;
-    let depth = 0;
-    let level = [from];
-    while (level.length) {
-      visible += level.length;
-      if (visible > most && depth > 1) break;
-      depth += 1;
-      level = level.flatMap((node) => hasManyBranches(node) ? [] : node.children);
-    }
-    return Math.max(depth - 1, 1);
-  }
-};
-var ALL_LEVELS = 99;
-var hasManyBranches = ({ kind, children }) => kind === "concurrence" && children.length >= MANY;
-function joinsOf(node) {
-  const labels = new Set(node.children.map((child) => child.label));
-  return node.rules.flatMap(({ outcome, conditions, text: text2, change: change2 }) => {
-    const known2 = conditions.filter(([label]) => labels.has(label));
-    if (new Set(known2.map(([label]) => label)).size < 2 || text2.startsWith("any of")) return [];
-    const quorum = /^(\d+) of /.exec(text2);
-    return [{ outcome, text: text2, change: change2, conditions: known2, need: quorum ? Number(quorum[1]) : known2.length }];
-  });
-}
-function joinText({ need, conditions }, met) {
-  const all = conditions.length;
-  const what = need < all ? `${need} of ${all}` : all === 2 ? "both" : `all ${all}`;
-  return met > 0 && met < need ? `${what}: ${met} of ${need}` : what;
-}
-function linksOf(node) {
-  const found = node.edges.map((edge) => ({ ...edge, rule: null, join: null }));
-  const keyOf3 = (...parts) => parts.join("\n");
-  const known2 = new Set(found.flatMap((edge) => edge.outcomes.map((o5) => keyOf3(edge.source, o5, edge.target, null))));
-  for (const rule of node.rules) {
-    const number = node.joins.findIndex((one) => one.outcome === rule.outcome && one.text === rule.text);
-    const join2 = number < 0 ? null : number;
-    for (const [source, outcome] of rule.conditions) {
-      const key = keyOf3(source, outcome, rule.outcome, join2);
-      if (known2.has(key) || !node.children.some((child) => child.label === source)) continue;
-      known2.add(key);
-      const same2 = found.find(
-        (edge) => edge.rule && edge.source === source && edge.target === rule.outcome && edge.change === rule.change && edge.join === join2
-      );
-      if (same2) same2.outcomes = [...same2.outcomes, outcome];
-      else
-        found.push({
-          source,
-          target: rule.outcome,
-          to_outcome: true,
-          outcomes: [outcome],
-          implicit: false,
-          back: false,
-          rule: rule.text || rule.outcome,
-          join: join2,
-          change: rule.change,
-          note: ""
-        });
-    }
-  }
-  return found;
-}
-
 // src/core/outcomes.ts
 var words = (text2) => text2.split(" ");
 var SUCCESS = words(
@@ -2559,7 +1639,7 @@ function commonClass(node, outcomes) {
 // src/core/playback.ts
 var RATES = [0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 var MOST_KEYS = 200;
-var instantAt = ({ t: t4, since, rate: rate2 }, moment) => t4 + (moment - since) * rate2;
+var instantAt = ({ t: t4, since, rate }, moment) => t4 + (moment - since) * rate;
 var loopedAt = (t4, { from, to }) => t4 < to ? t4 : from + (t4 - from) % Math.max(1, to - from);
 var FRAME_MS = 200;
 var MOST_FRAMES = 150;
@@ -2610,9 +1690,9 @@ var Marks = class {
   /** Drop the marks of the oldest events of the run. @param count number of further dropped events */
   forget(count) {
     this.#gone += count;
-    for (const marks2 of this.#marks.values()) {
-      const kept = marks2.findIndex((mark) => mark.number > this.#gone);
-      marks2.splice(0, kept < 0 ? marks2.length : kept);
+    for (const marks of this.#marks.values()) {
+      const kept = marks.findIndex((mark) => mark.number > this.#gone);
+      marks.splice(0, kept < 0 ? marks.length : kept);
     }
   }
   /**
@@ -2622,18 +1702,18 @@ var Marks = class {
    * @param shown number of kept events up to the instant shown
    * @param step 1: after it, -1: before
    */
-  find(name, shown2, step, model2) {
-    const marks2 = this.#marks.get(name) ?? [];
-    const at = shown2 + this.#gone;
-    const count = countWhile(marks2, (mark) => mark.number <= at);
-    const here = count > 0 && marks2[count - 1].number === at ? marks2[count - 1].t : null;
-    for (let i4 = step > 0 ? count : count - 1; i4 >= 0 && i4 < marks2.length; i4 += step)
-      if (marks2[i4].t !== here && isOrigin(marks2[i4], model2)) return marks2[i4].number - this.#gone;
+  find(name, shown, step, model) {
+    const marks = this.#marks.get(name) ?? [];
+    const at = shown + this.#gone;
+    const count = countWhile(marks, (mark) => mark.number <= at);
+    const here = count > 0 && marks[count - 1].number === at ? marks[count - 1].t : null;
+    for (let i4 = step > 0 ? count : count - 1; i4 >= 0 && i4 < marks.length; i4 += step)
+      if (marks[i4].t !== here && isOrigin(marks[i4], model)) return marks[i4].number - this.#gone;
     return null;
   }
 };
-function isOrigin({ kind, path, outcome }, model2) {
-  const node = kind === "Left" ? model2?.get(path) : void 0;
+function isOrigin({ kind, path, outcome }, model) {
+  const node = kind === "Left" ? model?.get(path) : void 0;
   return !node || !node.children.length && endClass(node, outcome) === "failure";
 }
 
@@ -2825,6 +1905,10 @@ var Run = class {
     const to = running.length ? null : Math.max(...rows.map((row) => row.to ?? t4));
     return { from: found.from, to, rows, holds };
   }
+  /** The newest visit of a state that had begun at an instant; null if there is none. @param t [ms] */
+  visitAt(path, t4 = Infinity) {
+    return this.spans.findLast((one) => one.path === path && one.from <= t4) ?? null;
+  }
   first() {
     return this.begun ?? (this.events.length ? timeOf(this.events[0]) : null);
   }
@@ -2861,306 +1945,580 @@ var Run = class {
 };
 var timeOf = (e4) => e4.stamp_ns / 1e6;
 
+// src/core/values.ts
+var MOST = 2e4;
+var ROUNDED = 6;
+var WIDE = 88;
+var QUOTED = /[\\\p{Cc}\u00a0\u2028\u2029]/gu;
+var ESCAPES = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "	": "\\t" };
+function quoted(text2) {
+  const quote = text2.includes("'") && !text2.includes('"') ? '"' : "'";
+  const hex = (c4) => c4.charCodeAt(0).toString(16);
+  const inside = text2.replace(QUOTED, (c4) => {
+    const long = c4.charCodeAt(0) > 255;
+    return ESCAPES[c4] ?? (long ? `\\u${hex(c4)}` : `\\x${hex(c4).padStart(2, "0")}`);
+  });
+  return `${quote}${quote === "'" ? inside.replaceAll("'", "\\'") : inside}${quote}`;
+}
+var isTree = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
+var items = (value) => {
+  if (!Array.isArray(value)) throw new TypeError("no list");
+  return value;
+};
+var className = (value) => String(value.$object ?? String(value.$msg).split("/").at(-1));
+function fieldsOf(value) {
+  if (!isTree(value)) return null;
+  if ("$msg" in value || "$object" in value) return isTree(value.fields) ? value.fields : {};
+  return formOf(value) === null ? value : null;
+}
+var FORMS = {
+  $tuple: ({ $tuple }) => listed("tuple", "(", items($tuple), items($tuple).length === 1 ? ",)" : ")"),
+  $set: ({ $set }) => items($set).length ? listed("set", "{", items($set), "}") : "set()",
+  $items: ({ $items }) => ({
+    ...{ name: "dict", begin: "{", end: "}", sign: ": " },
+    parts: items($items).map((item) => [brief(items(item)[0]), items(item)[1]])
+  }),
+  $float: ({ $float }) => String($float),
+  $int: ({ $int }) => String($int),
+  $bytes: ({ $bytes }) => `b${quoted(atob(String($bytes)))}`,
+  $msg: (value) => called(value),
+  $object: (value) => called(value),
+  $array: ({ $array, dtype }) => listed("array", "array([", items($array), `], dtype=${dtype})`),
+  $cut: ({ $cut }) => `${quoted(String($cut))}…`,
+  $large: ({ $large, length }) => `<${$large} of ${length} elements>`,
+  $repr: ({ $repr }) => String($repr)
+};
+var listed = (name, begin, parts, end) => ({
+  name,
+  begin,
+  end,
+  sign: "",
+  parts: parts.map((one) => [null, one])
+});
+var called = (value) => ({
+  ...{ name: className(value), begin: `${className(value)}(`, end: ")", sign: "=" },
+  parts: Object.entries(fieldsOf(value) ?? {})
+});
+var formOf = (value) => Object.keys(FORMS).find((mark) => Object.hasOwn(value, mark)) ?? null;
+function opened(value, numberText2) {
+  if (value === null || value === void 0) return "None";
+  if (typeof value === "boolean") return value ? "True" : "False";
+  if (typeof value === "number") return numberText2(value);
+  if (typeof value === "string") return quoted(value);
+  if (Array.isArray(value)) return listed("list", "[", value, "]");
+  if (!isTree(value)) return String(value);
+  const form = formOf(value);
+  try {
+    if (form) return FORMS[form](value);
+  } catch {
+  }
+  const parts = Object.entries(value).map(([key, part]) => [quoted(key), part]);
+  return { name: "dict", begin: "{", end: "}", sign: ": ", parts };
+}
+var rounded = (number) => String(Number.isInteger(number) ? number : Number(number.toPrecision(ROUNDED)));
+var branchOf = (value) => opened(value, rounded);
+var brief = (value) => text(value, rounded);
+function text(value, numberText2) {
+  const one = opened(value, numberText2);
+  if (typeof one === "string") return one;
+  const parts = one.parts.map(([name, part]) => `${head(one, name)}${text(part, numberText2)}`);
+  return `${one.begin}${parts.join(", ")}${one.end}`;
+}
+var head = ({ sign: sign2 }, name) => name === null ? "" : `${name}${sign2}`;
+var pretty = (value) => wrapped(value, "").slice(0, MOST);
+function wrapped(value, indent) {
+  const line = text(value, String);
+  const one = opened(value, String);
+  if (typeof one === "string" || line.length + indent.length <= WIDE) return line;
+  const inner = `${indent}  `;
+  const parts = one.parts.map(([name, part]) => `${inner}${head(one, name)}${wrapped(part, inner)}`);
+  return `${one.begin}
+${parts.join(",\n")}
+${indent}${one.end}`;
+}
+function wasShortened(value) {
+  if (Array.isArray(value)) return value.some(wasShortened);
+  if (!isTree(value)) return false;
+  if ("$cut" in value || "$large" in value || String(value.$repr ?? "").endsWith("…")) return true;
+  return Object.values(value).some(wasShortened);
+}
+
+// src/core/scene.ts
+var COLOURS = 8;
+var MOST_POSES = 6e4;
+var MOST_SEEN = 4e3;
+var MOST_SERIES = 400;
+var NEAR = 0.3;
+var ENDED = { Left: 1, Failed: 1, Finished: 1 };
+var robotOf = (action) => String(action ?? "").replace(/^\//, "").replace(/\/?[^/]*$/, "");
+var fields = (value) => fieldsOf(value) ?? {};
+var isNumber = (value) => Number.isFinite(value);
+function placeOf2(stamped) {
+  const outer = fields(stamped);
+  const { position, orientation } = fields(outer.pose ?? stamped);
+  const { x: x3, y: y5 } = fields(position);
+  if (!isNumber(x3) || !isNumber(y5)) return null;
+  const turn = fields(orientation);
+  const [qx, qy, qz, qw] = [turn.x, turn.y, turn.z, turn.w].map((v4) => isNumber(v4) ? v4 : 0);
+  const frame = fields(outer.header).frame_id ?? "map";
+  const yaw = Math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz));
+  return /(^|\/)map$/.test(String(frame)) ? { x: x3, y: y5, yaw } : null;
+}
+var placeIn = (message, names) => names.map((name) => placeOf2(own(fields(message), name))).find((place) => place !== null) ?? null;
+var GOALS = ["target_pose", "pose", "goal_pose", "goal"];
+var FEEDBACK = ["base_position", "current_pose"];
+var LONGEST_NAME = 40;
+var MOST_NAMES = 200;
+function namedPlaces(value) {
+  const one = namedPlace(value, null);
+  if (one) return [one];
+  const parts = isTree(value) ? value.$tuple : value;
+  const named = Array.isArray(parts) ? parts.slice(0, MOST_NAMES).map((part) => namedPlace(part, null)) : Object.entries(fields(value)).slice(0, MOST_NAMES).map(([key, part]) => namedPlace(part, key));
+  return named.filter((place) => place !== null);
+}
+function namedPlace(value, key) {
+  const { name, label, x: x3, y: y5, pose } = fields(value);
+  const called2 = name ?? label ?? key;
+  if (typeof called2 !== "string" || !called2 || called2.length > LONGEST_NAME) return null;
+  const place = isNumber(x3) && isNumber(y5) ? { x: x3, y: y5 } : placeOf2(pose ?? value) ?? fields(pose);
+  return isNumber(place.x) && isNumber(place.y) ? { name: called2, x: place.x, y: place.y } : null;
+}
+var countUntil = (list, t4) => countWhile(list, (one) => one.t <= t4);
+function newestAt(goals, t4) {
+  const goal = goals[countUntil(goals, t4) - 1];
+  return goal && (goal.to === null || t4 <= goal.to) ? goal : null;
+}
+var newRobot = () => ({
+  poses: [],
+  observed: null,
+  scans: [],
+  plans: [],
+  goals: [],
+  tasks: [],
+  pieces: [],
+  done: 0
+});
+var Scene = class {
+  robots = /* @__PURE__ */ new Map();
+  maps = [];
+  /** values of topics, for plots */
+  series = /* @__PURE__ */ new Map();
+  /** beginning of the visit of each running state, by path */
+  entered = /* @__PURE__ */ new Map();
+  /** paths of the states that drive, in order of their first drive, which determines their colours */
+  drivers = [];
+  names = [];
+  revision = 0;
+  // counts the changes
+  #robot(name) {
+    let robot = this.robots.get(name);
+    if (!robot) {
+      robot = newRobot();
+      this.robots.set(name, robot);
+    }
+    return robot;
+  }
+  addEvents(events) {
+    for (const e4 of events) this.#event(e4, e4.stamp_ns / 1e6);
+    if (events.length) this.revision += 1;
+  }
+  #event(e4, t4) {
+    if (e4.kind === "Entered" || e4.kind === "Started") this.entered.set(e4.path, t4);
+    else if (Object.hasOwn(ENDED, e4.kind)) this.entered.delete(e4.path);
+    else if (e4.kind === "UserdataWritten") {
+      for (const named of namedPlaces(e4.value)) this.names.push({ t: t4, ...named });
+    } else if (e4.kind === "GoalSent") this.#goalSent(e4, t4);
+    else if (e4.kind === "GoalFeedback") {
+      const place = placeIn(e4.feedback, FEEDBACK);
+      if (place) this.#pose(robotOf(e4.action), { t: t4, ...place }, false);
+    } else if (e4.kind === "GoalDone") {
+      const robot = this.robots.get(robotOf(e4.action));
+      const goal = robot?.goals.findLast((one) => one.id === e4.goal_id);
+      if (goal) Object.assign(goal, { to: t4, status: e4.status, text: e4.text });
+      const task = robot?.tasks.findLast((one) => one.id === e4.goal_id);
+      if (task) task.to = t4;
+    }
+  }
+  #goalSent(e4, t4) {
+    const place = placeIn(e4.goal, GOALS);
+    const robot = this.#robot(robotOf(e4.action));
+    const from = this.entered.get(e4.path) ?? t4;
+    if (!place) {
+      robot.tasks.push({ id: e4.goal_id, path: e4.path, visit: from, t: t4, to: null });
+      if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t4) this.#resetPieces(robot);
+      return;
+    }
+    const goal = {
+      id: e4.goal_id,
+      path: e4.path,
+      visit: from,
+      t: t4,
+      to: null,
+      status: "ACTIVE",
+      text: "",
+      ...place
+    };
+    robot.goals.push(goal);
+    if (!this.drivers.includes(e4.path)) this.drivers.push(e4.path);
+    if (robot.poses.length && robot.poses[robot.poses.length - 1].t > t4) this.#resetPieces(robot);
+  }
+  /** Make the pieces of a robot's track anew. */
+  #resetPieces(robot) {
+    robot.pieces = [];
+    robot.done = 0;
+  }
+  #pose(name, pose, observed) {
+    const robot = this.#robot(name);
+    if (observed && robot.observed === null) {
+      robot.observed = pose.t;
+      robot.poses.length = countUntil(robot.poses, pose.t);
+      this.#resetPieces(robot);
+    }
+    if (!observed && robot.observed !== null && pose.t >= robot.observed) return;
+    const last = robot.poses.at(-1);
+    if (last && last.t > pose.t) {
+      robot.poses.splice(countUntil(robot.poses, pose.t), 0, pose);
+      this.#resetPieces(robot);
+    } else if (!last || last.t < pose.t || last.x !== pose.x || last.y !== pose.y) robot.poses.push(pose);
+    if (robot.poses.length > MOST_POSES) {
+      robot.poses.splice(0, MOST_POSES / 4);
+      this.#resetPieces(robot);
+    }
+  }
+  addObserved(records) {
+    for (const record of records) {
+      const t4 = record.stamp_ns / 1e6;
+      const take = own(OBSERVERS, record.what);
+      take?.(this, record, t4, this.#robot(record.robot));
+      if (record.what === "pose") {
+        const [x3, y5, yaw] = record.at;
+        this.#pose(record.robot, { t: t4, x: x3, y: y5, yaw }, true);
+      }
+    }
+    if (records.length) this.revision += 1;
+  }
+  /** Whether there is anything to show on a map. */
+  get isEmpty() {
+    return !this.maps.length && ![...this.robots.values()].some((robot) => robot.poses.length || robot.goals.length);
+  }
+  /** The track of a robot, cut where another visit, or none, drives it. */
+  piecesOf(robot) {
+    for (; robot.done < robot.poses.length; robot.done++) {
+      const pose = robot.poses[robot.done];
+      const goal = newestAt(robot.goals, pose.t) ?? newestAt(robot.tasks, pose.t);
+      const path = goal?.path ?? null;
+      const visit = goal?.visit ?? null;
+      const last = robot.pieces.at(-1);
+      const moved2 = robot.done > 0 && robot.poses[robot.done - 1].x !== pose.x;
+      if (path !== null && moved2 && !this.drivers.includes(path)) this.drivers.push(path);
+      if (last && last.path === path && last.visit === visit) last.poses.push(pose);
+      else {
+        const before = last?.poses.at(-1);
+        robot.pieces.push({ path, visit, poses: before ? [before, pose] : [pose] });
+      }
+    }
+    return robot.pieces;
+  }
+  /** The number of the colour of a state's tracks; -1 if it has not driven. */
+  colourOf(path) {
+    return this.drivers.indexOf(path);
+  }
+  /** The pose of a robot at an instant; null if it is not known yet. */
+  poseAt(robot, t4) {
+    return robot.poses[countUntil(robot.poses, t4) - 1] ?? null;
+  }
+  /** The map at an instant; before the first one, the first one. */
+  mapAt(t4) {
+    return (this.maps[countUntil(this.maps, t4) - 1] ?? this.maps[0])?.map ?? null;
+  }
+  /** The name of a goal's place; "" if it has none. */
+  placeName(goal) {
+    const near = (one) => Math.hypot(one.x - goal.x, one.y - goal.y) < NEAR;
+    return this.names.findLast(near)?.name ?? "";
+  }
+  /** The newest goal of a visit. */
+  goalOf(path, visit) {
+    for (const robot of this.robots.values()) {
+      const goal = robot.goals.findLast((one) => one.path === path && one.visit === visit);
+      if (goal) return goal;
+    }
+    return null;
+  }
+  /** The goal with an id, if it leads to a place. */
+  goalWithId(id) {
+    for (const robot of this.robots.values()) {
+      const goal = robot.goals.findLast((one) => one.id === id);
+      if (goal) return goal;
+    }
+    return null;
+  }
+  /**
+   * The piece of a track nearest to a place, and the time at which the robot was there.
+   * @param within [m]
+   * @param until later poses are ignored [ms]
+   */
+  nearest(x3, y5, within3, until = Infinity) {
+    let best = null;
+    for (const robot of this.robots.values())
+      for (const piece of this.piecesOf(robot))
+        for (let i4 = 0; i4 < piece.poses.length && piece.poses[i4].t <= until; i4++) {
+          const a5 = piece.poses[Math.max(0, i4 - 1)];
+          const b3 = piece.poses[i4];
+          const { far, part } = toSegment(x3, y5, a5, b3);
+          if (far > within3 || best && far > best.far + 1e-6) continue;
+          best = { piece, t: a5.t + part * (b3.t - a5.t), far };
+        }
+    return best;
+  }
+  /** The box around all places, and the map. */
+  extent(t4) {
+    const xs = [];
+    const ys = [];
+    const map = this.mapAt(t4);
+    if (map)
+      for (const [u4, v4] of [
+        [0, 0],
+        [map.width, 0],
+        [0, map.height],
+        [map.width, map.height]
+      ]) {
+        const place = cellAt(map, u4, v4);
+        xs.push(place.x);
+        ys.push(place.y);
+      }
+    else
+      for (const robot of this.robots.values())
+        for (const { x: x4, y: y6 } of [...robot.poses, ...robot.goals]) {
+          xs.push(x4);
+          ys.push(y6);
+        }
+    if (!xs.length) return null;
+    const least = (all) => all.reduce((a5, b3) => Math.min(a5, b3));
+    const most = (all) => all.reduce((a5, b3) => Math.max(a5, b3));
+    const [x3, y5] = [least(xs), least(ys)];
+    return { x: x3, y: y5, w: Math.max(1, most(xs) - x3), h: Math.max(1, most(ys) - y5) };
+  }
+};
+function cellAt({ resolution, origin: [x3, y5, yaw] }, u4, v4) {
+  const [c4, s4] = [Math.cos(yaw) * resolution, Math.sin(yaw) * resolution];
+  return { x: x3 + c4 * u4 - s4 * v4, y: y5 + s4 * u4 + c4 * v4 };
+}
+function toSegment(x3, y5, a5, b3) {
+  const [dx, dy] = [b3.x - a5.x, b3.y - a5.y];
+  const long = dx * dx + dy * dy;
+  const part = long ? Math.max(0, Math.min(1, ((x3 - a5.x) * dx + (y5 - a5.y) * dy) / long)) : 1;
+  return { far: Math.hypot(a5.x + part * dx - x3, a5.y + part * dy - y5), part };
+}
+function pushLimited(list, one) {
+  list.push(one);
+  if (list.length > MOST_SEEN) list.splice(0, MOST_SEEN / 4);
+}
+function pushSeries(scene, name, unit, point) {
+  const known2 = scene.series.get(name);
+  if (known2) pushLimited(known2.points, point);
+  else if (scene.series.size < MOST_SERIES) scene.series.set(name, { name, unit, points: [point] });
+}
+var OBSERVERS = {
+  scan: (_scene, { at, first, step, ranges }, t4, robot) => pushLimited(robot.scans, { t: t4, at, first, step, ranges }),
+  plan: (_scene, { points: points2 }, t4, robot) => pushLimited(robot.plans, { t: t4, points: points2 }),
+  map(scene, { robot, resolution, width, height, origin, cells }, t4) {
+    scene.maps.push({ t: t4, robot, map: { resolution, width, height, origin, cells } });
+    scene.maps.sort((a5, b3) => a5.t - b3.t);
+    if (scene.maps.length > 20) scene.maps.splice(1, 1);
+  },
+  value: (scene, { robot, name, value, unit }, t4) => pushSeries(scene, [robot, name].filter(Boolean).join("/"), unit, { t: t4, value }),
+  values(scene, { topic, values }, t4) {
+    for (const [path, value] of Object.entries(values))
+      pushSeries(scene, path === "data" ? topic : `${topic}.${path}`, "", { t: t4, value });
+  }
+};
+function scanPoints({ at: [x3, y5, yaw], first, step, ranges }) {
+  const points2 = [];
+  ranges.forEach((cm, i4) => {
+    const turn = yaw + first + i4 * step;
+    if (cm >= 0) points2.push({ x: x3 + cm / 100 * Math.cos(turn), y: y5 + cm / 100 * Math.sin(turn) });
+  });
+  return points2;
+}
+
+// src/core/text.ts
+var SPACE = /[\t-\r\u0085\p{Z}]+/u;
+var UNPRINTABLE = /[\p{C}\p{Z}]/gu;
+function shorten(text2, length = 34) {
+  const start = [...String(text2).slice(0, 8 * length)].slice(0, 4 * length).join("");
+  const words2 = start.split(SPACE).filter(Boolean);
+  const line = [...words2.map((word) => word.replace(UNPRINTABLE, "�")).join(" ")];
+  return line.length <= length ? line.join("") : `${line.slice(0, length - 1).join("")}…`;
+}
+function shortenLines(text2, length) {
+  const lines = [];
+  let left = length;
+  for (const line of text2.trim().split(/\r?\n/)) {
+    if (left <= 0) return [...lines, "…"].join("\n");
+    lines.push(shorten(line, left));
+    left -= line.length + 1;
+  }
+  return lines.join("\n");
+}
+function duration(seconds) {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 120) return `${Math.floor(seconds)} s`;
+  const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
+  if (seconds < 7200) return `${Math.floor(seconds / 60)} min ${two(seconds % 60)}`;
+  return `${Math.floor(seconds / 3600)} h ${two(seconds % 3600 / 60)}`;
+}
+var countOfEvents = (count) => `${count.toLocaleString("en")} event${count === 1 ? "" : "s"}`;
+var SOURCES = {
+  signal: "signal",
+  shutdown: "the program's end",
+  operator: "operator",
+  timeout: "timeout of",
+  concurrence: "concurrence, after",
+  plan: "plan",
+  action: "action",
+  state: "state",
+  test: "test",
+  program: "program"
+};
+function askerText(asked2) {
+  if (!asked2?.source) return null;
+  const who = `${own(SOURCES, asked2.source) ?? asked2.source} ${asked2.by ?? ""}`.trim();
+  return asked2.why ? `${who}: ${asked2.why}` : who;
+}
+function holdText(row, now) {
+  const grace = row.asked?.grace;
+  const limit = grace != null ? ` of ${duration(grace)}` : "";
+  return `${duration((now - row.preempt) / 1e3)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
+}
+
 // src/core/why.ts
-function wayOf(why2) {
+function wayOf(why) {
   const ends = /* @__PURE__ */ new Map();
-  for (const { path, outcome } of why2?.steps ?? []) if (outcome) ends.set(`${path} ${outcome}`, { path, outcome });
+  for (const { path, outcome } of why?.steps ?? []) if (outcome) ends.set(`${path} ${outcome}`, { path, outcome });
   return [...ends.values()];
 }
 
-// src/core/store.ts
-function saved(name, fallback) {
-  try {
-    return JSON.parse(localStorage.getItem(`smachpy.${name}`) ?? "null") ?? fallback;
-  } catch {
-    return fallback;
-  }
-}
-function save(name, value) {
-  try {
-    localStorage.setItem(`smachpy.${name}`, JSON.stringify(value));
-  } catch {
-  }
-}
-var connection = y3("connecting");
-var problem = y3("");
-var settings = y3({ follow: false, control: false, beat: 0, kept: 0, home: false });
-var machines = y3([]);
-var facts = y3(null);
-var problems = y3([]);
-var model = y3(null);
-var statistics = y3(null);
-var gap = y3(null);
-var actions = y3(null);
-var comparison = y3(null);
-var failure = y3(null);
-var wanted = y3("");
-var selected = y3(null);
-var query = y3("");
-var follow = y3(false);
-var implicit = y3(saved("implicit", false));
-var numbers = y3("none");
-var theme = y3(saved("theme", "system"));
-var hovered = y3(null);
-var pointed = y3(null);
-var opened2 = y3(/* @__PURE__ */ new Set());
-var help = y3(false);
-var paletteOpen = y3(false);
-var shortcuts = y3(saved("shortcuts", true));
-var sound = y3(saved("sound", true));
-var operator = y3(saved("operator", ""));
-var tokenAsked = y3(false);
-var why = y3(null);
-var wayShown = O(() => wayOf(why.value));
-var treeOpen = y3(false);
-var overview = y3(false);
-var laidOut = y3(null);
-var dismissed = y3(null);
-var pageShown = y3("machine");
-var runs = y3({ runs: [], folders: [], journals: [] });
-var simulateOpen = y3(false);
-var simulations = y3({
-  missions: {},
-  batches: []
-});
-var runsKnown = y3(false);
-var runsProblem = y3("");
-var pins = y3(new Set(saved("pins", [])));
-var chosenAction = y3(null);
-var logFilter = y3("all");
-var laneFilter = y3("");
-var notice = y3(null);
-var tick = y3(0);
-var slowTick = y3(0);
-var cursor = y3(null);
-var position = y3(null);
-var instant2 = O(() => [cursor.value, position.value]);
-var run = new Run(emptyState(), []);
-var scene = new Scene();
-var marks = new Marks();
-var hasMap = y3(false);
-var stateAtCursor = null;
-var rate = y3(saved("rate", 1));
-var playing = y3(null);
-var stretch = y3(null);
-var filmed = y3(null);
-var looping = y3(false);
-var followedKey = y3(null);
-function startRun(base, events) {
-  run = new Run(base, events);
+// src/core/store/data.ts
+var Data = class {
+  connection = y3("connecting");
+  problem = y3("");
+  // why the server refuses this page a stream
+  settings = y3({ follow: false, control: false, beat: 0, kept: 0, home: false });
+  machines = y3([]);
+  wanted = y3("");
+  // name of the machine to show
+  facts = y3(null);
+  // of the machine shown
+  problems = y3([]);
+  model = y3(null);
+  statistics = y3(null);
+  gap = y3(null);
+  // number of events that this page missed
+  /** Null before they are known. */
+  actions = y3(null);
+  comparison = y3(null);
+  failure = y3(null);
+  // why nothing is shown
+  why = y3(null);
+  // the causes of the run's end, while they are shown
+  /** The ends of states that led to the outcome. */
+  wayShown = O(() => wayOf(this.why.value));
+  runs = y3({
+    runs: [],
+    folders: [],
+    journals: []
+  });
+  runsKnown = y3(false);
+  runsProblem = y3("");
+  // why the runs cannot be listed
+  simulations = y3({
+    missions: {},
+    batches: []
+  });
+  run = new Run(emptyState(), []);
   scene = new Scene();
-  scene.addEvents(events);
   marks = new Marks();
-  marks.push(events);
-  stateAtCursor = null;
-  r3(() => {
-    cursor.value = null;
-    position.value = null;
-    gap.value = null;
-    hovered.value = null;
-    playing.value = null;
-    stretch.value = null;
-    looping.value = false;
-    followedKey.value = null;
+  // targets of jumps
+  robotLag = new Lag();
+  viewerLag = new Lag();
+  #lostAt = 0;
+  // when the server was lost, on this clock [ms]
+  constructor() {
+    this.connection.subscribe((state) => {
+      if (state === "live") this.#lostAt = 0;
+      else if (state === "lost") this.#lostAt ||= Date.now();
+    });
+  }
+  startRun(base, events) {
+    this.run = new Run(base, events);
+    this.scene = new Scene();
+    this.scene.addEvents(events);
+    this.marks = new Marks();
+    this.marks.push(events);
+    this.gap.value = null;
+  }
+  /** Add new events; drop the oldest if there are more than the server keeps. Returns the number of those. */
+  addEvents(events) {
+    this.run.push(events);
+    this.scene.addEvents(events);
+    this.marks.push(events);
+    const gone = this.run.trim(this.settings.value.kept || Infinity);
+    if (gone) this.marks.forget(gone);
+    return gone;
+  }
+  /** Add records of robot topics. */
+  addObserved(records) {
+    this.scene.addObserved(records);
+  }
+  /**
+   * The present, or the end of a run that is over, on the robot's clock [ms since the epoch]. It stands still when the
+   * server is lost, and at the last sign of life of a program that is gone.
+   */
+  liveMs() {
+    const { run } = this;
+    const about = this.facts.value;
+    const isOver = run.now.ended != null || about?.recorded || this.connection.value === "file";
+    const behind = ms(about?.behind) ?? 0;
+    const lag = this.robotLag.value ?? (this.viewerLag.value ?? 0) + behind;
+    const robot = about?.stale == null ? (this.#lostAt || Date.now()) - lag : about.stale / 1e6 - behind;
+    return isOver ? run.last() ?? robot : Math.max(robot, run.last() ?? 0);
+  }
+  /** Whether there is nothing to show, nor on its way: no machine runs, or none with the name asked for. */
+  isMissing = O(() => {
+    if (this.connection.value !== "live" || this.model.value) return false;
+    const wanted = this.wanted.value;
+    return !this.machines.value.length || wanted !== "" && !this.machines.value.some(({ name }) => name === wanted);
   });
-}
-var shown = () => cursor.value === null ? run.now : stateAtCursor ?? run.now;
-function addEvents(events) {
-  run.push(events);
-  scene.addEvents(events);
-  marks.push(events);
-  const gone = run.trim(settings.value.kept || Infinity);
-  if (gone) marks.forget(gone);
-  if (gone && position.value !== null) position.value = Math.max(0, position.value - gone);
-}
-var addObserved = (records) => scene.addObserved(records);
-var SHORTEST_MS = 20;
-function togglePin(id) {
-  const next = new Set(pins.value);
-  if (!next.delete(id)) next.add(id);
-  pins.value = next;
-  save("pins", [...next]);
-}
-function hover(visit) {
-  const before = hovered.value;
-  if (before?.path !== visit?.path || before?.from !== visit?.from) hovered.value = visit;
-}
-function show(t4, count) {
-  stateAtCursor = count === null ? null : run.after(count);
-  r3(() => {
-    cursor.value = t4;
-    position.value = count;
-    tick.value += 1;
-    slowTick.value += 1;
+  /** The running innermost states now, independent of the instant shown. */
+  runningLeaves() {
+    const { states: states2 } = this.run.now;
+    const paths = Object.keys(states2).filter((path) => states2[path].since != null);
+    return innermost(paths, (path) => path);
+  }
+  /** The names of the robots that the machine shown drives: the namespaces of its actions, or its own. */
+  robotNames() {
+    const names = new Set(Object.values(this.run.now.goals).map((goal) => robotOf(goal.action)));
+    for (const name of this.scene.robots.keys()) names.add(name);
+    names.delete("");
+    const own2 = this.facts.value?.name.split("/").slice(0, -1).join("/");
+    return names.size || !own2 ? [...names].sort() : [own2];
+  }
+  /** The name of a state, with that of its container if several states have it. */
+  nameOf(path) {
+    const node = this.model.value?.get(path);
+    if (!node) return shorten(path.slice(path.lastIndexOf("/") + 1));
+    return node.isRepeated && node.parent?.parent ? `${node.parent.name} › ${node.name}` : node.name;
+  }
+  /**
+   * Names of the actions that have a server and of those that had one; null before they are known. As JSON text, so
+   * that the signal does not change when a new list has the same names.
+   */
+  serversSeen = O(() => {
+    if (!this.actions.value) return null;
+    const { actions: there, gone } = this.actions.value;
+    return JSON.stringify([there.map((one) => one.name), gone]);
   });
-}
-function seek(t4) {
-  if (t4 === null) {
-    playing.value = null;
-    show(null, null);
-    return;
-  }
-  const within3 = Math.max(run.first() ?? t4, Math.min(t4, run.last() ?? t4));
-  if (playing.value) playing.value = { t: within3, since: performance.now(), rate: rate.value };
-  show(within3, run.indexAt(within3));
-}
-function seekTo(count) {
-  const event = run.events[count - 1];
-  playing.value = null;
-  if (event) show(event.stamp_ns / 1e6, count);
-}
-function seekEvent(step) {
-  const to = Math.max(1, eventsShown() + step);
-  if (to >= run.events.length && step > 0) seek(null);
-  else seekTo(Math.min(to, run.events.length));
-}
-function togglePlaying() {
-  if (playing.value) playing.value = null;
-  else if (goes.value) seek(nowMs());
-  else {
-    const t4 = cursor.value ?? run.first();
-    if (t4 === null) return;
-    playing.value = { t: t4, since: performance.now(), rate: rate.value };
-    seek(t4);
-  }
-}
-function playOn(moment) {
-  if (!playing.value) return;
-  let t4 = instantAt(playing.value, moment);
-  if (looping.value && stretch.value && t4 >= stretch.value.to) {
-    t4 = loopedAt(t4, stretch.value);
-    playing.value = { t: t4, since: moment, rate: rate.value };
-  }
-  if (t4 >= (run.last() ?? t4)) seek(null);
-  else show(t4, run.indexAt(t4));
-}
-function selectStretch(a5, b3 = a5) {
-  const inRun = (t4) => Math.max(run.first() ?? t4, Math.min(t4, run.last() ?? t4));
-  const [from, to] = [inRun(Math.min(a5, b3)), inRun(Math.max(a5, b3))];
-  stretch.value = to - from >= SHORTEST_MS ? { from, to } : null;
-  if (!stretch.value) looping.value = false;
-}
-function toggleLoop() {
-  looping.value = !looping.value;
-  if (!looping.value) return;
-  if (!stretch.value) {
-    const visit = selected.value === null ? null : visitAt(selected.value, nowMs());
-    if (visit) selectStretch(visit.from, visit.to ?? liveMs());
-    else selectStretch(run.first() ?? 0, run.last() ?? 0);
-  }
-  if (!stretch.value) {
-    looping.value = false;
-    notify("There is nothing to loop over yet");
-    return;
-  }
-  const { from, to } = stretch.value;
-  const t4 = nowMs();
-  playing.value = { t: t4 >= from && t4 < to ? t4 : from, since: performance.now(), rate: rate.value };
-  seek(playing.value.t);
-}
-function moveStretch(end) {
-  const at = nowMs();
-  const other = end === "from" ? stretch.value?.to ?? run.last() : stretch.value?.from ?? run.first();
-  const isTurned = other !== null && (end === "from" ? at >= other : at <= other);
-  if (other === null || isTurned) notify("The selected stretch would end before it begins", "error");
-  else selectStretch(at, other);
-}
-function setRate(factor) {
-  rate.value = factor;
-  save("rate", factor);
-  if (playing.value) seek(cursor.value);
-}
-var jumpOf = (name, step) => marks.find(name, eventsShown(), step, model.value) ?? (step > 0 && cursor.value === null ? marks.find(name, run.events.length + 1, -1, model.value) : null);
-function jump(name, step) {
-  const count = jumpOf(name, step);
-  if (count !== null) seekTo(count);
-  else notify(`No ${name.replace(/^kind |^key /, "")} ${step > 0 ? "ahead" : "before"}`);
-}
-var eventsShown = () => position.value ?? run.events.length;
-var visitAt = (path, t4) => run.spans.findLast((one) => one.path === path && one.from <= t4) ?? null;
-function hoverAt(path, t4 = nowMs()) {
-  const span = path === null ? null : visitAt(path, t4);
-  hover(span && { path: span.path, from: span.from });
-}
-function isLit(path, t4) {
-  const span = hoveredSpan();
-  return span?.path === path && t4 >= span.from && t4 <= (span.to ?? Infinity);
-}
-var hoverHandlers = (path, t4) => ({
-  onPointerEnter: () => hoverAt(path, t4),
-  onPointerLeave: () => hover(null),
-  onFocusIn: () => hoverAt(path, t4),
-  onFocusOut: () => hover(null)
-});
-function hoveredSpan() {
-  const visit = hovered.value;
-  return visit && run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
-}
-var PLOTTED_MACHINES = 30;
-var plotsChosen = y3(null);
-var usual2 = [];
-var plotsShown = O(() => {
-  slowTick.value;
-  if (plotsChosen.value) return plotsChosen.value;
-  const found = usualPlots(shown(), scene.series.keys());
-  const isMore = found.flat().length > usual2.flat().length;
-  if (isMore) usual2 = found;
-  return usual2;
-});
-function loadPlots() {
-  const kept = saved("plots", {});
-  usual2 = [];
-  const mine = own(kept, model.value?.root.label ?? "");
-  plotsChosen.value = mine === void 0 ? null : knownPlots(mine);
-}
-function setPlots(next) {
-  plotsChosen.value = knownPlots(next);
-  const isCut = plotsChosen.value.flat().length < next.flat().length;
-  if (isCut) notify(`There are ${MOST_PLOTS} plots of ${MOST_LINES} lines at most: remove one first`, "error");
-  const name = model.value?.root.label;
-  if (name === void 0) return;
-  const others = Object.entries(saved("plots", {})).filter(([one]) => one !== name);
-  save("plots", Object.fromEntries([...others, [name, plotsChosen.value]].slice(-PLOTTED_MACHINES)));
-}
-var addLine = (number, id) => setPlots(plotsShown.value.map((ids, i4) => i4 === number ? [...ids, id] : ids));
-var removeLine = (number, id) => setPlots(plotsShown.value.map((ids, i4) => i4 === number ? ids.filter((one) => one !== id) : ids));
-var arrangement = y3(arrangementOf(saved("panels", null)));
-var isPhone = y3(false);
-var part = y3("machine");
-var arrangementShown = O(
-  () => isPhone.value ? usual() : arrangement.value ?? usual()
-);
-var panelsThere = O(() => {
-  const isThere = { map: hasMap.value, plots: plotsShown.value.length > 0 };
-  return new Set(PANELS.filter((name) => isThere[name] ?? true));
-});
-function arrange(next) {
-  arrangement.value = next;
-  save("panels", next && wordOf(next));
-}
-var NOTED_RUNS = 30;
-var notes = y3([]);
-var noteAt = y3(null);
-function askForNote() {
-  if (run.first() !== null) noteAt.value = nowMs();
-}
-var notedRuns = () => {
-  const all = saved("notes", []);
-  return Array.isArray(all) ? all : [];
 };
-function loadNotes() {
-  const { notes: kept } = notedRuns().find((one) => one?.epoch === facts.value?.epoch) ?? {};
-  notes.value = Array.isArray(kept) ? kept : [];
-}
-function setNotes(next) {
-  const epoch2 = facts.value?.epoch;
-  notes.value = next;
-  if (!epoch2) return;
-  const others = notedRuns().filter((one) => one?.epoch !== epoch2);
-  save("notes", [...others, ...next.length ? [{ epoch: epoch2, notes: next }] : []].slice(-NOTED_RUNS));
-}
-var addNotes = (more) => setNotes(withNotes(notes.value, more));
-var removeNote = (note) => setNotes(notes.value.filter((one) => one !== note));
 var LAG_WINDOW_MS = 3e4;
 var Lag = class {
   since = performance.now();
@@ -3187,213 +2545,978 @@ var Lag = class {
     return least === Infinity ? null : least;
   }
 };
-var robotLag = new Lag();
-var viewerLag = new Lag();
-var nowMs = () => cursor.value ?? liveMs();
-var lostAt = 0;
-connection.subscribe((state) => {
-  if (state === "live") lostAt = 0;
-  else if (state === "lost") lostAt ||= Date.now();
-});
-function liveMs() {
-  const about = facts.value;
-  const isOver = run.now.ended != null || about?.recorded || connection.value === "file";
-  const behind = ms(about?.behind) ?? 0;
-  const lag = robotLag.value ?? (viewerLag.value ?? 0) + behind;
-  const robot = about?.stale == null ? (lostAt || Date.now()) - lag : about.stale / 1e6 - behind;
-  return isOver ? run.last() ?? robot : Math.max(robot, run.last() ?? 0);
-}
-var goes = O(() => {
-  tick.value;
-  const isOver = run.now.ended != null || facts.value?.recorded || facts.value?.stale != null;
-  return playing.value !== null || cursor.value === null && !isOver && connection.value !== "file";
-});
-var began = () => ms(shown().started) ?? run.first();
-var CLOCKS = ["run", "wall", "relative"];
-var clock = y3(saved("clock", "run"));
-function setClock(name) {
-  clock.value = name;
-  save("clock", name);
-  slowTick.value += 1;
-}
-function instantText(t4, digits = 1) {
-  if (clock.value === "wall") return wallText(t4, digits);
-  if (clock.value === "relative") {
-    const seconds = (t4 - liveMs()) / 1e3;
-    return Math.abs(seconds) < 60 ? `${seconds.toFixed(digits)} s` : runText(t4, digits, liveMs());
+
+// src/core/series.ts
+var MOST_POINTS = 2e4;
+var MOST_FIELDS = 60;
+var MOST_ITEMS = 8;
+var MOST_DEPTH = 6;
+var MOST_CHOICES = 400;
+var LONGEST_ID = 400;
+var MOST_PLOTS = 6;
+var JUST_MS = 1e-3;
+var MOST_LINES = 8;
+var SOURCES2 = ["feedback", "progress", "userdata", "topic"];
+var PROGRESS = {
+  distance: ["distance left", "m", ({ distance }) => distance],
+  fraction: ["progress", "%", ({ fraction }) => fraction === null ? null : 100 * fraction]
+};
+var idOf = ({ source, owner, path }) => [source, owner, ...path].map(encodeURIComponent).join(",");
+function originOf(id) {
+  if (id.length > LONGEST_ID) return null;
+  try {
+    const [word, owner, ...path] = id.split(",").map(decodeURIComponent);
+    const source = SOURCES2.find((one) => one === word);
+    const needsPath = source === "userdata" || source === "feedback" || source === "progress";
+    if (!source || !owner || needsPath && !path.length) return null;
+    return source === "progress" && !Object.hasOwn(PROGRESS, path[0]) ? null : { source, owner, path };
+  } catch {
+    return null;
   }
-  return runText(t4, digits);
 }
-function wallText(t4, digits) {
-  const unit = 10 ** digits;
-  const rounded2 = new Date(Math.round(t4 * unit / 1e3) * (1e3 / unit));
-  const part2 = digits ? `.${String(Math.round(rounded2.getMilliseconds() * (unit / 1e3))).padStart(digits, "0")}` : "";
-  return `${rounded2.toLocaleTimeString("en-GB", { hour12: false })}${part2}`;
+function knownPlots(plots) {
+  if (!Array.isArray(plots)) return [];
+  const lines = (plot) => (Array.isArray(plot) ? plot : []).filter((id) => typeof id === "string" && originOf(id)).slice(0, MOST_LINES);
+  return plots.map(lines).filter((plot) => plot.length).slice(0, MOST_PLOTS);
 }
-function runText(t4, digits = 1, since = began() ?? t4) {
-  const seconds = (t4 - since) / 1e3;
-  const unit = 10 ** digits;
-  const all = Math.round(Math.abs(seconds) * unit);
-  const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
-  const hours = Math.floor(all / (3600 * unit));
-  const part2 = digits ? `.${String(all % unit).padStart(digits, "0")}` : "";
-  const minutes = `${two(all / unit / 60 % 60)}:${two(all / unit % 60)}${part2}`;
-  return `${seconds < 0 && all ? "-" : ""}${hours ? `${hours}:` : ""}${minutes}`;
+function labelOf({ source, owner, path }) {
+  if (source === "progress") return PROGRESS[path[0]][0];
+  if (source === "feedback") return path.slice(-2).join(".");
+  return source === "userdata" ? path.join(".") : [owner, ...path].join(".");
 }
-var isMissing = O(() => {
-  if (connection.value !== "live" || model.value) return false;
-  return !machines.value.length || wanted.value !== "" && !machines.value.some(({ name }) => name === wanted.value);
-});
-var whyDisarmed = O(() => {
-  if (cursor.value !== null) return "You look at the past: back to live first (l)";
-  if (connection.value === "lost") return "The viewer's server does not answer";
-  return facts.value?.stale == null ? null : "The mission's program does not answer";
-});
-var activePaths = O(() => {
-  tick.value;
-  return Object.entries(shown().states).filter(([, state]) => state.since != null).map(([path]) => path);
-});
-var activeLeaves = O(() => innermost(activePaths.value, (path) => path));
-function runningLeaves() {
-  const paths = Object.keys(run.now.states).filter((path) => run.now.states[path].since != null);
-  return innermost(paths, (path) => path);
+var ownerOf = ({ source, owner }) => source === "topic" ? "" : owner;
+var unitOf = ({ source, path }) => source === "progress" ? PROGRESS[path[0]][1] : "";
+function partsOf(value) {
+  const fields2 = fieldsOf(value);
+  if (fields2) return Object.entries(fields2).slice(0, MOST_FIELDS);
+  const branch = branchOf(value);
+  if (typeof branch === "string") return null;
+  const most = Array.isArray(value) ? MOST_ITEMS : MOST_FIELDS;
+  return branch.parts.slice(0, most).map(([name, part], i4) => [unquoted(name) ?? String(i4), part]);
 }
-function robotNames() {
-  const names = new Set(Object.values(run.now.goals).map((goal) => robotOf(goal.action)));
-  for (const name of scene.robots.keys()) names.add(name);
-  names.delete("");
-  const own2 = facts.value?.name.split("/").slice(0, -1).join("/");
-  return names.size || !own2 ? [...names].sort() : [own2];
+var unquoted = (name) => name?.replace(/^(['"])(.*)\1$/, "$2");
+function numberOf(value) {
+  if (typeof value === "boolean") return value ? 1 : 0;
+  const number = isTree(value) && typeof value.$int === "string" ? Number(value.$int) : value;
+  return typeof number === "number" && Number.isFinite(number) ? number : null;
 }
-var lastLeaves = O(() => {
-  if (activeLeaves.value.length) return activeLeaves.value;
-  const left = Object.entries(shown().states).filter(([, state]) => state.left != null);
-  if (!left.length) return [];
-  const depth = (path) => path.split("/").length;
-  const [last] = left.reduce((a5, b3) => (b3[1].left ?? 0) > (a5[1].left ?? 0) ? b3 : a5);
-  const isWithin = (path, top) => `${path}/`.startsWith(`${top}/`);
-  const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered(last));
-  const end = innermost(inside, ([path]) => path);
-  const newest2 = end.reduce((a5, b3) => {
-    const later = (b3[1].left ?? 0) - (a5[1].left ?? 0);
-    return later > 0 || later === 0 && depth(b3[0]) > depth(a5[0]) ? b3 : a5;
+function numberAt(whole2, path) {
+  let value = whole2;
+  for (const name of path) {
+    const part = partsOf(value)?.find(([one]) => one === name);
+    if (!part) return null;
+    value = part[1];
+  }
+  return numberOf(value);
+}
+function numbersIn(value) {
+  const found = [];
+  const look = (one, path) => {
+    if (found.length >= MOST_FIELDS) return;
+    if (numberOf(one) !== null) found.push(path);
+    else if (path.length < MOST_DEPTH) for (const [name, part] of partsOf(one) ?? []) look(part, [...path, name]);
+  };
+  look(value, []);
+  return found;
+}
+function originsIn(data, topics) {
+  const found = /* @__PURE__ */ new Map();
+  const add = (source, owner, path) => {
+    const origin = { source, owner, path };
+    if (found.size < MOST_CHOICES) found.set(idOf(origin), origin);
+  };
+  for (const name of topics) add("topic", name, []);
+  for (const goal of Object.values(data.goals))
+    for (const name of Object.keys(PROGRESS))
+      if (goal.progress && PROGRESS[name][2](goal.progress) !== null) add("progress", goal.action, [name]);
+  for (const { container, key, value } of Object.values(data.userdata))
+    for (const path of numbersIn(value)) add("userdata", container, [key, ...path]);
+  for (const goal of Object.values(data.goals))
+    for (const path of numbersIn(goal.feedback)) if (path.length) add("feedback", goal.action, path);
+  return [...found.values()].filter((origin) => originOf(idOf(origin)));
+}
+function usualPlots(data, topics) {
+  const batteries = [...topics].filter((name) => /(^|\/)battery$/.test(name));
+  const actions = new Set(
+    Object.values(data.goals).filter((goal) => goal.progress?.distance != null).map((goal) => goal.action)
+  );
+  return knownPlots([
+    batteries.sort().map((owner) => idOf({ source: "topic", owner, path: [] })),
+    [...actions].sort().map((owner) => idOf({ source: "progress", owner, path: ["distance"] }))
+  ]);
+}
+var Samples = class {
+  id;
+  origin;
+  isStep;
+  list = [];
+  #read = 0;
+  // number of events that were read, including those the run has dropped since
+  #run = null;
+  #goal = "";
+  // id of the goal with the newest feedback
+  constructor(id) {
+    this.id = id;
+    this.origin = originOf(id);
+    this.isStep = this.origin.source === "userdata";
+  }
+  update(run, topics) {
+    const { source, owner } = this.origin;
+    if (source === "topic") {
+      this.list = topics.get(owner)?.points ?? [];
+      return this.list;
+    }
+    if (this.#run !== run) {
+      this.#run = run;
+      this.#read = run.forgotten;
+      this.list = [];
+    }
+    const first = Math.max(0, this.#read - run.forgotten);
+    for (let i4 = first; i4 < run.events.length; i4++) this.#take(run.events[i4]);
+    this.#read = run.forgotten + run.events.length;
+    if (this.list.length > MOST_POINTS) this.list.splice(0, MOST_POINTS / 4);
+    return this.list;
+  }
+  #take(e4) {
+    const { source, owner, path } = this.origin;
+    if (source === "userdata") {
+      if (e4.kind === "UserdataWritten" && e4.key === path[0] && containerOf(e4.path) === owner)
+        this.#put(e4, numberAt(e4.value, path.slice(1)));
+      return;
+    }
+    if (!("action" in e4) || e4.action !== owner) return;
+    if (e4.kind === "GoalFeedback") {
+      if (e4.goal_id !== this.#goal) this.#put(e4, null, -JUST_MS);
+      this.#goal = e4.goal_id;
+      if (source === "feedback") this.#put(e4, numberAt(e4.feedback, path));
+      else if (e4.progress) this.#put(e4, PROGRESS[path[0]][2](e4.progress));
+    } else if (e4.kind === "GoalDone" && e4.goal_id === this.#goal) this.#put(e4, null, JUST_MS);
+  }
+  /** @param later [ms] */
+  #put(e4, value, later = 0) {
+    if (value !== null || this.list.length) this.list.push({ t: e4.stamp_ns / 1e6 + later, value });
+  }
+};
+var valueAt = (list, t4) => list[countUntil(list, t4) - 1]?.value ?? null;
+function numberText(value) {
+  const size = Math.abs(value);
+  if (value === 0 || Number.isInteger(value) && size < 1e6) return String(value);
+  if (size >= 1e6 || size < 1e-3) return value.toExponential(2);
+  return String(Number(value.toPrecision(size < 0.01 ? 2 : 4)));
+}
+function aligned(all, from, to, now) {
+  const windows = all.map(({ list, isStep }) => {
+    const shown = list.slice(Math.max(0, countUntil(list, from) - 1), countUntil(list, to) + 1);
+    const last = shown.at(-1);
+    return isStep && last && last.t < now ? [...shown, { t: now, value: last.value }] : shown;
   });
-  return [newest2[0]];
-});
-function entered(path) {
-  const span = run.spans.findLast((one) => one.path === path);
-  return span ? span.from * 1e6 : 0;
+  const instants2 = [...new Set(windows.flatMap((list) => list.map((one) => one.t)))].sort((a5, b3) => a5 - b3);
+  const place = new Map(instants2.map((t4, i4) => [t4, i4]));
+  const columns = windows.map((list) => {
+    const column = new Array(instants2.length).fill(void 0);
+    for (const { t: t4, value } of list) column[place.get(t4)] = value;
+    return column;
+  });
+  return [instants2, ...columns];
 }
-var runStatus = O(() => {
-  tick.value;
-  const data = shown();
-  const about = facts.value;
-  const cutShort = data.ended == null && data.started != null;
-  if (!about) return { word: "waiting", kind: "other" };
-  if (cursor.value !== null) return { word: "replay", kind: "preempted" };
-  if (connection.value === "file" && cutShort) return { word: "recording ends here", kind: "active" };
-  if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
-  if (connection.value === "lost") return { word: "reconnecting", kind: "waiting" };
-  if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: outcomeClass(data.outcome) };
-  if (asks(data)) return { word: "asks you", kind: "waiting" };
-  if (about.control?.paused) return { word: pausedText(data), kind: "waiting" };
-  if (data.states[model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
-  if (data.started == null) return { word: "not started", kind: "other" };
-  return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
-});
+
+// src/core/links.ts
+var MOST_OPEN = 100;
+var LONGEST_OPEN = 6e3;
+var MOST_NOTES = 20;
+var LONGEST_NOTE = 300;
+var LATEST = 1e15;
+var instant = (at) => (Math.ceil(at * 1e3) / 1e6).toFixed(6);
+function instantOf(text2) {
+  if (!text2 || !/^\d{1,12}(\.\d{1,6})?$/.test(text2)) return null;
+  const at = Number(text2) * 1e3;
+  return at < LATEST ? at : null;
+}
+function fragmentOf({ at, selected, opened: opened2, notes, stretch, panels: panels2, plots }) {
+  const words2 = new URLSearchParams();
+  if (at !== null) words2.append("at", instant(at));
+  if (selected !== null) words2.append("state", selected);
+  const paths = opened2 ?? [];
+  const fits = paths.length <= MOST_OPEN && paths.join("").length <= LONGEST_OPEN;
+  for (const path of fits ? paths : []) words2.append("open", path);
+  for (const note of notes.slice(-MOST_NOTES)) words2.append("note", `${instant(note.at)} ${note.text}`);
+  if (stretch) words2.append("stretch", stretch.map(instant).join(" "));
+  if (panels2) words2.append("panels", wordOf(panels2));
+  for (const plot of plots ?? []) words2.append("plot", plot.join(";"));
+  if (plots && !plots.length) words2.append("plot", "");
+  return words2.toString();
+}
+function viewOf(text2) {
+  const words2 = new URLSearchParams(text2.replace(/^#/, ""));
+  const notes = [];
+  for (const word of words2.getAll("note").slice(0, MOST_NOTES)) {
+    const [, when, what] = /^(\S+) (.+)$/s.exec(word) ?? [];
+    const at = instantOf(when ?? null);
+    if (at !== null) notes.push({ at, text: what.slice(0, LONGEST_NOTE) });
+  }
+  const opened2 = words2.getAll("open").slice(0, MOST_OPEN);
+  const view2 = {
+    at: instantOf(words2.get("at")),
+    selected: words2.get("state"),
+    opened: null,
+    notes,
+    stretch: null,
+    panels: arrangementOf(words2.get("panels")),
+    plots: null
+  };
+  const [from, to] = (words2.get("stretch") ?? "").split(" ").map(instantOf);
+  if (from && to && from < to) view2.stretch = [from, to];
+  if (opened2.length) view2.opened = opened2;
+  if (words2.has("plot")) view2.plots = knownPlots(words2.getAll("plot").map((plot) => plot.split(";")));
+  return view2;
+}
+function withNotes(notes, more) {
+  const clean = more.map(({ at, text: text2 }) => ({ at, text: text2.trim().slice(0, LONGEST_NOTE) })).filter((one) => one.text);
+  const isKnown = (one) => notes.some((other) => other.text === one.text && same(other, one));
+  const all = [...notes, ...clean.filter((one) => !isKnown(one))].slice(-MOST_NOTES);
+  return all.sort((a5, b3) => a5.at - b3.at);
+}
+var same = (a5, b3) => Math.abs(a5.at - b3.at) < 0.01;
+
+// src/core/store/notes.ts
+var NOTED_RUNS = 30;
+var Notes = class {
+  all = y3([]);
+  writtenAt = y3(null);
+  // instant of the note that is being written [ms]
+  #data;
+  #playback;
+  constructor(data, playback) {
+    this.#data = data;
+    this.#playback = playback;
+  }
+  /** Begin a note on the instant shown. */
+  begin() {
+    if (this.#data.run.first() !== null) this.writtenAt.value = this.#playback.nowMs();
+  }
+  /** Load the notes of the machine shown. */
+  load() {
+    const { notes: kept } = notedRuns().find((one) => one?.epoch === this.#data.facts.value?.epoch) ?? {};
+    this.all.value = Array.isArray(kept) ? kept : [];
+  }
+  add(more) {
+    this.#set(withNotes(this.all.value, more));
+  }
+  remove(note) {
+    this.#set(this.all.value.filter((one) => one !== note));
+  }
+  #set(next) {
+    const epoch2 = this.#data.facts.value?.epoch;
+    this.all.value = next;
+    if (!epoch2) return;
+    const others = notedRuns().filter((one) => one?.epoch !== epoch2);
+    save("notes", [...others, ...next.length ? [{ epoch: epoch2, notes: next }] : []].slice(-NOTED_RUNS));
+  }
+};
+function notedRuns() {
+  const all = saved("notes", []);
+  return Array.isArray(all) ? all : [];
+}
+
+// src/core/store/panels.ts
+var PLOTTED_MACHINES = 30;
+var Panels = class {
+  /** null: the usual one */
+  arrangement = y3(arrangementOf(saved("panels", null)));
+  hasMap = y3(false);
+  // whether there is anything to show on a map
+  /** ids of series by plot; null: no choice was made */
+  plotsChosen = y3(null);
+  #data;
+  #playback;
+  #view;
+  #usualPlots = [];
+  constructor(data, playback, view2) {
+    this.#data = data;
+    this.#playback = playback;
+    this.#view = view2;
+  }
+  /** The arrangement in use; phones have a fixed one. */
+  arrangementShown = O(
+    () => this.#view.isPhone.value ? usual() : this.arrangement.value ?? usual()
+  );
+  /** Names of the panels that have something to show. */
+  panelsThere = O(() => {
+    const isThere = { map: this.hasMap.value, plots: this.plotsShown.value.length > 0 };
+    return new Set(PANELS.filter((name) => isThere[name] ?? true));
+  });
+  /** @param next null: the usual one */
+  arrange(next) {
+    this.arrangement.value = next;
+    save("panels", next && wordOf(next));
+  }
+  // -- plots ------------------------------------------------------------------------------------
+  plotsShown = O(() => {
+    this.#playback.slowTick.value;
+    if (this.plotsChosen.value) return this.plotsChosen.value;
+    const found = usualPlots(this.#playback.shown(), this.#data.scene.series.keys());
+    const isMore = found.flat().length > this.#usualPlots.flat().length;
+    if (isMore) this.#usualPlots = found;
+    return this.#usualPlots;
+  });
+  get #machine() {
+    return this.#data.model.value?.root.label;
+  }
+  /** Load the plots of the machine shown. */
+  loadPlots() {
+    const kept = saved("plots", {});
+    this.#usualPlots = [];
+    const mine = own(kept, this.#machine ?? "");
+    this.plotsChosen.value = mine === void 0 ? null : knownPlots(mine);
+  }
+  setPlots(next) {
+    const plots = knownPlots(next);
+    this.plotsChosen.value = plots;
+    if (plots.flat().length < next.flat().length)
+      this.#view.notify(`There are ${MOST_PLOTS} plots of ${MOST_LINES} lines at most: remove one first`, "error");
+    const name = this.#machine;
+    if (name === void 0) return;
+    const others = Object.entries(saved("plots", {})).filter(([one]) => one !== name);
+    save("plots", Object.fromEntries([...others, [name, plots]].slice(-PLOTTED_MACHINES)));
+  }
+  /** @param number of the plot */
+  addLine(number, id) {
+    this.setPlots(this.plotsShown.value.map((ids, i4) => i4 === number ? [...ids, id] : ids));
+  }
+  /** @param number of the plot */
+  removeLine(number, id) {
+    this.setPlots(this.plotsShown.value.map((ids, i4) => i4 === number ? ids.filter((one) => one !== id) : ids));
+  }
+};
+
+// src/core/store/playback.ts
+var SHORTEST_MS = 20;
+var Playback = class {
+  tick = y3(0);
+  // counts the changes that panels should show
+  slowTick = y3(0);
+  // the same, for panels with much text
+  cursor = y3(null);
+  // the instant shown [ms]; null: now
+  /** number of events up to there: several may have the same instant */
+  #position = y3(null);
+  instant = O(() => [this.cursor.value, this.#position.value]);
+  rate = y3(saved("rate", 1));
+  // of playing
+  playing = y3(null);
+  stretch = y3(null);
+  // the selected part of the run [ms]
+  looping = y3(false);
+  // whether playing repeats the stretch
+  filmed = y3(null);
+  // progress of a film [%]
+  followedKey = y3(null);
+  // the userdata key whose changes are targets of jumps
+  #data;
+  #view;
+  #stateAtCursor = null;
+  constructor(data, view2) {
+    this.#data = data;
+    this.#view = view2;
+  }
+  /** Show the present of a new run. */
+  restart() {
+    this.#stateAtCursor = null;
+    this.cursor.value = null;
+    this.#position.value = null;
+    this.playing.value = null;
+    this.stretch.value = null;
+    this.looping.value = false;
+    this.followedKey.value = null;
+  }
+  /** Stay at the same event after the oldest ones were dropped. @param gone their number */
+  forget(gone) {
+    const at = this.#position.value;
+    if (gone && at !== null) this.#position.value = Math.max(0, at - gone);
+  }
+  /** The state of the run at the instant shown. */
+  shown() {
+    return this.cursor.value === null ? this.#data.run.now : this.#stateAtCursor ?? this.#data.run.now;
+  }
+  /** The instant shown, on the robot's clock [ms since the epoch]. */
+  nowMs() {
+    return this.cursor.value ?? this.#data.liveMs();
+  }
+  /** The beginning of the run shown [ms]. */
+  began() {
+    return ms(this.shown().started) ?? this.#data.run.first();
+  }
+  /** The number of kept events up to the instant shown. */
+  eventsShown() {
+    return this.#position.value ?? this.#data.run.events.length;
+  }
+  /** Whether the instant shown moves by itself: a run is played, or a running one is shown live. */
+  goes = O(() => {
+    this.tick.value;
+    const { run, facts, connection } = this.#data;
+    const isOver = run.now.ended != null || facts.value?.recorded || facts.value?.stale != null;
+    return this.playing.value !== null || this.cursor.value === null && !isOver && connection.value !== "file";
+  });
+  /** Have all panels drawn again. */
+  renew() {
+    this.tick.value += 1;
+    this.slowTick.value += 1;
+  }
+  #show(t4, count) {
+    this.#stateAtCursor = count === null ? null : this.#data.run.after(count);
+    r3(() => {
+      this.cursor.value = t4;
+      this.#position.value = count;
+      this.renew();
+    });
+  }
+  /** The instant of the run that is nearest to another one [ms]. */
+  #inRun(t4) {
+    const { run } = this.#data;
+    return Math.max(run.first() ?? t4, Math.min(t4, run.last() ?? t4));
+  }
+  /** Show the instant t [ms]; null: now. Playing continues from there. */
+  seek(t4) {
+    if (t4 === null) {
+      this.playing.value = null;
+      this.#show(null, null);
+      return;
+    }
+    const within3 = this.#inRun(t4);
+    if (this.playing.value) this.#playFrom(within3);
+    this.#show(within3, this.#data.run.indexAt(within3));
+  }
+  /** Show the state after the first `count` events. */
+  seekTo(count) {
+    const event = this.#data.run.events[count - 1];
+    this.playing.value = null;
+    if (event) this.#show(event.stamp_ns / 1e6, count);
+  }
+  /** Go forward or back by a number of events. */
+  seekEvent(step) {
+    const to = Math.max(1, this.eventsShown() + step);
+    const all = this.#data.run.events.length;
+    if (to >= all && step > 0) this.seek(null);
+    else this.seekTo(Math.min(to, all));
+  }
+  // -- playing ----------------------------------------------------------------------------------
+  #playFrom(t4, since = performance.now()) {
+    this.playing.value = { t: t4, since, rate: this.rate.value };
+  }
+  /** Pause or play; at the end of a run that is over, play from the beginning. */
+  togglePlaying() {
+    if (this.playing.value) this.playing.value = null;
+    else if (this.goes.value) this.seek(this.nowMs());
+    else {
+      const t4 = this.cursor.value ?? this.#data.run.first();
+      if (t4 === null) return;
+      this.#playFrom(t4);
+      this.seek(t4);
+    }
+  }
+  /** While playing, show the instant that is due, and finally now. @param moment [ms] */
+  playOn(moment) {
+    if (!this.playing.value) return;
+    const { run } = this.#data;
+    const stretch = this.looping.value ? this.stretch.value : null;
+    let t4 = instantAt(this.playing.value, moment);
+    if (stretch && t4 >= stretch.to) {
+      t4 = loopedAt(t4, stretch);
+      this.#playFrom(t4, moment);
+    }
+    if (t4 >= (run.last() ?? t4)) this.seek(null);
+    else this.#show(t4, run.indexAt(t4));
+  }
+  setRate(factor) {
+    this.rate.value = factor;
+    save("rate", factor);
+    if (this.playing.value) this.seek(this.cursor.value);
+  }
+  // -- the selected stretch ---------------------------------------------------------------------
+  /** Select a stretch of the run between two instants [ms]; none if it is too short. */
+  selectStretch(a5, b3 = a5) {
+    const [from, to] = [this.#inRun(Math.min(a5, b3)), this.#inRun(Math.max(a5, b3))];
+    this.stretch.value = to - from >= SHORTEST_MS ? { from, to } : null;
+    if (!this.stretch.value) this.looping.value = false;
+  }
+  /** Repeat the selected stretch, otherwise the visit of the selected state, otherwise the whole run. */
+  toggleLoop() {
+    const { run } = this.#data;
+    this.looping.value = !this.looping.value;
+    if (!this.looping.value) return;
+    if (!this.stretch.value) {
+      const selected = this.#view.selected.value;
+      const visit = selected === null ? null : run.visitAt(selected, this.nowMs());
+      if (visit) this.selectStretch(visit.from, visit.to ?? this.#data.liveMs());
+      else this.selectStretch(run.first() ?? 0, run.last() ?? 0);
+    }
+    if (!this.stretch.value) {
+      this.looping.value = false;
+      this.#view.notify("There is nothing to loop over yet");
+      return;
+    }
+    const { from, to } = this.stretch.value;
+    const now = this.nowMs();
+    const t4 = now >= from && now < to ? now : from;
+    this.#playFrom(t4);
+    this.seek(t4);
+  }
+  /** Move the beginning or end of the selected stretch to the instant shown. */
+  moveStretch(end) {
+    const { run } = this.#data;
+    const at = this.nowMs();
+    const other = end === "from" ? this.stretch.value?.to ?? run.last() : this.stretch.value?.from ?? run.first();
+    const isTurned = other !== null && (end === "from" ? at >= other : at <= other);
+    if (other === null || isTurned) this.#view.notify("The selected stretch would end before it begins", "error");
+    else this.selectStretch(at, other);
+  }
+  // -- jumps ------------------------------------------------------------------------------------
+  /** The number of events up to the next or previous mark; when live, the newest mark counts as the next one. */
+  jumpOf(name, step) {
+    const { marks, model, run } = this.#data;
+    const next = marks.find(name, this.eventsShown(), step, model.value);
+    if (next !== null || step < 0 || this.cursor.value !== null) return next;
+    return marks.find(name, run.events.length + 1, -1, model.value);
+  }
+  /** Go to a mark, or notify the user that there is none. @param name of `Marks.find` */
+  jump(name, step) {
+    const count = this.jumpOf(name, step);
+    if (count !== null) this.seekTo(count);
+    else this.#view.notify(`No ${name.replace(/^kind |^key /, "")} ${step > 0 ? "ahead" : "before"}`);
+  }
+};
+
+// src/core/store/pointer.ts
+var Pointer = class {
+  hovered = y3(null);
+  /** The instant below the pointer in the timeline or a plot [ms]. */
+  pointed = y3(null);
+  #data;
+  #playback;
+  constructor(data, playback) {
+    this.#data = data;
+    this.#playback = playback;
+  }
+  /** Set the visit that the pointer is on, in the timeline or the map. */
+  hover(visit) {
+    const before = this.hovered.value;
+    if (before?.path !== visit?.path || before?.from !== visit?.from) this.hovered.value = visit;
+  }
+  /** Set what the pointer is on: the visit of a state at an instant, or nothing. */
+  hoverAt(path, t4 = this.#playback.nowMs()) {
+    const span = path === null ? null : this.#data.run.visitAt(path, t4);
+    this.hover(span && { path: span.path, from: span.from });
+  }
+  /** Whether the pointer is on the visit of a state at an instant [ms]. */
+  isLit(path, t4) {
+    const span = this.hoveredSpan();
+    return span?.path === path && t4 >= span.from && t4 <= (span.to ?? Infinity);
+  }
+  /** Handlers for a row about a state at an instant: pointing at it or focusing it highlights the visit. */
+  hoverHandlers(path, t4) {
+    const enter2 = () => this.hoverAt(path, t4);
+    const leave2 = () => this.hover(null);
+    return { onPointerEnter: enter2, onPointerLeave: leave2, onFocusIn: enter2, onFocusOut: leave2 };
+  }
+  /** The span of the visit that the pointer is on. */
+  hoveredSpan() {
+    const visit = this.hovered.value;
+    return visit && this.#data.run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
+  }
+};
+
+// src/core/store/status.ts
+var Status = class {
+  #data;
+  #playback;
+  constructor(data, playback) {
+    this.#data = data;
+    this.#playback = playback;
+  }
+  activePaths = O(() => {
+    this.#playback.tick.value;
+    return Object.entries(this.#playback.shown().states).filter(([, state]) => state.since != null).map(([path]) => path);
+  });
+  activeLeaves = O(() => innermost(this.activePaths.value, (path) => path));
+  /** The running innermost states; after the end of a run, the innermost state that was left last. */
+  lastLeaves = O(() => {
+    if (this.activeLeaves.value.length) return this.activeLeaves.value;
+    const left = Object.entries(this.#playback.shown().states).filter(([, state]) => state.left != null);
+    if (!left.length) return [];
+    const depth = (path) => path.split("/").length;
+    const [last] = left.reduce((a5, b3) => (b3[1].left ?? 0) > (a5[1].left ?? 0) ? b3 : a5);
+    const entered = (this.#data.run.visitAt(last)?.from ?? 0) * 1e6;
+    const isWithin = (path, top) => `${path}/`.startsWith(`${top}/`);
+    const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered);
+    const end = innermost(inside, ([path]) => path);
+    const newest2 = end.reduce((a5, b3) => {
+      const later = (b3[1].left ?? 0) - (a5[1].left ?? 0);
+      return later > 0 || later === 0 && depth(b3[0]) > depth(a5[0]) ? b3 : a5;
+    });
+    return [newest2[0]];
+  });
+  runStatus = O(() => {
+    this.#playback.tick.value;
+    const data = this.#playback.shown();
+    const about = this.#data.facts.value;
+    const connection = this.#data.connection.value;
+    const cutShort = data.ended == null && data.started != null;
+    if (!about) return { word: "waiting", kind: "other" };
+    if (this.#playback.cursor.value !== null) return { word: "replay", kind: "preempted" };
+    if (connection === "file" && cutShort) return { word: "recording ends here", kind: "active" };
+    if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
+    if (connection === "lost") return { word: "reconnecting", kind: "waiting" };
+    if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: outcomeClass(data.outcome) };
+    if (asks(data)) return { word: "asks you", kind: "waiting" };
+    if (about.control?.paused) return { word: this.#pausedText(data), kind: "waiting" };
+    if (data.states[this.#data.model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
+    if (data.started == null) return { word: "not started", kind: "other" };
+    return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
+  });
+  /** The paused state and the reason, as text. */
+  #pausedText(data) {
+    const held = Object.entries(data.states).filter(([, state2]) => state2.waits != null);
+    if (!held.length) return "paused";
+    const [path, state] = held[0];
+    const why = state.waits === "pause" ? "" : ` (${state.waits})`;
+    return `paused before ${this.#data.nameOf(path)}${held.length > 1 ? ` and ${held.length - 1} more` : ""}${why}`;
+  }
+  /** Why commands are disabled; null if they are not. */
+  whyDisarmed = O(() => {
+    if (this.#playback.cursor.value !== null) return "You look at the past: back to live first (l)";
+    if (this.#data.connection.value === "lost") return "The viewer's server does not answer";
+    return this.#data.facts.value?.stale == null ? null : "The mission's program does not answer";
+  });
+  /** Whether a goal seems to wait for a server. A server behind a bridge has no token and shows only by its answers. */
+  hasNoServer(goal) {
+    const { serversSeen, connection, facts, run } = this.#data;
+    if (serversSeen.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
+    if (connection.value !== "live" || this.#playback.cursor.value !== null) return false;
+    if (facts.value?.stale != null || facts.value?.recorded) return false;
+    const plain = (name2) => name2.replace(/^\//, "");
+    const name = plain(goal.action);
+    const [there, gone] = JSON.parse(serversSeen.value);
+    if (there.includes(name)) return false;
+    if (gone.includes(name)) return true;
+    const answered = (one) => plain(one.action) === name && (one.feedback != null || one.result != null);
+    return !Object.values(run.now.goals).some(answered);
+  }
+};
 var asks = (data) => Object.values(data.states).some(({ since, question }) => since != null && question?.answered === null);
-function pausedText(data) {
-  const held = Object.entries(data.states).filter(([, state2]) => state2.waits != null);
-  if (!held.length) return "paused";
-  const [path, state] = held[0];
-  const why2 = state.waits === "pause" ? "" : ` (${state.waits})`;
-  return `paused before ${nameOf(path)}${held.length > 1 ? ` and ${held.length - 1} more` : ""}${why2}`;
+
+// src/core/model.ts
+var CHANGE_SIGNS = {
+  added: "+",
+  removed: "−",
+  changed: "≠",
+  numbers: "×"
+};
+var signed = (change2, name) => change2 ? `${CHANGE_SIGNS[change2]} ${name}` : name;
+var KIND_NAMES = {
+  state: "state",
+  callback: "function",
+  action: "action",
+  service: "service call",
+  monitor: "monitor",
+  condition: "condition",
+  machine: "state machine",
+  sequence: "sequence",
+  concurrence: "concurrence",
+  iterator: "iterator",
+  plan: "Petri net plan",
+  place: "place",
+  "goal place": "goal",
+  "fail place": "failed plan",
+  transition: "transition",
+  missing: "missing state"
+};
+var isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
+var MANY = 7;
+var READABLE = 40;
+var Model = class {
+  payload;
+  keys;
+  root;
+  byPath = /* @__PURE__ */ new Map();
+  order = [];
+  // parents first
+  /** @param implicit whether to show implicit transitions */
+  constructor(payload, implicit) {
+    this.payload = payload;
+    this.keys = payload.keys;
+    this.root = implicit ? payload.implicit : payload.explicit;
+    this.#index(this.root, null, 0);
+    const counts = /* @__PURE__ */ new Map();
+    for (const { name } of this.order) counts.set(name, (counts.get(name) ?? 0) + 1);
+    for (const node of this.order) node.isRepeated = counts.get(node.name) > 1;
+  }
+  #index(node, parent, depth) {
+    Object.assign(node, { parent, depth, number: this.order.length });
+    node.name = shorten(node.caption || node.label);
+    node.shown = signed(node.change, node.name);
+    this.byPath.set(node.path, node);
+    this.order.push(node);
+    node.total = 1;
+    for (const child of node.children) {
+      this.#index(child, node, depth + 1);
+      node.total += child.total;
+    }
+    node.joins = joinsOf(node);
+    node.links = linksOf(node);
+    const wired = /* @__PURE__ */ new Map();
+    for (const link2 of node.links)
+      for (const outcome of link2.outcomes) wired.set(link2.source, (wired.get(link2.source) ?? /* @__PURE__ */ new Set()).add(outcome));
+    for (const child of node.children) child.wired = child.outcomes.filter((o5) => wired.get(child.label)?.has(o5));
+  }
+  get(path) {
+    return path == null ? void 0 : this.byPath.get(path);
+  }
+  /** The containers around a state, outermost first. */
+  ancestors(path) {
+    const found = [];
+    for (let node = this.get(path)?.parent; node; node = node.parent) found.unshift(node);
+    return found;
+  }
+  /** The arrow of an outcome of a state. */
+  linkOf(node, outcome) {
+    return node.parent?.links.find((link2) => link2.source === node.label && link2.outcomes.includes(outcome));
+  }
+  search(text2) {
+    const words2 = text2.toLowerCase().split(/\s+/).filter(Boolean);
+    if (!words2.length) return [];
+    const found = this.order.filter((node) => words2.every((word) => node.path.toLowerCase().includes(word)));
+    const rank = (node) => node.label.toLowerCase().startsWith(words2[0]) ? 0 : 1;
+    return found.sort((a5, b3) => rank(a5) - rank(b3) || a5.number - b3.number);
+  }
+  /** Paths of the containers down to `depth` levels, or of all; up to there many branches of one stay closed. */
+  toDepth(depth) {
+    const isWanted = (node) => node.children.length > 0 && node.depth < depth && (depth >= ALL_LEVELS || !this.isBranch(node));
+    return new Set(this.order.filter(isWanted).map((node) => node.path));
+  }
+  /** Whether a state is one of many branches, or within one. */
+  isBranch(node) {
+    for (let one = node; one.parent; one = one.parent) if (hasManyBranches(one.parent)) return true;
+    return false;
+  }
+  /** The greatest depth at which a page is readable at a glance. */
+  readableDepth(most = READABLE, from = this.root) {
+    let visible = 0;
+    let depth = 0;
+    let level = [from];
+    while (level.length) {
+      visible += level.length;
+      if (visible > most && depth > 1) break;
+      depth += 1;
+      level = level.flatMap((node) => hasManyBranches(node) ? [] : node.children);
+    }
+    return Math.max(depth - 1, 1);
+  }
+};
+var ALL_LEVELS = 99;
+var hasManyBranches = ({ kind, children }) => kind === "concurrence" && children.length >= MANY;
+function joinsOf(node) {
+  const labels = new Set(node.children.map((child) => child.label));
+  return node.rules.flatMap(({ outcome, conditions, text: text2, change: change2 }) => {
+    const known2 = conditions.filter(([label]) => labels.has(label));
+    if (new Set(known2.map(([label]) => label)).size < 2 || text2.startsWith("any of")) return [];
+    const quorum = /^(\d+) of /.exec(text2);
+    return [{ outcome, text: text2, change: change2, conditions: known2, need: quorum ? Number(quorum[1]) : known2.length }];
+  });
 }
-function nameOf(path) {
-  const node = model.value?.get(path);
-  if (!node) return shorten(path.slice(path.lastIndexOf("/") + 1));
-  return node.isRepeated && node.parent?.parent ? `${node.parent.name} › ${node.name}` : node.name;
+function joinText({ need, conditions }, met) {
+  const all = conditions.length;
+  const what = need < all ? `${need} of ${all}` : all === 2 ? "both" : `all ${all}`;
+  return met > 0 && met < need ? `${what}: ${met} of ${need}` : what;
 }
-var serversSeen = O(() => {
-  if (!actions.value) return null;
-  const { actions: there, gone } = actions.value;
-  return JSON.stringify([there.map((one) => one.name), gone]);
-});
-function hasNoServer(goal) {
-  if (serversSeen.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
-  if (connection.value !== "live" || cursor.value !== null) return false;
-  if (facts.value?.stale != null || facts.value?.recorded) return false;
-  const plain = (name2) => name2.replace(/^\//, "");
-  const name = plain(goal.action);
-  const [there, gone] = JSON.parse(serversSeen.value);
-  if (there.includes(name)) return false;
-  if (gone.includes(name)) return true;
-  const answered = (one) => plain(one.action) === name && (one.feedback != null || one.result != null);
-  return !Object.values(run.now.goals).some(answered);
+function linksOf(node) {
+  const found = node.edges.map((edge) => ({ ...edge, rule: null, join: null }));
+  const keyOf3 = (...parts) => parts.join("\n");
+  const known2 = new Set(found.flatMap((edge) => edge.outcomes.map((o5) => keyOf3(edge.source, o5, edge.target, null))));
+  for (const rule of node.rules) {
+    const number = node.joins.findIndex((one) => one.outcome === rule.outcome && one.text === rule.text);
+    const join2 = number < 0 ? null : number;
+    for (const [source, outcome] of rule.conditions) {
+      const key = keyOf3(source, outcome, rule.outcome, join2);
+      if (known2.has(key) || !node.children.some((child) => child.label === source)) continue;
+      known2.add(key);
+      const same2 = found.find(
+        (edge) => edge.rule && edge.source === source && edge.target === rule.outcome && edge.change === rule.change && edge.join === join2
+      );
+      if (same2) same2.outcomes = [...same2.outcomes, outcome];
+      else
+        found.push({
+          source,
+          target: rule.outcome,
+          to_outcome: true,
+          outcomes: [outcome],
+          implicit: false,
+          back: false,
+          rule: rule.text || rule.outcome,
+          join: join2,
+          change: rule.change,
+          note: ""
+        });
+    }
+  }
+  return found;
 }
+
+// src/core/store/view.ts
 var AROUND = 60;
-var autoDepth = 0;
-function setModel(payload) {
-  const next = new Model(payload, implicit.value);
-  model.value = next;
-  if (payload !== comparison.value?.model) comparison.value = null;
-  const known2 = saved(`open.${next.root.label}`, []).filter(
-    (path) => next.get(path)?.children.length
-  );
-  autoDepth = known2.length ? 0 : next.readableDepth();
-  opened2.value = autoDepth ? next.toDepth(autoDepth) : new Set(known2);
-}
-function setImplicit(on2) {
-  implicit.value = on2;
-  save("implicit", on2);
-  if (model.value) model.value = new Model(model.value.payload, on2);
-}
-function openOneLevelLess() {
-  if (autoDepth < 2 || !model.value) return false;
-  autoDepth -= 1;
-  opened2.value = model.value.toDepth(autoDepth);
-  return true;
-}
-function keepOpened(paths) {
-  opened2.value = paths;
-  autoDepth = 0;
-}
-function setOpened(paths) {
-  keepOpened(paths);
-  if (model.value) save(`open.${model.value.root.label}`, [...paths]);
-}
-function openAround(node) {
-  const top = node.children.length ? node : node.parent;
-  if (!model.value || !top) return;
-  const below = top.depth + model.value.readableDepth(AROUND, top);
-  const inside = model.value.order.filter(
-    (one) => one.children.length && one.depth < below && (one === top || one.path.startsWith(`${top.path}/`))
-  );
-  follow.value = false;
-  setOpened(new Set([...model.value.ancestors(top.path), ...inside].map((one) => one.path)));
-}
-function toggle(path) {
-  const next = new Set(opened2.value);
-  if (!next.delete(path)) next.add(path);
-  follow.value = false;
-  setOpened(next);
-}
-function reveal(path) {
-  const closed = model.value?.ancestors(path).filter((node) => !opened2.value.has(node.path)) ?? [];
-  if (closed.length) setOpened(/* @__PURE__ */ new Set([...opened2.value, ...closed.map((node) => node.path)]));
-  return closed.length > 0;
-}
-var noticeTimer;
-function notify(text2, kind = "info") {
-  notice.value = { text: text2, kind };
-  clearTimeout(noticeTimer);
-  noticeTimer = setTimeout(
-    () => {
-      notice.value = null;
+var NOTICE_MS = { info: 3e3, error: 8e3 };
+var View = class {
+  pageShown = y3("machine");
+  // the page on view
+  selected = y3(null);
+  // path of a state
+  query = y3("");
+  // of the search
+  follow = y3(false);
+  implicit = y3(saved("implicit", false));
+  numbers = y3("none");
+  // a key of statistics.MODES
+  theme = y3(saved("theme", "system"));
+  opened = y3(/* @__PURE__ */ new Set());
+  // paths of containers
+  help = y3(false);
+  paletteOpen = y3(false);
+  shortcuts = y3(saved("shortcuts", true));
+  // whether single keys do something
+  sound = y3(saved("sound", true));
+  // whether a new question makes a sound
+  operator = y3(saved("operator", ""));
+  // the name under which answers are given
+  tokenAsked = y3(false);
+  // whether the viewer refused this page's token
+  treeOpen = y3(false);
+  // on small screens, where the tree covers the page
+  overview = y3(false);
+  // whether states are tiles without arrows, because many are open
+  laidOut = y3(null);
+  // progress of a long layout [states]
+  dismissed = y3(null);
+  // the previous run whose notice was closed
+  simulateOpen = y3(false);
+  // the dialog of simulated runs
+  pins = y3(new Set(saved("pins", [])));
+  // ids of runs
+  chosenAction = y3(null);
+  logFilter = y3("all");
+  laneFilter = y3("");
+  // names of lanes that the timeline shows
+  isPhone = y3(false);
+  // whether there is room for only one part of the page
+  part = y3("machine");
+  // the part that a phone shows: machine, map, time or log
+  notice = y3(null);
+  #data;
+  #autoDepth = 0;
+  // levels opened automatically; 0: the user has chosen
+  #noticeTimer;
+  constructor(data) {
+    this.#data = data;
+  }
+  notify(text2, kind = "info") {
+    this.notice.value = { text: text2, kind };
+    clearTimeout(this.#noticeTimer);
+    this.#noticeTimer = setTimeout(() => {
+      this.notice.value = null;
+    }, NOTICE_MS[kind]);
+  }
+  /** @param id of a run */
+  togglePin(id) {
+    const next = new Set(this.pins.value);
+    if (!next.delete(id)) next.add(id);
+    this.pins.value = next;
+    save("pins", [...next]);
+  }
+  // -- the machine and its open containers ------------------------------------------------------
+  setModel(payload) {
+    const next = new Model(payload, this.implicit.value);
+    this.#data.model.value = next;
+    if (payload !== this.#data.comparison.value?.model) this.#data.comparison.value = null;
+    const known2 = saved(`open.${next.root.label}`, []).filter(
+      (path) => next.get(path)?.children.length
+    );
+    this.#autoDepth = known2.length ? 0 : next.readableDepth();
+    this.opened.value = this.#autoDepth ? next.toDepth(this.#autoDepth) : new Set(known2);
+  }
+  setImplicit(on2) {
+    this.implicit.value = on2;
+    save("implicit", on2);
+    const model = this.#data.model.value;
+    if (model) this.#data.model.value = new Model(model.payload, on2);
+  }
+  /** Open one level less, unless the user has chosen; returns false if that is impossible. */
+  openOneLevelLess() {
+    const model = this.#data.model.value;
+    if (this.#autoDepth < 2 || !model) return false;
+    this.#autoDepth -= 1;
+    this.opened.value = model.toDepth(this.#autoDepth);
+    return true;
+  }
+  keepOpened(paths) {
+    this.opened.value = paths;
+    this.#autoDepth = 0;
+  }
+  setOpened(paths) {
+    this.keepOpened(paths);
+    const model = this.#data.model.value;
+    if (model) save(`open.${model.root.label}`, [...paths]);
+  }
+  /** Open only a state's container, with as many levels inside as are readable. */
+  openAround(node) {
+    const model = this.#data.model.value;
+    const top = node.children.length ? node : node.parent;
+    if (!model || !top) return;
+    const below = top.depth + model.readableDepth(AROUND, top);
+    const inside = model.order.filter(
+      (one) => one.children.length && one.depth < below && (one === top || one.path.startsWith(`${top.path}/`))
+    );
+    this.follow.value = false;
+    this.setOpened(new Set([...model.ancestors(top.path), ...inside].map((one) => one.path)));
+  }
+  toggle(path) {
+    const next = new Set(this.opened.value);
+    if (!next.delete(path)) next.add(path);
+    this.follow.value = false;
+    this.setOpened(next);
+  }
+  /** Open the containers around a state; returns false if all are open. */
+  reveal(path) {
+    const around2 = this.#data.model.value?.ancestors(path) ?? [];
+    const closed = around2.filter((node) => !this.opened.value.has(node.path));
+    if (closed.length) this.setOpened(/* @__PURE__ */ new Set([...this.opened.value, ...closed.map((node) => node.path)]));
+    return closed.length > 0;
+  }
+};
+
+// src/core/store.ts
+function createStore() {
+  const data = new Data();
+  const view2 = new View(data);
+  const playback = new Playback(data, view2);
+  const status = new Status(data, playback);
+  const pointer = new Pointer(data, playback);
+  const clock = new Clock(data, playback);
+  const panels2 = new Panels(data, playback, view2);
+  const notes = new Notes(data, playback);
+  return {
+    ...{ data, view: view2, playback, status, pointer, clock, panels: panels2, notes },
+    startRun(base, events) {
+      r3(() => {
+        data.startRun(base, events);
+        playback.restart();
+        pointer.hovered.value = null;
+      });
     },
-    kind === "error" ? 8e3 : 3e3
-  );
+    /** Add new events to the run. */
+    addEvents(events) {
+      playback.forget(data.addEvents(events));
+    }
+  };
 }
+var store = createStore();
 
 // src/core/pages.ts
 var PAGES = ["runs", "fleet", "actions"];
@@ -3413,7 +3536,7 @@ function addressOf(address, name, machine) {
 }
 function showPage(name, { machine, replace = false } = {}) {
   const address = addressOf(location.href, name, machine);
-  pageShown.value = name;
+  store.view.pageShown.value = name;
   if (address === location.href) return;
   if (replace) history.replaceState(null, "", address);
   else history.pushState(null, "", address);
@@ -3461,21 +3584,21 @@ async function connect(handlers) {
   ({ onEvents, onMachine, onObserved } = handlers);
   readToken();
   if (isFile()) {
-    const run2 = JSON.parse(await unpack("run-data"));
-    connection.value = "file";
-    await takeSnapshot(run2.snap, run2.model);
-    onObserved(run2.observed ?? []);
-    statistics.value = run2.statistics ?? null;
-    whyOfFile = run2.why ?? null;
+    const run = JSON.parse(await unpack("run-data"));
+    store.data.connection.value = "file";
+    await takeSnapshot(run.snap, run.model);
+    onObserved(run.observed ?? []);
+    store.data.statistics.value = run.statistics ?? null;
+    whyOfFile = run.why ?? null;
     return;
   }
   await logIn();
-  wanted.value = new URLSearchParams(location.search).get("machine") ?? "";
+  store.data.wanted.value = new URLSearchParams(location.search).get("machine") ?? "";
   showPage(pageOf(location.search), { replace: true });
   addEventListener("popstate", () => {
-    const machine = new URLSearchParams(location.search).get("machine") ?? wanted.value;
-    pageShown.value = pageOf(location.search);
-    if (machine !== wanted.value) follow2(machine);
+    const machine = new URLSearchParams(location.search).get("machine") ?? store.data.wanted.value;
+    store.view.pageShown.value = pageOf(location.search);
+    if (machine !== store.data.wanted.value) follow(machine);
   });
   openHub();
   tellHub();
@@ -3499,15 +3622,15 @@ async function logIn() {
   const known2 = token ?? view;
   if (known2) await ask("/api/login", { method: "POST", body: JSON.stringify({ token: known2 }) });
 }
-var hasToken = () => token !== null && settings.value.control;
+var hasToken = () => token !== null && store.data.settings.value.control;
 function choose(name) {
   showPage("machine", { machine: name });
-  if (name !== wanted.value || facts.value?.name !== name) follow2(name);
+  if (name !== store.data.wanted.value || store.data.facts.value?.name !== name) follow(name);
 }
-function follow2(name) {
-  wanted.value = name;
-  facts.value = null;
-  statistics.value = null;
+function follow(name) {
+  store.data.wanted.value = name;
+  store.data.facts.value = null;
+  store.data.statistics.value = null;
   epoch = "";
   newest = 0;
   seen = -1;
@@ -3515,7 +3638,7 @@ function follow2(name) {
   tellHub();
 }
 var encoded2 = (text2) => encodeURIComponent(text2.replace(/\p{Surrogate}/gu, "�"));
-var link = (what, more = "", machine = facts.value?.name ?? "") => `/api/${what}?machine=${encoded2(machine)}${more}`;
+var link = (what, more = "", machine = store.data.facts.value?.name ?? "") => `/api/${what}?machine=${encoded2(machine)}${more}`;
 var HERE_MS = 2e4;
 function openHub() {
   if (typeof SharedWorker === "undefined") {
@@ -3532,27 +3655,27 @@ function openHub() {
 function tellHub() {
   streamBegan = performance.now();
   const last = epoch ? `${epoch}:${newest}` : "";
-  hub?.postMessage({ kind: "follow", machine: wanted.value, last, seen, hidden: document.hidden });
+  hub?.postMessage({ kind: "follow", machine: store.data.wanted.value, last, seen, hidden: document.hidden });
 }
 var TAKERS = {
-  settings(settings2) {
+  settings(settings) {
     streamBegan = performance.now();
     const asked2 = new URLSearchParams(location.search);
-    if (settings2.home && !settings.value.home && !asked2.has("machine") && pageOf(location.search) === "machine")
+    if (settings.home && !store.data.settings.value.home && !asked2.has("machine") && pageOf(location.search) === "machine")
       showPage("runs", { replace: true });
-    settings.value = settings2;
+    store.data.settings.value = settings;
   },
-  beat: (t4) => viewerLag.measure(t4),
+  beat: (t4) => store.data.viewerLag.measure(t4),
   machines(list) {
-    machines.value = list.sort((a5, b3) => a5.name < b3.name ? -1 : 1);
+    store.data.machines.value = list.sort((a5, b3) => a5.name < b3.name ? -1 : 1);
   },
   actions(found) {
-    actions.value = found;
+    store.data.actions.value = found;
   },
   facts: takeFacts,
   snap: takeStreamed,
   gap({ missed }) {
-    if (isNew) gap.value = missed;
+    if (isNew) store.data.gap.value = missed;
   },
   observed({ records }) {
     const unknown = records.filter(({ n: n3 }) => (n3 ?? 0) > seen);
@@ -3563,10 +3686,10 @@ var TAKERS = {
 };
 function takeMessage(message) {
   if ("standing" in message) {
-    const { state, problem: problem2, wantsToken } = message.standing;
-    connection.value = state;
-    problem.value = problem2;
-    if (wantsToken) tokenAsked.value = true;
+    const { state, problem, wantsToken } = message.standing;
+    store.data.connection.value = state;
+    store.data.problem.value = problem;
+    if (wantsToken) store.view.tokenAsked.value = true;
   } else TAKERS[message.event]?.(JSON.parse(message.text));
 }
 function takeNew({ seq, events }) {
@@ -3574,7 +3697,7 @@ function takeNew({ seq, events }) {
   newest = Math.max(newest, seq);
   if (!unknown.length) return;
   if (performance.now() - streamBegan > CAUGHT_UP_MS)
-    robotLag.measure(unknown[unknown.length - 1].stamp_ns / 1e6);
+    store.data.robotLag.measure(unknown[unknown.length - 1].stamp_ns / 1e6);
   onEvents(unknown);
 }
 function takeStreamed(snapshot) {
@@ -3592,47 +3715,46 @@ function takeStreamed(snapshot) {
   takeSnapshot(snapshot);
 }
 var reconnect = () => hub?.postMessage({ kind: "reconnect" });
-async function takeFacts(facts2) {
-  const before = facts.value;
-  facts.value = facts2;
-  if (before && before.revision !== facts2.revision && before.epoch === facts2.epoch) await load(facts2);
+async function takeFacts(facts) {
+  const before = store.data.facts.value;
+  store.data.facts.value = facts;
+  if (before && before.revision !== facts.revision && before.epoch === facts.epoch) await load(facts);
 }
 async function takeSnapshot(snapshot, payload) {
-  wanted.value ||= snapshot.name;
-  const known2 = facts.value;
+  store.data.wanted.value ||= snapshot.name;
+  const known2 = store.data.facts.value;
   const same2 = known2?.name === snapshot.name && known2.epoch === snapshot.epoch;
   if (!same2) {
-    robotLag.forget();
-    why.value = null;
+    store.data.robotLag.forget();
+    store.data.why.value = null;
   }
   r3(() => {
-    facts.value = snapshot;
-    problems.value = snapshot.problems;
-    startRun(snapshot.base, snapshot.events);
-    tick.value += 1;
-    slowTick.value += 1;
+    store.data.facts.value = snapshot;
+    store.data.problems.value = snapshot.problems;
+    store.startRun(snapshot.base, snapshot.events);
+    store.playback.renew();
   });
   if (payload) {
-    setModel(payload);
+    store.view.setModel(payload);
     onMachine();
-  } else if (same2 && model.value && known2.revision === snapshot.revision) onEvents([]);
+  } else if (same2 && store.data.model.value && known2.revision === snapshot.revision) onEvents([]);
   else await load(snapshot);
 }
-async function load(facts2) {
+async function load(facts) {
   loads += 1;
   const mine = loads;
   let payload = null;
   for (let pause = RETRY_MS2; !payload; pause = Math.min(2 * pause, LONGEST_RETRY_MS)) {
-    payload = await fetchModel(facts2.name);
+    payload = await fetchModel(facts.name);
     if (!payload) await new Promise((done) => setTimeout(done, pause));
     if (mine !== loads) return;
   }
-  setModel(payload);
+  store.view.setModel(payload);
   onMachine();
-  const statistics2 = await ask(link("statistics"));
+  const statistics = await ask(link("statistics"));
   if (mine !== loads) return;
-  if (isFailure(statistics2)) notify(`Recorded runs: ${statistics2.text}`, "error");
-  statistics.value = isFailure(statistics2) ? null : statistics2;
+  if (isFailure(statistics)) store.view.notify(`Recorded runs: ${statistics.text}`, "error");
+  store.data.statistics.value = isFailure(statistics) ? null : statistics;
 }
 async function fetchModel(name) {
   try {
@@ -3649,17 +3771,17 @@ async function ask(address, options = {}) {
     answer = await fetch(address, options);
     text2 = await answer.text();
   } catch (error) {
-    return failure2(`The viewer's server does not answer (${messageOf(error)}).`);
+    return failure(`The viewer's server does not answer (${messageOf(error)}).`);
   }
   try {
     return JSON.parse(text2);
   } catch {
     const status = `${answer.status} ${answer.statusText}`.trim();
     const reason = [status, text2.trim().slice(0, 300)].filter(Boolean).join(": ");
-    return failure2(`The viewer's server answered ${reason}`);
+    return failure(`The viewer's server answered ${reason}`);
   }
 }
-var failure2 = (text2) => ({ ok: false, text: text2, wants_token: false, problems: [] });
+var failure = (text2) => ({ ok: false, text: text2, wants_token: false, problems: [] });
 var isFailure = (answer) => typeof answer === "object" && answer !== null && "ok" in answer && answer.ok === false;
 var messageOf = (error) => error instanceof Error ? error.message : String(error);
 async function post(address, data) {
@@ -3673,8 +3795,8 @@ async function post(address, data) {
   });
   clearTimeout(timer);
   if (limit.signal.aborted)
-    return failure2(`no answer in ${ANSWER_MS / 1e3} s; it may still be carried out: look at the machine.`);
-  if (isFailure(answer) && answer.wants_token) tokenAsked.value = true;
+    return failure(`no answer in ${ANSWER_MS / 1e3} s; it may still be carried out: look at the machine.`);
+  if (isFailure(answer) && answer.wants_token) store.view.tokenAsked.value = true;
   return answer;
 }
 function takeToken(text2) {
@@ -3685,19 +3807,19 @@ function takeToken(text2) {
     sessionStorage.setItem("smachpy.token", found);
   } catch {
   }
-  tokenAsked.value = false;
+  store.view.tokenAsked.value = false;
   logIn().then(reconnect);
-  notify("Try again now");
+  store.view.notify("Try again now");
   return true;
 }
 var askAction = (data) => post("/api/action", data);
-async function showWhy(open = why.value === null) {
-  const shown2 = facts.value?.epoch;
+async function showWhy(open = store.data.why.value === null) {
+  const shown = store.data.facts.value?.epoch;
   const answer = open ? whyOfFile ?? await ask(link("why")) : null;
-  if (isFailure(answer)) notify(`Why: ${answer.text}`, "error");
-  else if (shown2 === facts.value?.epoch) {
-    why.value = answer;
-    if (answer) part.value = "log";
+  if (isFailure(answer)) store.view.notify(`Why: ${answer.text}`, "error");
+  else if (shown === store.data.facts.value?.epoch) {
+    store.data.why.value = answer;
+    if (answer) store.view.part.value = "log";
   }
 }
 var REFRESH_MS = 2e3;
@@ -3711,9 +3833,9 @@ function refreshRuns() {
       refreshed = performance.now();
       refreshDue = 0;
       r3(() => {
-        runsProblem.value = isFailure(answer) ? answer.text : "";
-        if (!isFailure(answer)) runs.value = answer;
-        runsKnown.value = true;
+        store.data.runsProblem.value = isFailure(answer) ? answer.text : "";
+        if (!isFailure(answer)) store.data.runs.value = answer;
+        store.data.runsKnown.value = true;
       });
     },
     Math.max(0, refreshed + REFRESH_MS - performance.now())
@@ -3730,18 +3852,18 @@ async function askSimulation(data) {
 }
 async function refreshSimulations() {
   const answer = await ask("/api/simulations");
-  if (!isFailure(answer)) simulations.value = answer;
+  if (!isFailure(answer)) store.data.simulations.value = answer;
 }
 async function commandMission({ journal, id }, what) {
   const answer = await post("/api/mission", { journal, id, command: what });
-  if (answer.ok) notify(`${id}: ${answer.text}`);
-  else if (!answer.wants_token) notify(answer.text, "error");
+  if (answer.ok) store.view.notify(`${id}: ${answer.text}`);
+  else if (!answer.wants_token) store.view.notify(answer.text, "error");
   refreshRuns();
 }
 async function openRun(id) {
   const answer = await ask(`/api/open?run=${encoded2(id)}`);
   if (!answer.ok) {
-    notify(`Run: ${answer.text}`, "error");
+    store.view.notify(`Run: ${answer.text}`, "error");
     return;
   }
   choose(answer.name);
@@ -3750,6 +3872,7 @@ async function openRun(id) {
 // src/core/purposes.ts
 var NAMES = ["name", "station", "place", "waypoint", "location", "target", "object", "item", "text"];
 function purposeOf(id, { goal }) {
+  const { scene } = store.data;
   const driven = scene.goalWithId(id);
   if (driven) return scene.placeName(driven) || `(${driven.x.toFixed(1)}, ${driven.y.toFixed(1)})`;
   const fields2 = fieldsOf(goal) ?? {};
@@ -3770,19 +3893,19 @@ function purposeOfVisit(span) {
   return found;
 }
 function attemptText(path, attempt) {
-  const retry = model.value?.get(path)?.details.find(([name]) => name === "retry")?.[1] ?? "";
+  const retry = store.data.model.value?.get(path)?.details.find(([name]) => name === "retry")?.[1] ?? "";
   const most = /^(\d+) attempts/.exec(retry)?.[1];
   return `attempt ${attempt}${most ? ` of ${most}` : ""}`;
 }
 function wordsOf(name, span, now) {
   const took = duration(Math.max(0, Math.min(span.to ?? now, now) - span.from) / 1e3);
   const purpose = purposeOfVisit(span);
-  const runs3 = span.to === null || span.to > now;
-  const facts2 = [
+  const runs2 = span.to === null || span.to > now;
+  const facts = [
     (span.attempt ?? 1) > 1 && attemptText(span.path, span.attempt ?? 1),
-    runs3 && span.serviced !== null && span.serviced <= now && "cleaning up"
+    runs2 && span.serviced !== null && span.serviced <= now && "cleaning up"
   ].filter(Boolean);
-  const more = facts2.map((fact) => `, ${fact}`).join("");
+  const more = facts.map((fact) => `, ${fact}`).join("");
   const to = purpose && `→ ${purpose}`;
   const all = [
     `${name}${to && ` ${to}`}${more} ${took}`,
@@ -3794,14 +3917,14 @@ function wordsOf(name, span, now) {
   return [...new Set(all.filter(Boolean))];
 }
 function insideText(path) {
-  const leaf = activeLeaves.value.find((one) => one.startsWith(`${path}/`));
+  const leaf = store.status.activeLeaves.value.find((one) => one.startsWith(`${path}/`));
   if (leaf) return `${leaf.slice(leaf.lastIndexOf("/") + 1)} ${purposeOfState(leaf)}`.trim();
-  const state = own(shown().states, path);
+  const state = own(store.playback.shown().states, path);
   if (!state?.visits) return "not begun";
   return state.since != null ? purposeOfState(path) : state.error ?? state.outcome ?? "";
 }
 function purposeOfState(path) {
-  const span = run.open.get(path);
+  const span = store.data.run.open.get(path);
   const purpose = span ? purposeOfVisit(span) : "";
   return purpose && `→ ${purpose}`;
 }
@@ -3809,19 +3932,19 @@ function purposeOfState(path) {
 // src/core/commands.ts
 var MOST_NAMED = 4;
 function control() {
-  const facts2 = facts.value;
-  return hasToken() && !facts2?.recorded ? facts2?.control ?? null : null;
+  const facts = store.data.facts.value;
+  return hasToken() && !facts?.recorded ? facts?.control ?? null : null;
 }
 function canAnswer() {
-  const facts2 = facts.value;
-  return hasToken() && connection.value === "live" && facts2?.stale == null && !facts2?.recorded;
+  const facts = store.data.facts.value;
+  return hasToken() && store.data.connection.value === "live" && facts?.stale == null && !facts?.recorded;
 }
 var sent = y3(null);
 var FAILED_MS = 8e3;
 var keyOf = (name, path) => `${name} ${path ?? ""}`;
-async function command(name, more = {}, machine = facts.value?.name ?? "") {
-  if (whyDisarmed.value) {
-    notify(whyDisarmed.value, "error");
+async function command(name, more = {}, machine = store.data.facts.value?.name ?? "") {
+  if (store.status.whyDisarmed.value) {
+    store.view.notify(store.status.whyDisarmed.value, "error");
     return false;
   }
   const mine = { key: keyOf(name, more.path), failure: null };
@@ -3829,15 +3952,15 @@ async function command(name, more = {}, machine = facts.value?.name ?? "") {
   const result = await post(link("control", "", machine), { command: name, ...more });
   const isNewest = sent.value === mine;
   if (result.ok) {
-    if (name !== "answer") notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
+    if (name !== "answer") store.view.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
     if (isNewest) sent.value = null;
   } else if (result.wants_token) {
     if (isNewest) sent.value = null;
   } else {
-    const failure3 = `${name}: ${result.text ?? "refused"}`;
-    notify(failure3, "error");
+    const failure2 = `${name}: ${result.text ?? "refused"}`;
+    store.view.notify(failure2, "error");
     if (isNewest) {
-      const failed = { ...mine, failure: failure3 };
+      const failed = { ...mine, failure: failure2 };
       sent.value = failed;
       setTimeout(() => {
         if (sent.value === failed) sent.value = null;
@@ -3848,14 +3971,19 @@ async function command(name, more = {}, machine = facts.value?.name ?? "") {
 }
 var confirmation = y3(null);
 var situationOf = (...more) => JSON.stringify([
-  ...[facts.value?.name, facts.value?.epoch, run.now.started, run.now.ended],
-  ...[pageShown.value, whyDisarmed.value, ...more]
+  ...[
+    store.data.facts.value?.name,
+    store.data.facts.value?.epoch,
+    store.data.run.now.started,
+    store.data.run.now.ended
+  ],
+  ...[store.view.pageShown.value, store.status.whyDisarmed.value, ...more]
 ]);
 function situationAt(path, within3) {
-  const visits = run.now.states;
+  const visits = store.data.run.now.states;
   const running = Object.keys(visits).filter((one) => visits[one].since != null && `${one}/`.startsWith(`${within3}/`));
   return situationOf(
-    selected.value === path,
+    store.view.selected.value === path,
     running.map((one) => [one, visits[one].since])
   );
 }
@@ -3866,23 +3994,23 @@ function confirmationNow() {
   const asked2 = confirmation.value;
   if (!asked2 || asked2.situation() === asked2.was) return asked2;
   confirmation.value = null;
-  notify(`“${asked2.title}” was closed: what it was about has changed`, "error");
+  store.view.notify(`“${asked2.title}” was closed: what it was about has changed`, "error");
   return null;
 }
 function targetText() {
-  const name = facts.value?.label ?? "";
-  const robots = robotNames();
+  const name = store.data.facts.value?.label ?? "";
+  const robots = store.data.robotNames();
   if (!robots.length) return name;
   return robots.length === 1 ? `${name} on ${robots[0]}` : `${name} on ${robots.length} robots`;
 }
 function endsText(within3) {
   const inside = (path) => `${path}/`.startsWith(`${within3}/`);
-  const { states: states2, goals } = run.now;
-  const now = liveMs();
-  const leaves = runningLeaves().filter(inside);
+  const { states: states2, goals } = store.data.run.now;
+  const now = store.data.liveMs();
+  const leaves = store.data.runningLeaves().filter(inside);
   const running = leaves.slice(0, MOST_NAMED).map((path) => {
     const since = own(states2, path)?.since;
-    return `${nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1e3)})`}`;
+    return `${store.data.nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1e3)})`}`;
   });
   const sentGoals = Object.entries(goals).filter(([, goal]) => goal.ended == null && inside(goal.path));
   const targets = sentGoals.slice(0, MOST_NAMED).map(([id, goal]) => goalText(id, goal));
@@ -3904,8 +4032,8 @@ var MODES = [
 ];
 var OF_RECORDED_RUNS = ["runs", "failures", "compare"];
 var total = (outcomes) => Object.values(outcomes ?? {}).reduce((a5, b3) => a5 + b3, 0);
-function numbersFor(mode, run2, statistics2, model2) {
-  const recorded = statistics2?.states ?? {};
+function numbersFor(mode, run, statistics, model) {
+  const recorded = statistics?.states ?? {};
   const counts = (states2) => (path, outcome) => {
     const outcomes = own(states2, path)?.outcomes;
     const count = own(outcomes, outcome);
@@ -3913,29 +4041,29 @@ function numbersFor(mode, run2, statistics2, model2) {
   };
   switch (mode) {
     case "counts":
-      return { countOf: counts(run2), heatOf: null };
+      return { countOf: counts(run), heatOf: null };
     case "time": {
-      const most = mostSeconds(run2, model2);
-      return { countOf: counts(run2), heatOf: (path) => Math.min(1, (own(run2, path)?.seconds ?? 0) / most) };
+      const most = mostSeconds(run, model);
+      return { countOf: counts(run), heatOf: (path) => Math.min(1, (own(run, path)?.seconds ?? 0) / most) };
     }
     case "runs":
       return { countOf: counts(recorded), heatOf: null };
     case "failures":
       return { countOf: counts(recorded), heatOf: (path) => own(recorded, path)?.failures ?? 0 };
     case "compare":
-      return { countOf: counts(run2), heatOf: (path) => slower(own(run2, path), own(recorded, path)) };
+      return { countOf: counts(run), heatOf: (path) => slower(own(run, path), own(recorded, path)) };
     default:
       return { countOf: null, heatOf: null };
   }
 }
-function mostSeconds(run2, model2) {
-  const leaves = Object.entries(run2).filter(([path]) => !model2?.get(path)?.children.length);
+function mostSeconds(run, model) {
+  const leaves = Object.entries(run).filter(([path]) => !model?.get(path)?.children.length);
   return Math.max(1e-3, ...leaves.map(([, state]) => state.seconds));
 }
-function heatScale(mode, run2, model2) {
+function heatScale(mode, run, model) {
   switch (mode) {
     case "time":
-      return ["0 s", duration(mostSeconds(run2, model2))];
+      return ["0 s", duration(mostSeconds(run, model))];
     case "failures":
       return ["none failed", "all failed"];
     case "compare":
@@ -3949,15 +4077,15 @@ function slower(state, recorded) {
   const ended = total(state.outcomes);
   return ended ? Math.min(1, Math.max(0, state.seconds / ended / recorded.median - 1)) : 0;
 }
-function coverage(model2, run2) {
+function coverage(model, run) {
   let taken = 0;
   let all = 0;
-  for (const node of model2?.order ?? [])
+  for (const node of model?.order ?? [])
     for (const edge of node.edges) {
       if (edge.implicit) continue;
       for (const outcome of edge.outcomes) {
         all += 1;
-        if (own(own(run2, `${node.path}/${edge.source}`)?.outcomes, outcome)) taken += 1;
+        if (own(own(run, `${node.path}/${edge.source}`)?.outcomes, outcome)) taken += 1;
       }
     }
   return { taken, all };
@@ -4094,12 +4222,12 @@ var Diagram = class {
     this.world = el("g", { class: "world" });
     svg2.replaceChildren(arrowHeads(), this.world);
   }
-  draw(layout, model2, problems2) {
+  draw(layout, model, problems) {
     const { states: states2, arrows, joins, boxes, cards: cards2, pills, minimapRects, minimapDue } = this;
     for (const map of [states2, arrows, joins, boxes, cards2, pills, minimapRects, minimapDue]) map.clear();
-    this.model = model2;
-    this.problems = groupByPath(problems2);
-    const isCompared = model2.order.some((n3) => n3.change || n3.note || n3.edges.some((e4) => e4.change || e4.note));
+    this.model = model;
+    this.problems = groupByPath(problems);
+    const isCompared = model.order.some((n3) => n3.change || n3.note || n3.edges.some((e4) => e4.change || e4.note));
     this.svg.classList.toggle("compared", isCompared);
     this.size = { x: 0, y: 0, w: layout.w + 16, h: layout.h + 16 };
     const picture = document.createDocumentFragment();
@@ -4262,10 +4390,10 @@ var Diagram = class {
   #edge(edge, x3, y5) {
     const points2 = edge.points.map((p5) => ({ x: p5.x + x3, y: p5.y + y5 }));
     const kind = edge.kind === "link" ? commonClass(this.model?.get(edge.source), edge.outcomes) : edge.kind;
-    const implicit2 = edge.link?.implicit ? " implicit" : "";
+    const implicit = edge.link?.implicit ? " implicit" : "";
     const change2 = edge.link?.change ? ` cmp-${edge.link.change}` : "";
     const line = el("path", {
-      class: `edge ${kind}${implicit2}${change2}`,
+      class: `edge ${kind}${implicit}${change2}`,
       d: roundedLine(points2),
       "marker-end": `url(#arrow-${edge.kind === "link" ? kind : "plain"})`
     });
@@ -4380,10 +4508,10 @@ var Diagram = class {
     classes.toggle("faded", !active && state?.left != null && now - state.left / 1e6 > FADE_MS);
     write(view2.glyph, glyphOf(state, kind));
     write(view2.badge, active ? elapsed(state, now) : view2.node.note || "");
-    const part2 = active ? goal?.progress?.fraction ?? 0 : 0;
-    if (view2.bar && view2.part !== part2) {
-      view2.part = part2;
-      view2.bar.style.transform = `scaleX(${part2})`;
+    const part = active ? goal?.progress?.fraction ?? 0 : 0;
+    if (view2.bar && view2.part !== part) {
+      view2.part = part;
+      view2.bar.style.transform = `scaleX(${part})`;
     }
     const label = [path, statusOf(state, goal, noServer), view2.node.change].filter(Boolean).join(", ");
     if (view2.label !== label) {
@@ -4424,8 +4552,8 @@ var Diagram = class {
       view2.group.classList.toggle("fired", isFired);
       write(view2.badge, held ?? (tokens > 3 ? `●${tokens}` : "●".repeat(tokens)));
       const lacks = isTransition && held === void 0 ? lackOf(plan, child, tokensOf) : "";
-      const facts2 = [held, lacks, tokens ? `${tokens} token${tokens > 1 ? "s" : ""}` : "", isFired ? "fired" : ""];
-      const label = [child.name, KIND_NAMES[child.kind], ...facts2].filter(Boolean).join(", ");
+      const facts = [held, lacks, tokens ? `${tokens} token${tokens > 1 ? "s" : ""}` : "", isFired ? "fired" : ""];
+      const label = [child.name, KIND_NAMES[child.kind], ...facts].filter(Boolean).join(", ");
       if (view2.label === label) continue;
       view2.label = label;
       view2.group.setAttribute("aria-label", label);
@@ -4510,15 +4638,15 @@ function fitting(text2, width) {
 }
 function outcomePill(node, pill, x3, y5) {
   const byDefault = node.pills.find((one) => one.outcome === pill.outcome)?.by_default ? " default" : "";
-  const shown2 = pill.from ? `${shorten(pill.outcome)}, from ${pill.from}` : shorten(pill.outcome);
+  const shown = pill.from ? `${shorten(pill.outcome)}, from ${pill.from}` : shorten(pill.outcome);
   const place = { x: x3 + pill.x, y: y5 + pill.y, width: pill.w, height: pill.h, rx: pill.h / 2 };
   const centre = { x: place.x + pill.w / 2, y: place.y + pill.h / 2 + 3.1, "text-anchor": "middle" };
   return el(
     "g",
     { class: `pill ${outcomeClass(pill.outcome)}${byDefault}` },
     el("rect", place),
-    el("text", centre, shown2),
-    ...shown2 === pill.outcome ? [] : [el("title", {}, shorten(pill.outcome, 400))]
+    el("text", centre, shown),
+    ...shown === pill.outcome ? [] : [el("title", {}, shorten(pill.outcome, 400))]
   );
 }
 function tokensIn(plan, state) {
@@ -4533,9 +4661,9 @@ function lackOf(plan, transition, tokensOf) {
   const places = empty.filter(isPartOfNet).map((child) => child.name);
   return places.length ? `lacks tokens in ${places.join(", ")}` : "";
 }
-function groupByPath(problems2) {
+function groupByPath(problems) {
   const found = /* @__PURE__ */ new Map();
-  for (const one of problems2) found.set(one.path, [...found.get(one.path) ?? [], one]);
+  for (const one of problems) found.set(one.path, [...found.get(one.path) ?? [], one]);
   return found;
 }
 function glyphOf(state, kind) {
@@ -4550,10 +4678,10 @@ function statusOf(state, goal, noServer) {
   if (state.preempt) return `asked to stop${state.serviced ? ", cleaning up" : ""}`;
   return noServer && goal ? `no server of ${goal.action} seen` : "running";
 }
-function write(shown2, text2) {
-  if (shown2.text === text2) return;
-  shown2.text = text2;
-  shown2.element.textContent = text2;
+function write(shown, text2) {
+  if (shown.text === text2) return;
+  shown.text = text2;
+  shown.element.textContent = text2;
 }
 function elapsed(state, now) {
   const since = (ns) => Math.max(0, now - (ms(ns) ?? now)) / 1e3;
@@ -4578,16 +4706,16 @@ var READABLE2 = 0.84;
 var lastOpen = "";
 var rearrangedAt = -Infinity;
 function containersToOpen(now) {
-  const model2 = model.value;
+  const model = store.data.model.value;
   const moment = performance.now();
-  if (!model2 || moment - rearrangedAt < PAUSE_MS) return null;
-  const states2 = shown().states;
-  const open = /* @__PURE__ */ new Set([model2.root.path]);
-  const ended = activePaths.value.length === 0;
-  for (const path of ended ? lastLeaves.value.flatMap(around) : activePaths.value) {
+  if (!model || moment - rearrangedAt < PAUSE_MS) return null;
+  const states2 = store.playback.shown().states;
+  const open = /* @__PURE__ */ new Set([model.root.path]);
+  const ended = store.status.activePaths.value.length === 0;
+  for (const path of ended ? store.status.lastLeaves.value.flatMap(around) : store.status.activePaths.value) {
     const since = ended ? 0 : states2[path]?.since;
-    const node = model2.get(path);
-    if (node?.children.length && !model2.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
+    const node = model.get(path);
+    if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
       open.add(path);
   }
   const key = [...open].sort().join("\n");
@@ -4596,13 +4724,13 @@ function containersToOpen(now) {
   rearrangedAt = moment;
   return open;
 }
-var around = (path) => model.value?.ancestors(path).map((node) => node.path) ?? [];
+var around = (path) => store.data.model.value?.ancestors(path).map((node) => node.path) ?? [];
 function restart() {
   lastOpen = "";
   rearrangedAt = -Infinity;
 }
 function boxOfActive(boxes) {
-  const found = lastLeaves.value.flatMap((path) => {
+  const found = store.status.lastLeaves.value.flatMap((path) => {
     let at = path;
     while (at && !boxes.has(at)) at = at.slice(0, Math.max(0, at.lastIndexOf("/")));
     return boxes.get(at) ?? [];
@@ -4625,17 +4753,17 @@ function oneLevelLess(open) {
   return less.length ? new Set(less) : null;
 }
 function boxToFrame(diagram, view2, whole2) {
-  const leaves = lastLeaves.value;
-  const model2 = model.value;
+  const leaves = store.status.lastLeaves.value;
+  const model = store.data.model.value;
   const active = boxOfActive(diagram.boxes);
-  if (!active || !model2) return whole2;
-  const shared = model2.ancestors(leaves[0]).filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
+  if (!active || !model) return whole2;
+  const shared = model.ancestors(leaves[0]).filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
   for (const { path } of shared) {
     const box = diagram.boxOf(path);
     if (box && view2.scaleFor(box) >= READABLE2) return atLeast(box, view2);
   }
   if (view2.scaleFor(active) >= READABLE2) return atLeast(active, view2);
-  const states2 = shown().states;
+  const states2 = store.playback.shown().states;
   const newest2 = leaves.reduce((a5, b3) => (states2[b3]?.since ?? 0) > (states2[a5]?.since ?? 0) ? b3 : a5);
   const at = boxOfOne(diagram, newest2) ?? active;
   const [w5, h5] = [view2.width / READABLE2, view2.height / READABLE2];
@@ -4809,7 +4937,7 @@ var GRID_FROM = 4;
 var FOLD_FROM = 7;
 var BUNDLE_FROM = 6;
 var FOLD_COST = 1.05;
-var nameOf2 = ({ dir, columns, folded }) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
+var nameOf = ({ dir, columns, folded }) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
 function shapesOf(node, inner, aspect) {
   const shapes = DIRECTIONS.map((dir) => ({ dir }));
   const { children } = node;
@@ -4858,9 +4986,9 @@ var TILE_GAP = 6;
 var HEAD3 = 24;
 var HEAD_GROWS = 1.7;
 var MOST_COLUMNS2 = 60;
-function overview2(node, open, aspect) {
+function overview(node, open, aspect) {
   const tiles = node.children.map((child) => {
-    const inner = isOpen(child, open) ? overview2(child, open, aspect) : null;
+    const inner = isOpen(child, open) ? overview(child, open, aspect) : null;
     return { node: child, inner, w: inner?.w ?? leafWidth(child), h: inner?.h ?? LEAF_H };
   });
   const head2 = HEAD_GROWS * Math.max(HEAD3 / HEAD_GROWS, ...tiles.map((tile) => tile.inner?.head ?? 0));
@@ -5293,7 +5421,7 @@ var Layout = class {
    */
   async run(root, open, onProgress) {
     const all = countOf(root, open);
-    if (all > OVERVIEW_FROM || isTangled(root, open)) return overview2(root, open, this.aspect);
+    if (all > OVERVIEW_FROM || isTangled(root, open)) return overview(root, open, this.aspect);
     if (this.cache.size > MOST_CACHED) this.forget();
     const levels = [];
     const height = (node) => {
@@ -5338,7 +5466,7 @@ var Layout = class {
       const chosen2 = this.chosen.get(node.path);
       for (const outer of node === root ? [null] : DIRECTIONS)
         for (const shape of shapesOf(node, this.#inside(node, open, keys2, "DOWN"), this.aspect)) {
-          const name = nameOf2(shape);
+          const name = nameOf(shape);
           if (chosen2 !== void 0 && chosen2 !== name) continue;
           names.add(name);
           const key = known2 + SEP2 + name + SEP2 + outer;
@@ -5401,7 +5529,7 @@ var Layout = class {
   }
   /** Keep the shapes of the containers shown. */
   #settle(result) {
-    if (!result.shape.cards) this.chosen.set(result.node.path, nameOf2(result.shape));
+    if (!result.shape.cards) this.chosen.set(result.node.path, nameOf(result.shape));
     for (const child of result.boxes) if (child.inner) this.#settle(child.inner);
   }
 };
@@ -5416,11 +5544,11 @@ function keyOf2(node, open, keys2, inner) {
 
 // src/drawing/theme.ts
 var systemIsDark = matchMedia("(prefers-color-scheme: dark)");
-var isDark = () => theme.value === "system" ? systemIsDark.matches : theme.value === "dark";
+var isDark = () => store.view.theme.value === "system" ? systemIsDark.matches : store.view.theme.value === "dark";
 function applyTheme() {
-  if (theme.value === "system") delete document.documentElement.dataset.theme;
-  else document.documentElement.dataset.theme = theme.value;
-  save("theme", theme.value);
+  if (store.view.theme.value === "system") delete document.documentElement.dataset.theme;
+  else document.documentElement.dataset.theme = store.view.theme.value;
+  save("theme", store.view.theme.value);
 }
 var Colours = class {
   #known = /* @__PURE__ */ new Map();
@@ -5516,10 +5644,10 @@ var Viewport = class {
     const from = { x: this.x, y: this.y, k: this.k };
     const begun = performance.now();
     const step = (now) => {
-      const part2 = Math.max(0, Math.min(1, (now - begun) / time2));
-      const ease = 1 - (1 - part2) ** 3;
+      const part = Math.max(0, Math.min(1, (now - begun) / time2));
+      const ease = 1 - (1 - part) ** 3;
       this.set(from.x + (x3 - from.x) * ease, from.y + (y5 - from.y) * ease, from.k + (k4 - from.k) * ease);
-      if (part2 < 1) this.#animation = requestAnimationFrame(step);
+      if (part < 1) this.#animation = requestAnimationFrame(step);
     };
     this.#animation = requestAnimationFrame(step);
   }
@@ -5631,7 +5759,7 @@ var MapView = class {
     this.canvas = canvas2;
     this.context = canvas2.getContext("2d");
     canvas2.addEventListener("pointermove", (e4) => this.#hover(e4));
-    canvas2.addEventListener("pointerleave", () => hover(null));
+    canvas2.addEventListener("pointerleave", () => store.pointer.hover(null));
     grab(canvas2, {
       onPan: (dx, dy) => this.#pan(dx, dy),
       onZoom: (factor, px, py) => this.#zoom(factor, px, py),
@@ -5668,10 +5796,10 @@ var MapView = class {
     const { k: k4, left, bottom } = this.#scale;
     return { x: (px - left) / k4, y: (bottom - py) / k4 };
   }
-  #frame(scene2, now, width, height) {
-    const box = scene2.extent(now);
-    const robot = this.followed === null ? null : scene2.robots.get(this.followed);
-    const pose = robot && scene2.poseAt(robot, now);
+  #frame(scene, now, width, height) {
+    const box = scene.extent(now);
+    const robot = this.followed === null ? null : scene.robots.get(this.followed);
+    const pose = robot && scene.poseAt(robot, now);
     const whole2 = box ? {
       k: Math.min((width - 2 * MARGIN) / box.w, (height - 2 * MARGIN) / box.h),
       x: box.x + box.w / 2,
@@ -5687,21 +5815,21 @@ var MapView = class {
     const size = fitted(g5);
     if (!size) return;
     const { width, height, ratio } = size;
-    const { scene: scene2, now } = this.given ?? { scene, now: nowMs() };
-    this.#frame(scene2, now, width, height);
-    const map = scene2.mapAt(now);
+    const { scene, now } = this.given ?? { scene: store.data.scene, now: store.playback.nowMs() };
+    this.#frame(scene, now, width, height);
+    const map = scene.mapAt(now);
     g5.fillStyle = this.#colours.of(map ? "unknown" : "floor");
     g5.fillRect(0, 0, width, height);
     if (map) this.#floor(map, ratio);
     else this.#grid(width, height);
-    const until = (this.given ? null : cursor.value) ?? Infinity;
-    for (const robot of scene2.robots.values()) this.#seen(scene2, robot, now, until);
-    for (const robot of scene2.robots.values()) this.#tracks(scene2, robot, until);
+    const until = (this.given ? null : store.playback.cursor.value) ?? Infinity;
+    for (const robot of scene.robots.values()) this.#seen(scene, robot, now, until);
+    for (const robot of scene.robots.values()) this.#tracks(scene, robot, until);
     this.#labels = [this.#scaleBox(width, height)];
-    this.#goals(scene2, until);
-    for (const [name, robot] of scene2.robots) this.#robot(scene2, name, robot, now);
+    this.#goals(scene, until);
+    for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
     this.#scaleBar(width, height);
-    canvas2.setAttribute("aria-label", describe(scene2, now));
+    canvas2.setAttribute("aria-label", describe(scene, now));
   }
   #floor(map, ratio) {
     const picture = this.#picture(map);
@@ -5767,10 +5895,10 @@ var MapView = class {
     g5.stroke();
   }
   /** The scan and the plan of a robot. */
-  #seen(scene2, robot, now, until) {
+  #seen(scene, robot, now, until) {
     const g5 = this.context;
     const scan = robot.scans[countUntil(robot.scans, now) - 1];
-    const pose = scene2.poseAt(robot, now);
+    const pose = scene.poseAt(robot, now);
     if (scan && pose && now - scan.t < SCAN_MS) {
       const points2 = scanPoints(scan).map((point) => this.at(point));
       g5.fillStyle = this.#colours.of("active");
@@ -5798,18 +5926,18 @@ var MapView = class {
     for (const point of points2) g5.lineTo(...this.at(point));
     g5.stroke();
   }
-  #tracks(scene2, robot, until) {
+  #tracks(scene, robot, until) {
     const g5 = this.context;
-    const { hovered: hovered2 } = store_exports;
-    const lit = hovered2.value;
-    const pieces = scene2.piecesOf(robot);
-    const isLit2 = (one) => lit !== null && one.path === lit.path && one.visit === lit.from;
-    const anyLit = pieces.some(isLit2);
+    const { hovered } = store.pointer;
+    const lit = hovered.value;
+    const pieces = scene.piecesOf(robot);
+    const isLit = (one) => lit !== null && one.path === lit.path && one.visit === lit.from;
+    const anyLit = pieces.some(isLit);
     for (const piece of pieces) {
       const count = piece.poses[piece.poses.length - 1].t <= until ? piece.poses.length : countUntil(piece.poses, until);
       if (count < 1) break;
       const poses = count === piece.poses.length ? piece.poses : piece.poses.slice(0, count);
-      if (isLit2(piece)) {
+      if (isLit(piece)) {
         g5.strokeStyle = this.#colours.of("ink");
         g5.lineWidth = 12;
         this.#line(poses);
@@ -5817,21 +5945,21 @@ var MapView = class {
         g5.lineWidth = 10;
         this.#line(poses);
       }
-      const number = piece.path === null ? -1 : scene2.colourOf(piece.path);
+      const number = piece.path === null ? -1 : scene.colourOf(piece.path);
       g5.strokeStyle = this.#colours.of(number < 0 ? "muted" : `s${1 + number % COLOURS}`);
       g5.lineWidth = number < 0 ? 1 : 2.5;
       if (number >= COLOURS) g5.setLineDash([6, 4]);
-      g5.globalAlpha = anyLit && !isLit2(piece) ? 0.4 : 0.9;
+      g5.globalAlpha = anyLit && !isLit(piece) ? 0.4 : 0.9;
       this.#line(poses);
       g5.globalAlpha = 1;
       g5.setLineDash([]);
     }
   }
   /** Draw each goal's place once, with the status of the newest goal there. */
-  #goals(scene2, until) {
+  #goals(scene, until) {
     const g5 = this.context;
     const places = /* @__PURE__ */ new Map();
-    for (const robot of scene2.robots.values())
+    for (const robot of scene.robots.values())
       for (const goal of robot.goals)
         if (goal.t <= until) places.set(`${goal.x.toFixed(1)} ${goal.y.toFixed(1)}`, goal);
     g5.textBaseline = "middle";
@@ -5841,9 +5969,9 @@ var MapView = class {
     }
     for (const goal of places.values()) {
       const [x3, y5] = this.at(goal);
-      const runs3 = goal.to === null || goal.to > until;
-      const kind = runs3 ? "active" : outcomeClass(goal.status);
-      g5.fillStyle = this.#colours.of(runs3 ? "floor" : `${kind}-fill`);
+      const runs2 = goal.to === null || goal.to > until;
+      const kind = runs2 ? "active" : outcomeClass(goal.status);
+      g5.fillStyle = this.#colours.of(runs2 ? "floor" : `${kind}-fill`);
       g5.strokeStyle = this.#colours.of(kind);
       g5.lineWidth = 1.75;
       if (kind === "preempted") g5.setLineDash([3, 2]);
@@ -5853,7 +5981,7 @@ var MapView = class {
       g5.stroke();
       g5.setLineDash([]);
       g5.beginPath();
-      if (runs3) {
+      if (runs2) {
         g5.fillStyle = this.#colours.of(kind);
         g5.arc(x3, y5, 3, 0, 7);
         g5.fill();
@@ -5871,7 +5999,7 @@ var MapView = class {
         }
         g5.stroke();
       }
-      this.#label(scene2.placeName(goal), x3, y5, runs3);
+      this.#label(scene.placeName(goal), x3, y5, runs2);
     }
   }
   /** Write a name beside a place, on a side without another name. */
@@ -5897,8 +6025,8 @@ var MapView = class {
     g5.fillStyle = this.#colours.of("ink");
     g5.fillText(text2, side.left, side.top + 7);
   }
-  #robot(scene2, name, robot, now) {
-    const pose = scene2.poseAt(robot, now);
+  #robot(scene, name, robot, now) {
+    const pose = scene.poseAt(robot, now);
     if (!pose) return;
     const g5 = this.context;
     const [x3, y5] = this.at(pose);
@@ -5920,7 +6048,7 @@ var MapView = class {
     g5.lineTo(-0.35 * r4, -0.5 * r4);
     g5.fill();
     g5.restore();
-    if (scene2.robots.size > 1) this.#label(name, x3, y5 - r4 - 7, true);
+    if (scene.robots.size > 1) this.#label(name, x3, y5 - r4 - 7, true);
   }
   /** The box of the scale, at the bottom right. */
   #scaleBox(width, height) {
@@ -5954,20 +6082,20 @@ var MapView = class {
   #nearest(e4) {
     if (this.given) return null;
     const { x: x3, y: y5 } = this.#placeAt(e4.offsetX, e4.offsetY);
-    return scene.nearest(x3, y5, REACH / this.#scale.k, cursor.value ?? Infinity);
+    return store.data.scene.nearest(x3, y5, REACH / this.#scale.k, store.playback.cursor.value ?? Infinity);
   }
   #hover(e4) {
     const found = this.#nearest(e4);
     this.canvas.style.cursor = found ? "pointer" : "";
     const { path, visit } = found?.piece ?? { path: null, visit: null };
-    hover(path === null || visit === null ? null : { path, from: visit });
+    store.pointer.hover(path === null || visit === null ? null : { path, from: visit });
   }
   /** Go to the instant at which a robot was at the pointer. */
   #goTo(e4) {
     const found = this.#nearest(e4);
     if (!found) return;
-    seek(found.t);
-    if (found.piece.path) selected.value = found.piece.path;
+    store.playback.seek(found.t);
+    if (found.piece.path) store.view.selected.value = found.piece.path;
   }
   #pan(dx, dy) {
     this.followed = null;
@@ -6001,11 +6129,11 @@ function wordOf2(hex) {
   const [r4, g5, b3] = [0, 2, 4].map((i4) => Number.parseInt(full.slice(i4, i4 + 2), 16));
   return (255 << 24 | b3 << 16 | g5 << 8 | r4) >>> 0;
 }
-function describe(scene2, now) {
-  const parts = [...scene2.robots].flatMap(([name, robot]) => {
-    const pose = scene2.poseAt(robot, now);
+function describe(scene, now) {
+  const parts = [...scene.robots].flatMap(([name, robot]) => {
+    const pose = scene.poseAt(robot, now);
     const goal = robot.goals.findLast((one) => one.t <= now && (one.to === null || one.to > now));
-    const to = goal ? `, on its way to ${scene2.placeName(goal) || placeText(goal)}` : "";
+    const to = goal ? `, on its way to ${scene.placeName(goal) || placeText(goal)}` : "";
     return pose ? [`${name || "the robot"} at ${placeText(pose)}${to}`] : [];
   });
   return `map: ${parts.join("; ") || "no robot yet"}`;
@@ -6013,14 +6141,14 @@ function describe(scene2, now) {
 var placeText = ({ x: x3, y: y5 }) => `(${x3.toFixed(1)}, ${y5.toFixed(1)})`;
 
 // src/core/density.ts
-function densityOf(events, { from, to }, columns, model2 = null) {
+function densityOf(events, { from, to }, columns, model = null) {
   const found = { counts: new Array(columns).fill(0), failures: [], preempts: [], starts: [] };
   const wide = Math.max(1, to - from) / columns;
   let begun = false;
   for (const e4 of events) {
     const t4 = e4.stamp_ns / 1e6;
     found.counts[Math.max(0, Math.min(columns - 1, Math.floor((t4 - from) / wide)))] += 1;
-    const isFailure2 = e4.kind === "Failed" || e4.kind === "Left" && endClass(model2?.get(e4.path), e4.outcome) === "failure";
+    const isFailure2 = e4.kind === "Failed" || e4.kind === "Left" && endClass(model?.get(e4.path), e4.outcome) === "failure";
     if (isFailure2) found.failures.push(t4);
     else if (e4.kind === "PreemptRequested") found.preempts.push(t4);
     else if (e4.kind === "Started") {
@@ -6062,9 +6190,9 @@ var Strip = class {
   }
   /** The time of the whole run [ms]; null before it begins. */
   #whole() {
-    const from = run.first();
+    const from = store.data.run.first();
     if (from === null) return null;
-    return { from, to: Math.max(liveMs(), from + 1e3) };
+    return { from, to: Math.max(store.data.liveMs(), from + 1e3) };
   }
   draw() {
     const g5 = this.#context;
@@ -6076,12 +6204,12 @@ var Strip = class {
     if (wide < 40) return;
     const x3 = (t4) => this.left + (t4 - whole2.from) / (whole2.to - whole2.from) * wide;
     const columns = Math.floor(wide / COLUMN);
-    const { events } = run;
+    const { events } = store.data.run;
     const step = (whole2.to - whole2.from) / columns;
     const end = Math.floor(whole2.to / Math.max(step, 250));
-    const key = [model.value?.root.path, events[0]?.seq, events.length, columns, end].join(" ");
+    const key = [store.data.model.value?.root.path, events[0]?.seq, events.length, columns, end].join(" ");
     if (key !== this.#key || !this.#density) {
-      this.#density = densityOf(events, whole2, columns, model.value);
+      this.#density = densityOf(events, whole2, columns, store.data.model.value);
       this.#key = key;
     }
     const { counts, failures, preempts, starts } = this.#density;
@@ -6093,9 +6221,9 @@ var Strip = class {
       if (count) g5.fillRect(this.left + i4 * COLUMN, height - 3 - tall, COLUMN - 0.5, tall);
     }
     g5.fillStyle = this.#colours.of("waiting-fill");
-    for (const [from, to] of asksIn(run.waits, whole2.to))
+    for (const [from, to] of asksIn(store.data.run.waits, whole2.to))
       g5.fillRect(x3(from), 3, Math.max(2, x3(to) - x3(from)), height - 6);
-    for (const [from, to] of run.now.outages ?? []) {
+    for (const [from, to] of store.data.run.now.outages ?? []) {
       g5.fillStyle = this.#colours.of("background");
       g5.fillRect(x3(from / 1e6), 0, Math.max(2, x3(to / 1e6) - x3(from / 1e6)), height);
     }
@@ -6107,7 +6235,7 @@ var Strip = class {
     ticks2("ink", starts, 1.5, 0);
     ticks2("failure", failures, FAILURE2, 0);
     this.#window(x3, height, width);
-    const at = cursor.value;
+    const at = store.playback.cursor.value;
     if (at !== null) ticks2("active", [at], 2, 0);
   }
   /** Draw what the timeline shows, with its ends. */
@@ -6219,17 +6347,17 @@ var Timeline = class {
     canvas2.addEventListener("pointermove", (e4) => {
       const span = this.#spanAt(e4);
       canvas2.title = span ? describe2(span) : "";
-      hover(span ? { path: span.path, from: span.from } : null);
+      store.pointer.hover(span ? { path: span.path, from: span.from } : null);
       this.#hover(e4.offsetX);
     });
     canvas2.addEventListener("pointerleave", () => {
       this.#hover(null);
-      hover(null);
+      store.pointer.hover(null);
     });
     canvas2.addEventListener("keydown", (e4) => this.#key(e4));
     canvas2.addEventListener("dblclick", (e4) => {
       const span = this.#spanAt(e4);
-      if (span) this.#show(span.from, span.to ?? nowMs());
+      if (span) this.#show(span.from, span.to ?? store.playback.nowMs());
     });
   }
   /** Read the colours again. */
@@ -6244,8 +6372,8 @@ var Timeline = class {
   }
   /** Show the whole run. */
   fitAll() {
-    const first = run.first();
-    const last = nowMs();
+    const first = store.data.run.first();
+    const last = store.playback.nowMs();
     if (first == null) return;
     this.length = Math.max(500, (last - first) * 1.04);
     this.end = last + this.length * 0.02;
@@ -6259,7 +6387,7 @@ var Timeline = class {
   }
   /** Show a range [ms]; one that reaches the present of a running machine moves on with it. */
   showRange({ from, to }) {
-    const isLive = cursor.value === null && goes.value && to >= liveMs();
+    const isLive = store.playback.cursor.value === null && store.playback.goes.value && to >= store.data.liveMs();
     this.length = Math.max(SHORTEST_MS3, to - from);
     this.end = isLive ? null : to;
     this.draw();
@@ -6267,22 +6395,22 @@ var Timeline = class {
   /** Follow the present. */
   live() {
     this.end = null;
-    seek(null);
+    store.playback.seek(null);
   }
   /** The range shown [ms]. */
   #range() {
-    const now = nowMs();
+    const now = store.playback.nowMs();
     let end = this.end ?? now + this.length * 0.01;
-    if (this.end === null && cursor.value !== null) end = now + this.length / 2;
-    const first = run.first();
-    if (this.end === null && cursor.value === null && first != null)
+    if (this.end === null && store.playback.cursor.value !== null) end = now + this.length / 2;
+    const first = store.data.run.first();
+    if (this.end === null && store.playback.cursor.value === null && first != null)
       end = Math.max(end, first + this.length * 0.98);
     return [end - this.length, end];
   }
   /** Keep the played instant in view. */
   #keepInView() {
-    const at = cursor.value;
-    if (this.end === null || at === null || !playing.value) return;
+    const at = store.playback.cursor.value;
+    if (this.end === null || at === null || !store.playback.playing.value) return;
     if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
     else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
   }
@@ -6291,45 +6419,45 @@ var Timeline = class {
     return from + (px - this.names) / (this.canvas.clientWidth - this.names - RIGHT2) * (to - from);
   }
   /** Put new spans into lanes; a container gets a lane when a state in it has run. */
-  #makeLanes(model2, spans) {
-    if (this.model !== model2 || this.spans !== spans) {
+  #makeLanes(model, spans) {
+    if (this.model !== model || this.spans !== spans) {
       this.spansOf.clear();
       this.sorted = 0;
       this.lanes = [];
     }
-    this.model = model2;
+    this.model = model;
     this.spans = spans;
     const before = this.spansOf.size;
     for (; this.sorted < spans.length; this.sorted++) {
       const span = spans[this.sorted];
-      const lane = model2.get(span.path)?.parent?.path;
+      const lane = model.get(span.path)?.parent?.path;
       if (lane === void 0) continue;
       const known2 = this.spansOf.get(lane);
       if (known2) known2.push(span);
       else this.spansOf.set(lane, [span]);
     }
-    if (this.spansOf.size !== before) this.lanes = model2.order.filter((node) => this.spansOf.has(node.path));
+    if (this.spansOf.size !== before) this.lanes = model.order.filter((node) => this.spansOf.has(node.path));
   }
   /** Tell screen readers the instant shown, as the value of a slider [s]. */
   tellInstant() {
-    const began2 = began() ?? 0;
-    const seconds = (t4) => String(Math.max(0, Math.round((t4 - began2) / 1e3)));
+    const began = store.playback.began() ?? 0;
+    const seconds = (t4) => String(Math.max(0, Math.round((t4 - began) / 1e3)));
     this.canvas.setAttribute("aria-valuemin", "0");
-    this.canvas.setAttribute("aria-valuemax", seconds(liveMs()));
-    this.canvas.setAttribute("aria-valuenow", seconds(nowMs()));
-    this.canvas.setAttribute("aria-valuetext", instantText(nowMs()));
+    this.canvas.setAttribute("aria-valuemax", seconds(store.data.liveMs()));
+    this.canvas.setAttribute("aria-valuenow", seconds(store.playback.nowMs()));
+    this.canvas.setAttribute("aria-valuetext", store.clock.instantText(store.playback.nowMs()));
   }
   draw() {
     const g5 = this.context;
-    const model2 = model.value;
+    const model = store.data.model.value;
     const size = fitted(g5);
-    if (!size || !model2) return;
+    if (!size || !model) return;
     const { width, height } = size;
     this.names = width < 640 ? NAMES_NARROW : NAMES2;
     g5.clearRect(0, 0, width, height);
     g5.font = "11px Inter, Arial, sans-serif";
     g5.textBaseline = "middle";
-    this.#makeLanes(model2, run.spans);
+    this.#makeLanes(model, store.data.run.spans);
     this.#keepInView();
     const [from, to] = this.#range();
     const x3 = (t4) => this.names + (t4 - from) / (to - from) * (width - this.names - RIGHT2);
@@ -6362,7 +6490,7 @@ var Timeline = class {
   }
   /** Draw the selected stretch. */
   #stretch(x3, height) {
-    const found = stretch.value;
+    const found = store.playback.stretch.value;
     if (!found) return;
     const g5 = this.context;
     const [left, right] = [found.from, found.to].map((t4) => Math.max(this.names, x3(t4)));
@@ -6371,13 +6499,13 @@ var Timeline = class {
     g5.fillRect(left, 0, right - left, height - FOOT);
     g5.globalAlpha = 1;
     for (const px of [left, right]) g5.fillRect(px - 0.75, 0, 1.5, height - FOOT);
-    g5.fillRect(left, height - FOOT, right - left, looping.value ? 4 : 2);
+    g5.fillRect(left, height - FOOT, right - left, store.playback.looping.value ? 4 : 2);
   }
   /** Draw the outages. */
   #outages({ from, to, x: x3 }, width, height) {
     const g5 = this.context;
     this.gaps = [];
-    for (const [begin, end] of run.now.outages ?? []) {
+    for (const [begin, end] of store.data.run.now.outages ?? []) {
       if (end / 1e6 < from || begin / 1e6 > to) continue;
       const left = Math.max(this.names, x3(begin / 1e6));
       const right = Math.min(width - RIGHT2, Math.max(x3(end / 1e6), left + 3));
@@ -6405,7 +6533,7 @@ var Timeline = class {
   /** Draw a pin at each note, with its text. */
   #notes(x3, width, height) {
     const g5 = this.context;
-    for (const { at, text: text2 } of notes.value) {
+    for (const { at, text: text2 } of store.notes.all.value) {
       const px = x3(at);
       if (px < this.names || px > width - RIGHT2) continue;
       g5.fillStyle = this.#colours.of("ink");
@@ -6432,9 +6560,9 @@ var Timeline = class {
   }
   /** The lanes of the names that are looked for; all if there is room, otherwise those with spans in the range. */
   #lanesToShow({ from, to }, room) {
-    const wanted2 = laneFilter.value.toLowerCase().split(/[\s,]+/).filter(Boolean);
-    const named = (lane) => [lane, ...lane.children].some(({ path }) => isNamed(path, wanted2));
-    const lanes = wanted2.length ? this.lanes.filter(named) : this.lanes;
+    const wanted = store.view.laneFilter.value.toLowerCase().split(/[\s,]+/).filter(Boolean);
+    const named = (lane) => [lane, ...lane.children].some(({ path }) => isNamed(path, wanted));
+    const lanes = wanted.length ? this.lanes.filter(named) : this.lanes;
     const tall = lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
     if (tall <= room) return lanes;
     return lanes.filter((lane) => {
@@ -6446,7 +6574,7 @@ var Timeline = class {
   }
   #grid({ from, to, x: x3 }, width, height) {
     const g5 = this.context;
-    const begun = ms(shown().started) ?? run.first() ?? from;
+    const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
     const widthOf = (s4) => s4 * 1e3 / (to - from) * (width - this.names);
     const step = 1e3 * (STEPS_S.find((s4) => widthOf(s4) > 74) ?? 86400 * Math.ceil((to - from) / 864e5 / 8));
     g5.fillStyle = this.#colours.of("muted");
@@ -6459,7 +6587,7 @@ var Timeline = class {
       g5.moveTo(px, 0);
       g5.lineTo(px, height - FOOT);
       g5.stroke();
-      const text2 = instantText(t4, step < 1e3 ? 1 : 0);
+      const text2 = store.clock.instantText(t4, step < 1e3 ? 1 : 0);
       if (px + 3 + g5.measureText(text2).width < width) g5.fillText(text2, px + 3, height - FOOT / 2);
     }
   }
@@ -6471,7 +6599,7 @@ var Timeline = class {
     this.#clipped(0, y5, this.names - 8, h5, () => g5.fillText(lane.name, indent, y5 + h5 / 2));
     const rows = lane.kind === "concurrence" ? lane.children.length : 1;
     const spans = this.spansOf.get(lane.path) ?? [];
-    const now = nowMs();
+    const now = store.playback.nowMs();
     let lastPx = -10;
     const failures = [];
     for (let i4 = firstAfter(spans, from); i4 < spans.length; i4++) {
@@ -6479,7 +6607,7 @@ var Timeline = class {
       if (span.from > to) break;
       const later = span.from > now;
       const ended = span.to !== null && (later || span.to <= now);
-      const until = span.to ?? Math.max(now, run.last() ?? now);
+      const until = span.to ?? Math.max(now, store.data.run.last() ?? now);
       const node = this.model?.get(span.path);
       if (until < from || !node) continue;
       const left = Math.max(this.names, x3(span.from));
@@ -6508,8 +6636,8 @@ var Timeline = class {
   /** Draw the times in which the lane's states were paused before they began, or asked. */
   #waits(lane, y5, h5, rows, { from, to, x: x3 }, width) {
     const g5 = this.context;
-    const now = nowMs();
-    for (const wait of run.waits) {
+    const now = store.playback.nowMs();
+    for (const wait of store.data.run.waits) {
       const until = Math.min(wait.to ?? now, now);
       if (until < from || wait.from > Math.min(to, now)) continue;
       const node = this.model?.get(wait.path);
@@ -6559,10 +6687,10 @@ var Timeline = class {
     const size = tall > 13 ? 11 : 9.5;
     g5.font = `${size}px Inter, Arial, sans-serif`;
     const text2 = texts.find((one) => this.#widthOf(one, size) <= wide - 8) ?? "";
-    const shown2 = text2 || (wide > 26 ? texts.at(-1) ?? "" : "");
+    const shown = text2 || (wide > 26 ? texts.at(-1) ?? "" : "");
     g5.fillStyle = this.#colours.of(colour);
     g5.textAlign = "left";
-    if (shown2) this.#clipped(left, top, wide - 3, tall, () => g5.fillText(shown2, left + 4, top + tall / 2 + 0.5));
+    if (shown) this.#clipped(left, top, wide - 3, tall, () => g5.fillText(shown, left + 4, top + tall / 2 + 0.5));
     g5.font = "11px Inter, Arial, sans-serif";
   }
   /** @param size of the font, which is set [px] */
@@ -6597,21 +6725,21 @@ var Timeline = class {
       g5.restore();
     }
     g5.stroke();
-    if (selected.value === span.path) {
+    if (store.view.selected.value === span.path) {
       g5.strokeStyle = this.#colours.of("ink");
       g5.lineWidth = 2;
       g5.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
     }
-    const driver = scene.colourOf(span.path);
+    const driver = store.data.scene.colourOf(span.path);
     if (driver >= 0) {
       g5.fillStyle = this.#colours.of(`s${1 + driver % COLOURS}`);
       g5.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
     }
-    const lit = hovered.value;
+    const lit = store.pointer.hovered.value;
     if (lit?.path === span.path && lit.from === span.from) this.#halo({ left, right, top, bottom });
     this.#mark(span.serviced, "preempted", x3, now, { right, top, tall });
     this.#mark(span.abandoned, "failure", x3, now, { right, top, tall });
-    const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? nowMs() : now);
+    const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? store.playback.nowMs() : now);
     this.#text(words2, `${kind}-text`, left, top, wide, tall);
   }
   /** Draw a ring around the visit that the pointer is on here or in the map. */
@@ -6642,13 +6770,13 @@ var Timeline = class {
     g5.fillRect(px - 0.75, top, 1.5, tall);
   }
   #hover(px) {
-    pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
+    store.pointer.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
   }
   /** Draw the instants at the pointer and shown. */
   #cursor(x3, height) {
-    const at = cursor.value;
-    const pointed2 = pointed.value;
-    if (pointed2 !== null && x3(pointed2) >= this.names) this.#flag(x3(pointed2), pointed2, height, "muted", 1);
+    const at = store.playback.cursor.value;
+    const pointed = store.pointer.pointed.value;
+    if (pointed !== null && x3(pointed) >= this.names) this.#flag(x3(pointed), pointed, height, "muted", 1);
     if (at === null) return;
     const last = this.canvas.clientWidth - RIGHT2;
     const px = Math.max(this.names, Math.min(last, x3(at)));
@@ -6657,7 +6785,7 @@ var Timeline = class {
   /** Draw a line through the lanes, with its instant at the axis. */
   #flag(px, t4, height, colour, wide) {
     const g5 = this.context;
-    const text2 = instantText(t4);
+    const text2 = store.clock.instantText(t4);
     g5.font = "600 11px 'JetBrains Mono', ui-monospace, monospace";
     const half = g5.measureText(text2).width / 2 + 5;
     const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
@@ -6687,15 +6815,15 @@ var Timeline = class {
     let dragged = false;
     const [, stop] = this.#range();
     this.end ??= stop;
-    const seek2 = (m5) => seek(Math.min(this.#timeAt(m5.clientX - left), run.last() ?? stop));
+    const seek = (m5) => store.playback.seek(Math.min(this.#timeAt(m5.clientX - left), store.data.run.last() ?? stop));
     const move = (m5) => {
       if (Math.abs(m5.clientX - left - from) > 3) dragged = true;
-      if (dragged && selects) selectStretch(begin, this.#timeAt(m5.clientX - left));
-      else if (dragged || !span && !selects) seek2(m5);
+      if (dragged && selects) store.playback.selectStretch(begin, this.#timeAt(m5.clientX - left));
+      else if (dragged || !span && !selects) seek(m5);
     };
     drag(move, (m5) => {
       if (dragged && selects) return;
-      seek2(m5);
+      seek(m5);
       if (!dragged && span) this.onPick(span.path);
     });
   }
@@ -6713,16 +6841,16 @@ var Timeline = class {
     }
     const at = this.#timeAt(e4.offsetX);
     const length = Math.max(SHORTEST_MS3, Math.min(this.length * Math.exp(e4.deltaY * 16e-4), LONGEST_MS));
-    if (this.end !== null || cursor.value !== null) this.end = at + (to - at) * length / this.length;
+    if (this.end !== null || store.playback.cursor.value !== null) this.end = at + (to - at) * length / this.length;
     this.length = length;
   }
   #key(e4) {
     const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20 }[e4.key];
     if (step !== void 0) {
-      seekEvent(step);
+      store.playback.seekEvent(step);
       e4.stopPropagation();
     } else if (e4.key === "End") this.live();
-    else if (e4.key === "Home") seek(run.first());
+    else if (e4.key === "Home") store.playback.seek(store.data.run.first());
     else return;
     e4.preventDefault();
   }
@@ -6850,7 +6978,7 @@ var Page = class {
     });
     svg2.addEventListener("pointermove", (e4) => e4.buttons || this.#hover(pathOf(e4)));
     svg2.addEventListener("pointerleave", () => this.#hover(null));
-    svg2.addEventListener("dblclick", (e4) => this.#toggle(model.value?.get(pathOf(e4))));
+    svg2.addEventListener("dblclick", (e4) => this.#toggle(store.data.model.value?.get(pathOf(e4))));
     minimap2.addEventListener("pointerdown", (e4) => this.#jump(e4));
     new ResizeObserver(() => {
       if (this.fitted && this.view.is(this.fitted)) {
@@ -6860,16 +6988,18 @@ var Page = class {
       this.diagram.showWindow(this.view);
       this.timeline.draw();
     }).observe(svg2);
-    const linked2 = [selected, opened2, instant2, notes, stretch];
     const phone = matchMedia("(max-width: 720px), (max-height: 480px)");
     const look = () => {
-      isPhone.value = phone.matches;
+      store.view.isPhone.value = phone.matches;
     };
     phone.addEventListener("change", look);
     look();
     new ResizeObserver(() => this.timeline.draw()).observe(canvas2);
-    for (const one of [...linked2, arrangement, plotsChosen]) one.subscribe(() => this.#writeAddress());
-    for (const one of [notes, clock, laneFilter]) one.subscribe(() => this.timeline.draw());
+    const { view: view2, playback, panels: panels2, notes } = store;
+    const chosen2 = [view2.selected, view2.opened, notes.all, playback.stretch, panels2.arrangement, panels2.plotsChosen];
+    for (const one of [...chosen2, playback.instant]) one.subscribe(() => this.#writeAddress());
+    for (const one of [store.notes.all, store.clock.chosen, store.view.laneFilter])
+      one.subscribe(() => this.timeline.draw());
     addEventListener("hashchange", () => {
       readToken();
       this.linked = viewOf(location.hash);
@@ -6877,24 +7007,24 @@ var Page = class {
       this.relayout({ frame: true });
     });
     systemIsDark.addEventListener("change", () => this.#restyle());
-    instant2.subscribe(() => {
+    store.playback.instant.subscribe(() => {
       this.paintAll();
       this.timeline.draw();
       this.map.draw();
     });
-    playing.subscribe((playing2) => {
-      if (playing2 && !this.playFrame) this.playFrame = requestAnimationFrame((moment) => this.#play(moment));
+    store.playback.playing.subscribe((playing) => {
+      if (playing && !this.playFrame) this.playFrame = requestAnimationFrame((moment) => this.#play(moment));
     });
-    hovered.subscribe((visit) => {
+    store.pointer.hovered.subscribe((visit) => {
       this.diagram.mark(visit ? [visit.path] : [], "linked");
       this.timeline.draw();
       this.map.draw();
     });
-    pointed.subscribe(() => this.timeline.draw());
-    stretch.subscribe(() => this.timeline.draw());
-    serversSeen.subscribe(() => this.paintAll());
-    facts.subscribe(() => this.paintAll());
-    wayShown.subscribe(() => this.#showWay());
+    store.pointer.pointed.subscribe(() => this.timeline.draw());
+    store.playback.stretch.subscribe(() => this.timeline.draw());
+    store.data.serversSeen.subscribe(() => this.paintAll());
+    store.data.facts.subscribe(() => this.paintAll());
+    store.data.wayShown.subscribe(() => this.#showWay());
   }
   /** Begin; the elements must be in the document, so that the browser loads their fonts. */
   async start() {
@@ -6911,16 +7041,16 @@ var Page = class {
   /** Show the machine in the store. */
   showMachine() {
     this.openedAt = performance.now();
-    selected.value = null;
+    store.view.selected.value = null;
     restart();
     this.layout?.clear();
     this.timeline.reset();
-    loadNotes();
-    loadPlots();
+    store.notes.load();
+    store.panels.loadPlots();
     this.map.reset();
-    if (isFile() || facts.value?.recorded || run.now.ended != null) this.timeline.fitAll();
-    if (settings.value.follow && !this.followIsSet) {
-      follow.value = true;
+    if (isFile() || store.data.facts.value?.recorded || store.data.run.now.ended != null) this.timeline.fitAll();
+    if (store.data.settings.value.follow && !this.followIsSet) {
+      store.view.follow.value = true;
       this.followIsSet = true;
     }
     this.#showLinked();
@@ -6930,76 +7060,77 @@ var Page = class {
   /** The address of the view. */
   address() {
     const address = new URL(location.href);
-    const name = facts.value?.name;
+    const name = store.data.facts.value?.name;
     if (name && !isFile()) address.searchParams.set("machine", name);
     address.hash = this.#fragment();
     return String(address);
   }
   /** The title of the view, for a picture. */
   title() {
-    return facts.value?.label ?? "";
+    return store.data.facts.value?.label ?? "";
   }
   /** A file name for the view, without an extension. */
   fileName() {
-    return `${this.title()} ${instantText(nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
+    return `${this.title()} ${store.clock.instantText(store.playback.nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
   }
   #fragment() {
-    const { cursor: cursor2, selected: selected2, opened: opened3, notes: notes2, stretch: stretch2, arrangement: arrangement2, plotsChosen: plotsChosen2 } = store_exports;
+    const { view: view2, playback, panels: panels2, notes } = store;
+    const stretch = playback.stretch.value;
     return fragmentOf({
-      at: cursor2.value,
-      selected: selected2.value,
-      opened: [...opened3.value],
-      notes: notes2.value,
-      stretch: stretch2.value && [stretch2.value.from, stretch2.value.to],
-      panels: arrangement2.value,
-      plots: plotsChosen2.value
+      at: playback.cursor.value,
+      selected: view2.selected.value,
+      opened: [...view2.opened.value],
+      notes: notes.all.value,
+      stretch: stretch && [stretch.from, stretch.to],
+      panels: panels2.arrangement.value,
+      plots: panels2.plotsChosen.value
     });
   }
   /** Write the view into the address, a moment after the last change. */
   #writeAddress() {
     clearTimeout(this.addressDue);
     this.addressDue = setTimeout(() => {
-      if (model.value && !this.linked && pageShown.value === "machine")
+      if (store.data.model.value && !this.linked && store.view.pageShown.value === "machine")
         history.replaceState(null, "", `#${this.#fragment()}`);
     }, ADDRESS_MS);
   }
   /** Show the view of the address, as far as it exists. */
   #showLinked() {
-    const model2 = model.value;
+    const model = store.data.model.value;
     const view2 = this.linked;
     this.linked = null;
-    if (!view2 || !model2) return;
-    const known2 = view2.opened?.filter((path) => model2.get(path)?.children.length);
-    if (known2?.length) keepOpened(new Set(known2));
-    if (view2.notes.length) addNotes(view2.notes);
-    if (view2.panels) arrangement.value = view2.panels;
-    if (view2.stretch) selectStretch(...view2.stretch);
-    if (view2.plots) plotsChosen.value = view2.plots;
-    const first = run.first();
-    const isKept = first !== null && view2.at !== null && view2.at >= first && view2.at <= (run.last() ?? first) + 1;
+    if (!view2 || !model) return;
+    const known2 = view2.opened?.filter((path) => model.get(path)?.children.length);
+    if (known2?.length) store.view.keepOpened(new Set(known2));
+    if (view2.notes.length) store.notes.add(view2.notes);
+    if (view2.panels) store.panels.arrangement.value = view2.panels;
+    if (view2.stretch) store.playback.selectStretch(...view2.stretch);
+    if (view2.plots) store.panels.plotsChosen.value = view2.plots;
+    const first = store.data.run.first();
+    const isKept = first !== null && view2.at !== null && view2.at >= first && view2.at <= (store.data.run.last() ?? first) + 1;
     if (isKept) {
       this.timeline.fitAll();
-      seek(view2.at);
-    } else if (view2.at !== null) notify("The instant of this link is not in this run", "error");
+      store.playback.seek(view2.at);
+    } else if (view2.at !== null) store.view.notify("The instant of this link is not in this run", "error");
     if (view2.selected === null) return;
-    if (model2.get(view2.selected)) {
-      selected.value = view2.selected;
-      reveal(view2.selected);
-    } else notify("The state of this link is not in this machine", "error");
+    if (model.get(view2.selected)) {
+      store.view.selected.value = view2.selected;
+      store.view.reveal(view2.selected);
+    } else store.view.notify("The state of this link is not in this machine", "error");
   }
   takeEvents(events) {
-    const live = cursor.value === null && !document.hidden;
+    const live = store.playback.cursor.value === null && !document.hidden;
     for (const e4 of events) {
       this.changed.add(e4.path);
       if (live && ["Left", "Failed", "Fired"].includes(e4.kind)) this.flashes.push(e4);
       if (live && events.length < BURST) this.arrived.push(e4.stamp_ns / 1e6);
     }
-    addEvents(events);
+    store.addEvents(events);
     if (!events.length) this.paintAll();
     this.#schedule();
   }
   takeObserved(records) {
-    addObserved(records);
+    store.data.addObserved(records);
     this.#schedule();
   }
   #schedule() {
@@ -7017,9 +7148,9 @@ var Page = class {
     this.late += LATE_PART * (moment - this.askedAt - this.late);
     const flashes = this.flashes.splice(0);
     const arrived = this.arrived.splice(0);
-    if (cursor.value === null) {
-      const now = nowMs();
-      for (const path of this.changed) this.#paint(path, run.now, now);
+    if (store.playback.cursor.value === null) {
+      const now = store.playback.nowMs();
+      for (const path of this.changed) this.#paint(path, store.data.run.now, now);
       this.changed.clear();
       for (const e4 of flashes)
         if (e4.kind === "Fired") this.diagram.flashFired(e4.path, e4.transition, moment);
@@ -7036,11 +7167,11 @@ var Page = class {
   }
   #play(moment) {
     this.playFrame = 0;
-    if (!playing.value) return;
+    if (!store.playback.playing.value) return;
     this.playFrame = requestAnimationFrame((next) => this.#play(next));
     if (moment - this.playedAt < PLAY_MS) return;
     this.playedAt = moment;
-    playOn(performance.now());
+    store.playback.playOn(performance.now());
   }
   #measureLatency() {
     const now = performance.timeOrigin + performance.now();
@@ -7051,12 +7182,12 @@ var Page = class {
     clearTimeout(this.panelsDue);
     this.panelsDue = 0;
     this.panelsAt = moment;
-    tick.value += 1;
-    hasMap.value = !scene.isEmpty;
+    store.playback.tick.value += 1;
+    store.panels.hasMap.value = !store.data.scene.isEmpty;
     if (moment - this.textAt > TEXT_MS) {
       this.textAt = moment;
-      slowTick.value += 1;
-      const newest2 = run.events.at(-1)?.seq ?? 0;
+      store.playback.slowTick.value += 1;
+      const newest2 = store.data.run.events.at(-1)?.seq ?? 0;
       const isBusy = newest2 - this.newestSeq > 3 * BUSY * (TEXT_MS / 1e3);
       this.newestSeq = newest2;
       this.diagram.svg.classList.toggle("busy", isBusy);
@@ -7073,23 +7204,23 @@ var Page = class {
   }
   /** Update what changes without events: clocks, the stale badge, closed containers. */
   #beat() {
-    const data = shown();
-    const now = nowMs();
-    if (cursor.value === null)
-      for (const path of activePaths.value) {
+    const data = store.playback.shown();
+    const now = store.playback.nowMs();
+    if (store.playback.cursor.value === null)
+      for (const path of store.status.activePaths.value) {
         const state = data.states[path];
         if (state) this.diagram.updateBadge(path, state, now);
       }
-    if (cursor.value === null) this.diagram.paintCards(insideText);
-    if (numbers.value !== "none") this.#showNumbers();
+    if (store.playback.cursor.value === null) this.diagram.paintCards(insideText);
+    if (store.view.numbers.value !== "none") this.#showNumbers();
     this.#panels(performance.now());
   }
   /** Announce the running states to screen readers. */
   #announce(moment) {
     const region = document.getElementById("announced");
     if (!region || moment - this.announcedAt < ANNOUNCE_MS) return;
-    const names = activeLeaves.value.slice(0, 6).map(nameOf).join(", ");
-    const text2 = [runStatus.value.word, names].filter(Boolean).join(": ");
+    const names = store.status.activeLeaves.value.slice(0, 6).map((path) => store.data.nameOf(path)).join(", ");
+    const text2 = [store.status.runStatus.value.word, names].filter(Boolean).join(": ");
     if (region.textContent === text2) return;
     region.textContent = text2;
     this.announcedAt = moment;
@@ -7100,38 +7231,43 @@ var Page = class {
     this.diagram.paintNet(path, data.states[path]);
     if (!this.diagram.states.has(path)) return;
     const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
-    this.diagram.paint(path, data.states[path], now, goal, hasNoServer(goal));
+    this.diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
   }
   paintAll() {
     if (!this.diagram.size) return;
-    const data = shown();
-    const now = nowMs();
+    const data = store.playback.shown();
+    const now = store.playback.nowMs();
     const running = Object.values(data.goals).filter((goal) => goal.ended == null);
     const goals = new Map(running.map((goal) => [goal.path, goal]));
     for (const path of this.diagram.boxes.keys()) {
       const goal = goals.get(path);
-      this.diagram.paint(path, data.states[path], now, goal, hasNoServer(goal));
+      this.diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
     }
     for (const path of this.diagram.joins.keys()) this.diagram.paintJoins(path, data.states);
     this.diagram.paintCards(insideText);
     for (const path of this.diagram.boxes.keys()) this.diagram.paintNet(path, data.states[path]);
-    const stops = facts.value?.control?.breakpoints ?? [];
+    const stops = store.data.facts.value?.control?.breakpoints ?? [];
     const pathsOf = (some) => some.map(([path]) => path);
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
-    this.diagram.mark(selected.value ? [selected.value] : [], "selected");
-    this.diagram.showWay(wayShown.value);
+    this.diagram.mark(store.view.selected.value ? [store.view.selected.value] : [], "selected");
+    this.diagram.showWay(store.data.wayShown.value);
     this.#showNumbers();
   }
   /** Open the containers on the way to the end of the run, and highlight that way. */
   #showWay() {
-    const closed = wayShown.value.map(({ path }) => reveal(path)).some(Boolean);
+    const closed = store.data.wayShown.value.map(({ path }) => store.view.reveal(path)).some(Boolean);
     if (closed) this.relayout({ frame: true });
-    else if (this.diagram.size) this.diagram.showWay(wayShown.value);
+    else if (this.diagram.size) this.diagram.showWay(store.data.wayShown.value);
   }
   #showNumbers() {
-    const { numbers: numbers2, statistics: statistics2, model: model2 } = store_exports;
-    const { countOf: countOf2, heatOf } = numbersFor(numbers2.value, shown().states, statistics2.value, model2.value);
+    const { statistics, model } = store.data;
+    const { countOf: countOf2, heatOf } = numbersFor(
+      store.view.numbers.value,
+      store.playback.shown().states,
+      statistics.value,
+      model.value
+    );
     this.diagram.showNumbers(countOf2, heatOf);
   }
   // -- layout -------------------------------------------------------------------------------------
@@ -7159,46 +7295,46 @@ var Page = class {
       else if (frame) this.fit({ animate: false });
       const { dataset } = document.documentElement;
       dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
-      failure.value = null;
+      store.data.failure.value = null;
     } catch (error) {
       const text2 = `This machine could not be laid out: ${messageOf(error)}`;
       if (this.diagram.size)
-        notify(text2, "error");
-      else failure.value = text2;
+        store.view.notify(text2, "error");
+      else store.data.failure.value = text2;
       console.error(error);
     } finally {
       this.drawing = null;
     }
   }
   async #layoutOnce() {
-    const model2 = model.value;
-    if (!model2 || !this.layout) return;
+    const model = store.data.model.value;
+    if (!model || !this.layout) return;
     const begun = performance.now();
     if (this.afterLayout.frame) this.layout.choose(this.view.width / this.view.height);
     const progress = (done, all) => {
-      if (performance.now() - begun > SLOW_MS) laidOut.value = { done, all };
+      if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
-    let open = new Set(opened2.value).add(model2.root.path);
-    let result = await this.layout.run(model2.root, open, progress);
+    let open = new Set(store.view.opened.value).add(model.root.path);
+    let result = await this.layout.run(model.root, open, progress);
     if (this.afterLayout.frame === "follow")
       while (result && !isLegible(boxesOf(result), this.view)) {
         const less = oneLevelLess(open);
         if (!less) break;
         open = less;
-        opened2.value = less;
-        result = await this.layout.run(model2.root, less, progress);
+        store.view.opened.value = less;
+        result = await this.layout.run(model.root, less, progress);
       }
-    laidOut.value = null;
-    overview.value = Boolean(result?.isOverview);
+    store.view.laidOut.value = null;
+    store.view.overview.value = Boolean(result?.isOverview);
     this.layoutMs = performance.now() - begun;
-    if (!result || model2 !== model.value) return;
+    if (!result || model !== store.data.model.value) return;
     const anchor = this.#anchor();
-    this.diagram.draw(result, model2, problems.value);
+    this.diagram.draw(result, model, store.data.problems.value);
     this.#hold(anchor);
     this.paintAll();
     const size = this.diagram.size;
     const tooSmall = size !== null && this.view.scaleFor(size) < READABLE3;
-    if (this.afterLayout.frame === true && tooSmall && openOneLevelLess()) this.drawAgain = true;
+    if (this.afterLayout.frame === true && tooSmall && store.view.openOneLevelLess()) this.drawAgain = true;
   }
   /** Keep the state in the middle of the view at its place while a layout moves the others. */
   #anchor() {
@@ -7223,10 +7359,10 @@ var Page = class {
     if (box) this.view.frame(box, { margin: 110, most: Math.max(1, Math.min(this.view.k, 1.5)) });
   }
   #follow() {
-    if (!follow.value || this.drawing) return;
-    const open = containersToOpen(nowMs());
+    if (!store.view.follow.value || this.drawing) return;
+    const open = containersToOpen(store.playback.nowMs());
     if (!open) return;
-    opened2.value = open;
+    store.view.opened.value = open;
     this.relayout({ frame: "follow" });
   }
   /** Whether the page is just opening and the aspect of its view has changed much since the layout. */
@@ -7244,11 +7380,11 @@ var Page = class {
   // -- input --------------------------------------------------------------------------------------
   /** Set the state of the diagram that the pointer is on: its visit is highlighted everywhere. */
   #hover(path) {
-    if (path !== this.hovered) hoverAt(path);
+    if (path !== this.hovered) store.pointer.hoverAt(path);
     this.hovered = path;
   }
   select(path) {
-    selected.value = path;
+    store.view.selected.value = path;
     this.diagram.mark(path ? [path] : [], "selected");
     this.timeline.draw();
   }
@@ -7256,19 +7392,19 @@ var Page = class {
   goTo(path) {
     showPage("machine");
     this.select(path);
-    part.value = "machine";
-    if (reveal(path)) this.relayout({ focus: path });
+    store.view.part.value = "machine";
+    if (store.view.reveal(path)) this.relayout({ focus: path });
     else this.#focus(path);
   }
   /** Select the neighbour of the selected state in a direction. */
   selectNeighbour(dx, dy) {
-    const from = this.diagram.boxOf(selected.value);
+    const from = this.diagram.boxOf(store.view.selected.value);
     if (!from) return;
     const centre = (b3) => ({ x: b3.x + b3.w / 2, y: b3.y + Math.min(b3.h, 30) / 2 });
     const here = centre(from);
     let best = null;
     for (const [path, box] of this.diagram.boxes) {
-      if (path === selected.value) continue;
+      if (path === store.view.selected.value) continue;
       const there = centre(box);
       const along = (there.x - here.x) * dx + (there.y - here.y) * dy;
       const aside = Math.abs((there.x - here.x) * dy) + Math.abs((there.y - here.y) * dx);
@@ -7278,44 +7414,44 @@ var Page = class {
     if (best) this.select(best.path);
   }
   toggleSelected() {
-    this.#toggle(model.value?.get(selected.value));
+    this.#toggle(store.data.model.value?.get(store.view.selected.value));
   }
   /** Open or close a container, unless it is the root. */
   #toggle(node) {
-    if (overview.value && node) {
-      openAround(node);
+    if (store.view.overview.value && node) {
+      store.view.openAround(node);
       this.relayout({ focus: node.path });
       return;
     }
     if (!node?.children.length || !node.parent) return;
     this.toggled = node.path;
-    toggle(node.path);
+    store.view.toggle(node.path);
     this.relayout();
   }
   setFollow(on2) {
-    follow.value = on2;
+    store.view.follow.value = on2;
     restart();
     if (on2) this.#follow();
   }
   setDepth(levels) {
-    const model2 = model.value;
-    if (!model2) return;
-    follow.value = false;
-    setOpened(model2.toDepth(levels));
+    const model = store.data.model.value;
+    if (!model) return;
+    store.view.follow.value = false;
+    store.view.setOpened(model.toDepth(levels));
     this.relayout({ frame: true });
   }
   setImplicit(on2) {
-    setImplicit(on2);
+    store.view.setImplicit(on2);
     this.layout?.clear();
     this.relayout();
   }
   /** @param mode a key of statistics.MODES */
   setNumbers(mode) {
-    numbers.value = mode;
+    store.view.numbers.value = mode;
     this.#showNumbers();
   }
   setTheme(name) {
-    theme.value = name;
+    store.view.theme.value = name;
     applyTheme();
     this.#restyle();
   }
@@ -7407,8 +7543,8 @@ function decimal(text2) {
 }
 function time(text2) {
   if (/e/i.test(text2)) return decimal(text2);
-  const [whole2, part2 = ""] = text2.replace(/^[-+]/, "").split(".");
-  let total2 = BigInt(whole2 || "0") * 1000000000n + BigInt(part2.padEnd(9, "0").slice(0, 9));
+  const [whole2, part = ""] = text2.replace(/^[-+]/, "").split(".");
+  let total2 = BigInt(whole2 || "0") * 1000000000n + BigInt(part.padEnd(9, "0").slice(0, 9));
   if (text2.startsWith("-")) total2 = -total2;
   let secs = total2 / 1000000000n;
   let nsecs = total2 % 1000000000n;
@@ -7419,30 +7555,30 @@ function time(text2) {
   return `{secs: ${secs}, nsecs: ${nsecs}}`;
 }
 var quoted2 = (text2) => JSON.stringify(String(text2)).replace(UNPRINTABLE2, (c4) => `\\u${c4.charCodeAt(0).toString(16).padStart(4, "0")}`);
-function problemOf(problems2, path, field) {
-  const its = problems2.find((one) => one.path === path);
+function problemOf(problems, path, field) {
+  const its = problems.find((one) => one.path === path);
   if (its) return its.text;
-  const item = field && isOneText(field) && problems2.find((one) => one.path.startsWith(`${path}[`));
+  const item = field && isOneText(field) && problems.find((one) => one.path.startsWith(`${path}[`));
   return item ? `item ${Number(item.path.slice(path.length + 1, -1)) + 1}: ${item.text}` : null;
 }
-function problemsWithoutField(problems2, fields2, state) {
-  const shown2 = /* @__PURE__ */ new Set();
+function problemsWithoutField(problems, fields2, state) {
+  const shown = /* @__PURE__ */ new Set();
   const texts = [];
   const visit = (some, values, path) => {
     for (const field of some) {
       const at = `${path}.${field.name}`;
-      shown2.add(at);
+      shown.add(at);
       if (isOneText(field)) texts.push(`${at}[`);
       else if (field.array)
         for (const [i4, item] of listIn(values[field.name]).entries()) {
-          shown2.add(`${at}[${i4}]`);
+          shown.add(`${at}[${i4}]`);
           if (field.kind === "message") visit(field.fields ?? [], treeIn(item), `${at}[${i4}]`);
         }
       else if (field.kind === "message") visit(field.fields ?? [], treeIn(values[field.name]), at);
     }
   };
   visit(fields2, state, "$");
-  return problems2.filter(({ path }) => !shown2.has(path) && !texts.some((start) => path.startsWith(start)));
+  return problems.filter(({ path }) => !shown.has(path) && !texts.some((start) => path.startsWith(start)));
 }
 function problemText(text2, value) {
   if (!text2.endsWith("got str")) return text2;
@@ -7475,7 +7611,7 @@ var Section = ({
   ] }),
   children
 ] });
-var StateLink = ({ path, page: page2, tabindex }) => /* @__PURE__ */ a4("button", { class: "link", tabindex, title: shorten(path, 400), onClick: () => page2.goTo(path), children: nameOf(path) });
+var StateLink = ({ path, page: page2, tabindex }) => /* @__PURE__ */ a4("button", { class: "link", tabindex, title: shorten(path, 400), onClick: () => page2.goTo(path), children: store.data.nameOf(path) });
 var More = ({ left, onMore }) => left > 0 ? /* @__PURE__ */ a4("button", { class: "small", onClick: onMore, children: [
   "and ",
   left.toLocaleString("en"),
@@ -7531,7 +7667,7 @@ function Fields({
   return /* @__PURE__ */ a4($, { children: fields2.map((field) => /* @__PURE__ */ a4(Field, { field, path: `${path}.${field.name}`, ...shared }, field.name)) });
 }
 function Field({ field, state, ...shared }) {
-  const { path, problems: problems2, onChange } = shared;
+  const { path, problems, onChange } = shared;
   const value = state[field.name];
   const put2 = (changed) => {
     state[field.name] = changed;
@@ -7539,20 +7675,20 @@ function Field({ field, state, ...shared }) {
   };
   if (field.array && !isOneText(field)) return /* @__PURE__ */ a4(Rows, { field, value: listIn(value), put: put2, ...shared });
   if (field.kind === "message") return /* @__PURE__ */ a4(Group, { field, name: field.name, state: treeIn(value), ...shared });
-  const problem2 = problemOf(problems2, path, field);
-  return /* @__PURE__ */ a4("div", { class: `field ${problem2 ? "bad" : ""}`, children: [
+  const problem = problemOf(problems, path, field);
+  return /* @__PURE__ */ a4("div", { class: `field ${problem ? "bad" : ""}`, children: [
     /* @__PURE__ */ a4("label", { for: path, children: field.name }),
     /* @__PURE__ */ a4(Type, { field }),
-    /* @__PURE__ */ a4(Input, { field, value, put: put2, bad: Boolean(problem2), ...shared }),
+    /* @__PURE__ */ a4(Input, { field, value, put: put2, bad: Boolean(problem), ...shared }),
     /* @__PURE__ */ a4(Comment, { field, path }),
-    /* @__PURE__ */ a4(Problem, { path, text: problem2 && problemText(problem2, value) })
+    /* @__PURE__ */ a4(Problem, { path, text: problem && problemText(problem, value) })
   ] });
 }
 var Type = ({ field }) => /* @__PURE__ */ a4("span", { class: "type", children: field.type });
 function Comment({ field, path }) {
   const unit = { time: "seconds, or now", duration: "seconds" }[field.base];
-  const notes2 = [field.comment, isOneText(field) && "separated by commas", unit].filter(Boolean);
-  return notes2.length ? /* @__PURE__ */ a4("small", { class: "comment", id: `${path}?`, children: notes2.join("; ") }) : null;
+  const notes = [field.comment, isOneText(field) && "separated by commas", unit].filter(Boolean);
+  return notes.length ? /* @__PURE__ */ a4("small", { class: "comment", id: `${path}?`, children: notes.join("; ") }) : null;
 }
 var Problem = ({ path, text: text2 }) => text2 ? /* @__PURE__ */ a4("p", { class: "problem", id: `${path}!`, children: text2 }) : null;
 function Input({
@@ -7654,7 +7790,7 @@ function Rows({
   put: put2,
   ...shared
 }) {
-  const { path, problems: problems2, disabled } = shared;
+  const { path, problems, disabled } = shared;
   const isFixed = field.array?.length != null;
   const add = () => put2([...value, field.kind === "message" ? toState(field.fields ?? [], field.default ?? {}) : ""]);
   const remove = (i4) => /* @__PURE__ */ a4(
@@ -7675,12 +7811,12 @@ function Rows({
     const after = isFixed ? null : remove(i4);
     if (field.kind === "message")
       return /* @__PURE__ */ a4(Group, { field: inner, name, state: treeIn(item), after, ...at }, i4);
-    const problem2 = problemOf(problems2, at.path);
+    const problem = problemOf(problems, at.path);
     const putItem = (text2) => put2(value.map((old, n3) => n3 === i4 ? text2 : old));
-    return /* @__PURE__ */ a4("div", { class: `field row-field ${problem2 ? "bad" : ""}`, children: [
-      /* @__PURE__ */ a4(Input, { field: inner, value: item, bad: Boolean(problem2), label: name, put: putItem, ...at }),
+    return /* @__PURE__ */ a4("div", { class: `field row-field ${problem ? "bad" : ""}`, children: [
+      /* @__PURE__ */ a4(Input, { field: inner, value: item, bad: Boolean(problem), label: name, put: putItem, ...at }),
       after,
-      /* @__PURE__ */ a4(Problem, { path: at.path, text: problem2 })
+      /* @__PURE__ */ a4(Problem, { path: at.path, text: problem })
     ] }, i4);
   };
   return /* @__PURE__ */ a4("fieldset", { class: "group-field rows-field", children: [
@@ -7690,7 +7826,7 @@ function Rows({
       /* @__PURE__ */ a4(Type, { field })
     ] }),
     field.comment && /* @__PURE__ */ a4("small", { class: "comment", children: field.comment }),
-    /* @__PURE__ */ a4(Problem, { path, text: problemOf(problems2, path) }),
+    /* @__PURE__ */ a4(Problem, { path, text: problemOf(problems, path) }),
     value.map(row),
     !isFixed && /* @__PURE__ */ a4("button", { type: "button", class: "small", disabled: disabled || value.length >= MOST_ROWS2, onClick: add, children: [
       "+ ",
@@ -7704,16 +7840,16 @@ var TABS = ["form", "yaml"];
 var MOST_LINES2 = 40;
 function GoalForm({ name, server }) {
   const [definition, setDefinition] = d2(null);
-  const [failure3, setFailure] = d2(null);
+  const [failure2, setFailure] = d2(null);
   const [tab, setTab] = d2("form");
   const [state, setState] = d2({});
   const [yaml, setYaml] = d2("");
-  const [problems2, setProblems] = d2([]);
+  const [problems, setProblems] = d2([]);
   const [, redraw] = d2(0);
   const [busy, setBusy] = d2(false);
   const box = T2(null);
   const type = server?.type ?? definition?.type;
-  const why2 = refusal();
+  const why = refusal();
   const begin = (from) => {
     setState(toState(from.fields, from.values));
     setYaml(from.yaml);
@@ -7748,12 +7884,12 @@ function GoalForm({ name, server }) {
       ] }),
       " on the network: it has left or died. The form stays; you can send it when the server is back."
     ] }),
-    why2 && /* @__PURE__ */ a4("p", { class: "banner-line preempted", role: "note", id: "why", children: why2 })
+    why && /* @__PURE__ */ a4("p", { class: "banner-line preempted", role: "note", id: "why", children: why })
   ] });
-  if (failure3)
+  if (failure2)
     return /* @__PURE__ */ a4($, { children: [
       head2,
-      /* @__PURE__ */ a4("pre", { class: "error", role: "alert", children: failure3 })
+      /* @__PURE__ */ a4("pre", { class: "error", role: "alert", children: failure2 })
     ] });
   if (!definition)
     return /* @__PURE__ */ a4($, { children: [
@@ -7768,7 +7904,7 @@ function GoalForm({ name, server }) {
   };
   const turnTo = async (other) => {
     if (other === tab) return;
-    if (!why2 && server) {
+    if (!why && server) {
       const answer = await askAction({ command: "check", name, yaml: text2() });
       if (!answer.ok) {
         refuse(answer);
@@ -7779,14 +7915,14 @@ function GoalForm({ name, server }) {
     setTab(other);
   };
   const send = async () => {
-    if (why2 || !server || busy) return;
+    if (why || !server || busy) return;
     setBusy(true);
     const answer = await askAction({ command: "send", name, yaml: text2() });
     setBusy(false);
     if (!answer.ok) refuse(answer);
     else {
       setProblems([]);
-      notify(`goal sent to /${name}`);
+      store.view.notify(`goal sent to /${name}`);
     }
   };
   const onKeyDown = (e4) => {
@@ -7814,13 +7950,13 @@ function GoalForm({ name, server }) {
       children: one === "form" ? "Form" : "YAML"
     }
   );
-  const listed2 = tab === "form" ? problemsWithoutField(problems2, fields2, state) : problems2;
+  const listed2 = tab === "form" ? problemsWithoutField(problems, fields2, state) : problems;
   return /* @__PURE__ */ a4("div", { class: "goal-form", ref: box, onKeyDown, children: [
     head2,
     /* @__PURE__ */ a4("div", { class: "tabs", role: "tablist", "aria-label": "how to write the goal", children: [
       TABS.map(tabButton),
       /* @__PURE__ */ a4("span", { class: "spread" }),
-      /* @__PURE__ */ a4("button", { type: "button", disabled: Boolean(why2), onClick: () => begin(definition), children: "Defaults" })
+      /* @__PURE__ */ a4("button", { type: "button", disabled: Boolean(why), onClick: () => begin(definition), children: "Defaults" })
     ] }),
     /* @__PURE__ */ a4(ProblemList, { problems: listed2 }),
     /* @__PURE__ */ a4("div", { id: "goal-text", role: "tabpanel", "aria-labelledby": `tab-${tab}`, children: tab === "form" ? /* @__PURE__ */ a4($, { children: [
@@ -7829,13 +7965,13 @@ function GoalForm({ name, server }) {
         {
           fields: fields2,
           state,
-          problems: problems2,
-          disabled: Boolean(why2),
+          problems,
+          disabled: Boolean(why),
           onChange: () => redraw((n3) => n3 + 1)
         }
       ),
       !fields2.length && /* @__PURE__ */ a4("p", { class: "hint", children: "This goal has no fields." })
-    ] }) : /* @__PURE__ */ a4(YamlText, { yaml, invalid: problems2.length > 0, readonly: Boolean(why2), onChange: setYaml }) }),
+    ] }) : /* @__PURE__ */ a4(YamlText, { yaml, invalid: problems.length > 0, readonly: Boolean(why), onChange: setYaml }) }),
     /* @__PURE__ */ a4("div", { class: "send-line", children: [
       /* @__PURE__ */ a4(
         "button",
@@ -7843,18 +7979,18 @@ function GoalForm({ name, server }) {
           type: "button",
           id: "send-goal",
           class: "primary",
-          disabled: Boolean(why2) || !server || busy,
-          "aria-describedby": why2 ? "why" : void 0,
+          disabled: Boolean(why) || !server || busy,
+          "aria-describedby": why ? "why" : void 0,
           onClick: send,
           children: busy ? "Sending…" : "Send goal"
         }
       ),
-      !why2 && /* @__PURE__ */ a4("small", { class: "hint", children: "or Ctrl+Enter" })
+      !why && /* @__PURE__ */ a4("small", { class: "hint", children: "or Ctrl+Enter" })
     ] })
   ] });
 }
 var focusIn = (box, selector) => box?.querySelector(selector)?.focus();
-var ProblemList = ({ problems: problems2 }) => problems2.length ? /* @__PURE__ */ a4("ul", { class: "error problem-list", role: "alert", children: problems2.map((one) => /* @__PURE__ */ a4("li", { children: [
+var ProblemList = ({ problems }) => problems.length ? /* @__PURE__ */ a4("ul", { class: "error problem-list", role: "alert", children: problems.map((one) => /* @__PURE__ */ a4("li", { children: [
   one.path && /* @__PURE__ */ a4("code", { children: one.path }),
   " ",
   one.text
@@ -7881,7 +8017,7 @@ function YamlText({
   );
 }
 function refusal() {
-  if (!settings.value.control)
+  if (!store.data.settings.value.control)
     return /* @__PURE__ */ a4($, { children: [
       "This viewer sends no commands. To send goals, start it with ",
       /* @__PURE__ */ a4("code", { children: "smachpy view --control" }),
@@ -7893,7 +8029,7 @@ function refusal() {
       /* @__PURE__ */ a4("code", { children: "smachpy" }),
       " printed."
     ] });
-  return connection.value !== "live" ? "The viewer's server does not answer; nothing can be sent." : null;
+  return store.data.connection.value !== "live" ? "The viewer's server does not answer; nothing can be sent." : null;
 }
 
 // src/panels/goals.tsx
@@ -7906,12 +8042,12 @@ function Goals({ page: page2, data, now }) {
   const goals = Object.entries(data.goals).sort(([, a5], [, b3]) => (b3.ended ?? b3.since) - (a5.ended ?? a5.since));
   const running = goals.filter(([, goal]) => goal.ended == null).slice(0, MOST2);
   const ended = goals.filter(([, goal]) => goal.ended != null && (all || now - goal.ended / 1e6 < RECENT_MS));
-  const shown2 = all ? ended : ended.slice(0, MOST_ENDED);
-  const left = goals.filter(([, goal]) => goal.ended != null).length - shown2.length;
+  const shown = all ? ended : ended.slice(0, MOST_ENDED);
+  const left = goals.filter(([, goal]) => goal.ended != null).length - shown.length;
   return /* @__PURE__ */ a4(Section, { title: "Goals", children: [
     !goals.length && /* @__PURE__ */ a4("p", { class: "hint", children: "none" }),
     running.map(([id, goal]) => /* @__PURE__ */ a4(Goal, { id, goal, now, page: page2 }, id)),
-    shown2.map(([id, goal]) => /* @__PURE__ */ a4(EndedGoal, { id, goal, page: page2 }, id)),
+    shown.map(([id, goal]) => /* @__PURE__ */ a4(EndedGoal, { id, goal, page: page2 }, id)),
     left > 0 && /* @__PURE__ */ a4("button", { class: "small", onClick: () => setAll(true), children: [
       left,
       " earlier"
@@ -7950,9 +8086,9 @@ function EndedGoal({ id, goal, page: page2 }) {
   ] });
 }
 function Goal({ id, goal, now, page: page2 }) {
-  const waits = hasNoServer(goal);
+  const waits = store.status.hasNoServer(goal);
   const kind = waits ? "waiting" : "active";
-  const part2 = goal.progress?.fraction ?? null;
+  const part = goal.progress?.fraction ?? null;
   const took = duration((now - goal.since / 1e6) / 1e3);
   return /* @__PURE__ */ a4("div", { ...linked(goal, `goal ${kind}`), title: id, children: [
     /* @__PURE__ */ a4("div", { class: "head", children: [
@@ -7963,13 +8099,13 @@ function Goal({ id, goal, now, page: page2 }) {
         took
       ] })
     ] }),
-    /* @__PURE__ */ a4(ProgressBar, { part: part2, ended: false }),
+    /* @__PURE__ */ a4(ProgressBar, { part, ended: false }),
     /* @__PURE__ */ a4("div", { class: "text", children: [
       /* @__PURE__ */ a4(Pill, { kind, children: waits ? "no server seen" : "active" }),
       " ",
       goal.text || progressText(goal.progress),
-      part2 !== null && /* @__PURE__ */ a4("span", { class: "times", children: [
-        Math.round(part2 * 100),
+      part !== null && /* @__PURE__ */ a4("span", { class: "times", children: [
+        Math.round(part * 100),
         " %"
       ] })
     ] }),
@@ -7977,24 +8113,24 @@ function Goal({ id, goal, now, page: page2 }) {
   ] });
 }
 var linked = (goal, kind) => ({
-  ...hoverHandlers(goal.path, goal.since / 1e6),
-  class: `${kind} ${isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`
+  ...store.pointer.hoverHandlers(goal.path, goal.since / 1e6),
+  class: `${kind} ${store.pointer.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`
 });
 var progressText = (progress) => {
   const distance = progress?.distance != null ? `${progress.distance.toFixed(2)} m left` : "";
   return [distance, progress?.text].filter(Boolean).join(" · ");
 };
-function ProgressBar({ part: part2, ended }) {
-  const percent = Math.round((part2 ?? (ended ? 1 : 0)) * 100);
+function ProgressBar({ part, ended }) {
+  const percent = Math.round((part ?? (ended ? 1 : 0)) * 100);
   return /* @__PURE__ */ a4(
     "div",
     {
-      class: `bar ${part2 === null && !ended ? "unknown" : ""}`,
+      class: `bar ${part === null && !ended ? "unknown" : ""}`,
       role: "progressbar",
       "aria-label": "progress",
       "aria-valuemin": 0,
       "aria-valuemax": 100,
-      "aria-valuenow": part2 === null ? void 0 : percent,
+      "aria-valuenow": part === null ? void 0 : percent,
       children: /* @__PURE__ */ a4("i", { style: { width: `${percent}%` } })
     }
   );
@@ -8020,69 +8156,69 @@ var ARROWS = {
   ArrowDown: [0, 1]
 };
 function jumpToChange(step) {
-  const key = followedKey.value ?? [...marks.keys].sort()[0];
-  if (key !== void 0) jump(`key ${key}`, step);
+  const key = store.playback.followedKey.value ?? [...store.data.marks.keys].sort()[0];
+  if (key !== void 0) store.playback.jump(`key ${key}`, step);
 }
 function togglePage(name) {
-  if (pageShown.value !== name) showPage(name);
-  else if (model.value || name !== "runs") showPage("machine");
+  if (store.view.pageShown.value !== name) showPage(name);
+  else if (store.data.model.value || name !== "runs") showPage("machine");
 }
 function listenToKeys(page2) {
-  const actions2 = {
+  const actions = {
     "/": () => document.getElementById("search")?.focus(),
     0: () => page2.refit(),
-    f: () => jump("kind failure", 1),
-    F: () => jump("kind failure", -1),
-    p: () => jump("kind preempt", 1),
-    P: () => jump("kind preempt", -1),
-    g: () => jump("kind goal", 1),
-    G: () => jump("kind goal", -1),
+    f: () => store.playback.jump("kind failure", 1),
+    F: () => store.playback.jump("kind failure", -1),
+    p: () => store.playback.jump("kind preempt", 1),
+    P: () => store.playback.jump("kind preempt", -1),
+    g: () => store.playback.jump("kind goal", 1),
+    G: () => store.playback.jump("kind goal", -1),
     k: () => jumpToChange(1),
     K: () => jumpToChange(-1),
-    Home: () => seek(run.first()),
+    Home: () => store.playback.seek(store.data.run.first()),
     End: () => page2.timeline.live(),
     m: () => {
-      part.value = "map";
+      store.view.part.value = "map";
       page2.map.canvas.focus();
     },
-    r: () => toggleLoop(),
-    "[": () => moveStretch("from"),
-    "]": () => moveStretch("to"),
-    c: () => setClock(CLOCKS[(CLOCKS.indexOf(clock.value) + 1) % CLOCKS.length]),
+    r: () => store.playback.toggleLoop(),
+    "[": () => store.playback.moveStretch("from"),
+    "]": () => store.playback.moveStretch("to"),
+    c: () => store.clock.choose(CLOCKS[(CLOCKS.indexOf(store.clock.chosen.value) + 1) % CLOCKS.length]),
     w: () => showWhy(),
-    n: () => askForNote(),
+    n: () => store.notes.begin(),
     t: () => {
-      treeOpen.value = !treeOpen.value;
+      store.view.treeOpen.value = !store.view.treeOpen.value;
     },
-    o: () => page2.setFollow(!follow.value),
+    o: () => page2.setFollow(!store.view.follow.value),
     "+": () => page2.view.zoom(1.25),
     "=": () => page2.view.zoom(1.25),
     "-": () => page2.view.zoom(0.8),
-    ",": () => seekEvent(-1),
-    ".": () => seekEvent(1),
+    ",": () => store.playback.seekEvent(-1),
+    ".": () => store.playback.seekEvent(1),
     l: () => page2.timeline.live(),
-    i: () => page2.setImplicit(!implicit.value),
+    i: () => page2.setImplicit(!store.view.implicit.value),
     h: () => isFile() || togglePage("runs"),
     a: () => isFile() || togglePage("actions"),
     d: () => page2.setTheme(isDark() ? "light" : "dark"),
     "?": () => {
-      help.value = !help.value;
+      store.view.help.value = !store.view.help.value;
     },
     Enter: () => page2.toggleSelected(),
     Escape: () => {
       if (confirmation.value) confirmation.value = null;
-      else if (help.value) help.value = false;
-      else if (simulateOpen.value) simulateOpen.value = false;
-      else if (noteAt.value !== null) noteAt.value = null;
-      else if (tokenAsked.value) tokenAsked.value = false;
-      else if (pageShown.value !== "machine") togglePage(pageShown.value);
-      else if (treeOpen.value) treeOpen.value = false;
-      else if (stretch.value) selectStretch(0);
+      else if (store.view.help.value) store.view.help.value = false;
+      else if (store.view.simulateOpen.value) store.view.simulateOpen.value = false;
+      else if (store.notes.writtenAt.value !== null) store.notes.writtenAt.value = null;
+      else if (store.view.tokenAsked.value) store.view.tokenAsked.value = false;
+      else if (store.view.pageShown.value !== "machine") togglePage(store.view.pageShown.value);
+      else if (store.view.treeOpen.value) store.view.treeOpen.value = false;
+      else if (store.playback.stretch.value) store.playback.selectStretch(0);
       else page2.select(null);
     },
     " ": () => {
       const paused = control()?.paused;
-      if (paused === void 0 || cursor.value !== null) togglePlaying();
+      if (paused === void 0 || store.playback.cursor.value !== null) store.playback.togglePlaying();
       else command(paused ? "resume" : "pause");
     },
     s: () => control() && command("step")
@@ -8094,25 +8230,25 @@ function listenToKeys(page2) {
   document.addEventListener("keydown", (e4) => {
     const target = e4.target;
     if ((e4.ctrlKey || e4.metaKey) && e4.key.toLowerCase() === "k" && !document.querySelector("dialog[open]")) {
-      paletteOpen.value = true;
+      store.view.paletteOpen.value = true;
       e4.preventDefault();
       return;
     }
-    if (e4.ctrlKey || e4.metaKey || e4.altKey || paletteOpen.value) return;
+    if (e4.ctrlKey || e4.metaKey || e4.altKey || store.view.paletteOpen.value) return;
     if (["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName)) {
       if (e4.key === "Escape") target.blur();
       return;
     }
     if ((e4.key === "Enter" || e4.key === " ") && target.closest(PRESSED)) return;
     if (document.querySelector("dialog[open]") && e4.key !== "Escape" && e4.key !== "?") return;
-    if (!shortcuts.value && e4.key !== "Escape") return;
-    if (pageShown.value !== "machine" && !ON_OTHERS.includes(e4.key)) return;
+    if (!store.view.shortcuts.value && e4.key !== "Escape") return;
+    if (store.view.pageShown.value !== "machine" && !ON_OTHERS.includes(e4.key)) return;
     if (e4.key in ARROWS) {
       const [dx, dy] = ARROWS[e4.key];
-      if (selected.value && !e4.shiftKey) page2.selectNeighbour(dx, dy);
+      if (store.view.selected.value && !e4.shiftKey) page2.selectNeighbour(dx, dy);
       else page2.view.pan(-dx * STEP, -dy * STEP);
     } else if (/^[1-9]$/.test(e4.key)) page2.setDepth(Number(e4.key));
-    else if (Object.hasOwn(actions2, e4.key)) actions2[e4.key]();
+    else if (Object.hasOwn(actions, e4.key)) actions[e4.key]();
     else return;
     e4.preventDefault();
   });
@@ -8127,8 +8263,8 @@ var CANCELLING = {
 var GOALS_MS = 2e3;
 function ActionsButton({ id }) {
   if (isFile()) return null;
-  const open = pageShown.value === "actions";
-  const running = (actions.value?.goals ?? []).filter((goal) => goal.ended == null).length;
+  const open = store.view.pageShown.value === "actions";
+  const running = (store.data.actions.value?.goals ?? []).filter((goal) => goal.ended == null).length;
   return /* @__PURE__ */ a4(
     "button",
     {
@@ -8144,22 +8280,22 @@ function ActionsButton({ id }) {
     }
   );
 }
-var ActionsPage = () => pageShown.value === "actions" ? /* @__PURE__ */ a4(OpenPage, {}) : null;
+var ActionsPage = () => store.view.pageShown.value === "actions" ? /* @__PURE__ */ a4(OpenPage, {}) : null;
 function OpenPage() {
-  const actions2 = actions.value?.actions ?? [];
-  const chosen2 = chosenAction.value ?? actions2[0]?.name ?? null;
+  const actions = store.data.actions.value?.actions ?? [];
+  const chosen2 = store.view.chosenAction.value ?? actions[0]?.name ?? null;
   const heading = T2(null);
   A2(() => heading.current?.focus(), []);
-  const isAway = chosen2 !== null && !actions2.some((one) => one.name === chosen2);
-  const listed2 = isAway ? [...actions2, { name: chosen2 }] : actions2;
-  const server = actions2.find((one) => one.name === chosen2);
+  const isAway = chosen2 !== null && !actions.some((one) => one.name === chosen2);
+  const listed2 = isAway ? [...actions, { name: chosen2 }] : actions;
+  const server = actions.find((one) => one.name === chosen2);
   return /* @__PURE__ */ a4("section", { class: "actions-page", "aria-labelledby": "actions-title", children: [
     /* @__PURE__ */ a4("nav", { class: "action-list", "aria-label": "actions on the network", children: [
       /* @__PURE__ */ a4("h2", { id: "actions-title", tabindex: -1, ref: heading, children: [
         "Actions ",
-        /* @__PURE__ */ a4("span", { class: "number", children: actions2.length })
+        /* @__PURE__ */ a4("span", { class: "number", children: actions.length })
       ] }),
-      !actions2.length && /* @__PURE__ */ a4("p", { class: "hint", children: "No action server on the network yet. This list shows each as soon as it runs." }),
+      !actions.length && /* @__PURE__ */ a4("p", { class: "hint", children: "No action server on the network yet. This list shows each as soon as it runs." }),
       /* @__PURE__ */ a4("ul", { children: listed2.map((one) => /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4(Choice, { one, on: one.name === chosen2 }) }, one.name)) })
     ] }),
     /* @__PURE__ */ a4("div", { class: "goal-pane", children: chosen2 !== null && /* @__PURE__ */ a4(GoalForm, { name: chosen2, server }, chosen2) }),
@@ -8173,7 +8309,7 @@ function Choice({ one, on: on2 }) {
   const more = (one.servers ?? 1) - 1;
   const rivals = more > 0 ? ` and ${more} more: several servers have this name` : "";
   const onClick = () => {
-    chosenAction.value = one.name ?? null;
+    store.view.chosenAction.value = one.name ?? null;
   };
   return /* @__PURE__ */ a4("button", { class: `action ${on2 ? "on" : ""}`, "aria-current": on2, onClick, children: [
     /* @__PURE__ */ a4("b", { children: [
@@ -8190,8 +8326,8 @@ function Choice({ one, on: on2 }) {
 }
 function ServerGoals({ name }) {
   const [goals, setGoals] = d2([]);
-  const [problem2, setProblem] = d2("");
-  const own2 = new Set(actions.value?.goals.map((goal) => goal.id));
+  const [problem, setProblem] = d2("");
+  const own2 = new Set(store.data.actions.value?.goals.map((goal) => goal.id));
   A2(() => {
     let open = true;
     const read = async () => {
@@ -8215,16 +8351,16 @@ function ServerGoals({ name }) {
       goal.mission ? "Its mission goes on with the transition for a cancelled goal." : "",
       goal.gone ? "Its program is gone: nobody else can cancel it." : "Its program is told, and may send another."
     ],
-    situation: () => JSON.stringify([pageShown.value, connection.value]),
+    situation: () => JSON.stringify([store.view.pageShown.value, store.data.connection.value]),
     give: async () => {
       const answer = await askAction({ command: "cancel", name, goal: goal.id });
-      notify(
+      store.view.notify(
         answer.ok ? `goal ${goal.id}: asked to cancel` : answer.text ?? "refused",
         answer.ok ? "info" : "error"
       );
     }
   });
-  if (!others.length && !problem2) return null;
+  if (!others.length && !problem) return null;
   return /* @__PURE__ */ a4("section", { "aria-label": `goals of others to /${name}`, children: [
     /* @__PURE__ */ a4("h2", { children: [
       "Goals of others to /",
@@ -8232,7 +8368,7 @@ function ServerGoals({ name }) {
       " ",
       /* @__PURE__ */ a4("span", { class: "number", children: others.length || "" })
     ] }),
-    problem2 && /* @__PURE__ */ a4("p", { class: "hint", children: problem2 }),
+    problem && /* @__PURE__ */ a4("p", { class: "hint", children: problem }),
     others.map((goal) => /* @__PURE__ */ a4("article", { class: `goal sent ${goal.gone ? "waiting" : "active"}`, children: [
       /* @__PURE__ */ a4("div", { class: "head", children: [
         /* @__PURE__ */ a4("b", { children: senderText(goal) }),
@@ -8250,8 +8386,8 @@ function ServerGoals({ name }) {
 }
 var senderText = (goal) => shorten(goal.mission || (goal.sender ? `node /${goal.sender}` : "an unknown client"), 80);
 function SentGoals() {
-  const goals = actions.value?.goals ?? [];
-  tick.value;
+  const goals = store.data.actions.value?.goals ?? [];
+  store.playback.tick.value;
   return /* @__PURE__ */ a4("section", { "aria-label": "goals sent from here", children: [
     /* @__PURE__ */ a4("h2", { children: [
       "Goals sent from here ",
@@ -8272,13 +8408,13 @@ function statusOf2(goal) {
 function Goal2({ goal }) {
   const ended = goal.ended != null;
   const { kind, text: text2 } = statusOf2(goal);
-  const part2 = goal.status === "SUCCEEDED" ? 1 : goal.fraction;
+  const part = goal.status === "SUCCEEDED" ? 1 : goal.fraction;
   const until = goal.ended != null ? goal.ended / 1e6 : Date.now();
   const took = duration(Math.max(0, until - goal.sent / 1e6) / 1e3);
   const distance = goal.distance != null && !ended ? `${goal.distance.toFixed(2)} m left` : "";
   const cancel = async () => {
     const answer = await askAction({ command: "cancel", goal: goal.id });
-    if (!answer.ok) notify(answer.text ?? "refused", "error");
+    if (!answer.ok) store.view.notify(answer.text ?? "refused", "error");
   };
   return /* @__PURE__ */ a4("article", { class: `goal sent ${kind}`, "aria-label": `goal to /${goal.action}, ${text2}`, children: [
     /* @__PURE__ */ a4("div", { class: "head", children: [
@@ -8288,14 +8424,14 @@ function Goal2({ goal }) {
       ] }),
       /* @__PURE__ */ a4("span", { class: "times", children: took })
     ] }),
-    /* @__PURE__ */ a4(ProgressBar, { part: part2, ended }),
+    /* @__PURE__ */ a4(ProgressBar, { part, ended }),
     /* @__PURE__ */ a4("div", { class: "text", children: [
       /* @__PURE__ */ a4("span", { class: `pill-text ${kind}`, role: "status", children: text2 }),
       " ",
       goal.status === "LOST" && "The server of this goal is gone; how the goal ended is not known. ",
       [goal.text, distance].filter(Boolean).join(" · "),
-      part2 !== null && !ended && /* @__PURE__ */ a4("span", { class: "times", children: [
-        Math.round(part2 * 100),
+      part !== null && !ended && /* @__PURE__ */ a4("span", { class: "times", children: [
+        Math.round(part * 100),
         " %"
       ] })
     ] }),
@@ -8321,14 +8457,14 @@ function Command({
   onClick,
   children,
   title,
-  why: why2 = null,
+  why = null,
   class: name = "",
   ...more
 }) {
-  const reason = whyDisarmed.value ?? why2;
+  const reason = store.status.whyDisarmed.value ?? why;
   const mine = sent.value?.key === does ? sent.value : null;
   const state = mine && (mine.failure === null ? "sent" : "failed");
-  const refuse = () => notify(reason ?? "", "error");
+  const refuse = () => store.view.notify(reason ?? "", "error");
   return /* @__PURE__ */ a4(
     "button",
     {
@@ -8343,11 +8479,11 @@ function Command({
   );
 }
 function OperatorBar() {
-  tick.value;
-  const facts2 = control();
-  if (!facts2 || pageShown.value !== "machine") return null;
-  const { paused } = facts2;
-  if (run.now.ended != null && !paused) return null;
+  store.playback.tick.value;
+  const facts = control();
+  if (!facts || store.view.pageShown.value !== "machine") return null;
+  const { paused } = facts;
+  if (store.data.run.now.ended != null && !paused) return null;
   const target = targetText();
   return /* @__PURE__ */ a4("div", { class: "operator", role: "toolbar", "aria-label": `commands to ${target}`, children: [
     /* @__PURE__ */ a4(
@@ -8387,7 +8523,7 @@ function OperatorBar() {
       {
         id: "preempt",
         class: "warn",
-        does: keyOf("preempt", model.value?.root.path),
+        does: keyOf("preempt", store.data.model.value?.root.path),
         title: `Preempt ${target}`,
         onClick: () => askForPreempt(target),
         children: /* @__PURE__ */ a4("span", { children: [
@@ -8399,8 +8535,8 @@ function OperatorBar() {
   ] });
 }
 function askForPause(target) {
-  const path = model.value?.root.path ?? "";
-  const machine = facts.value?.name;
+  const path = store.data.model.value?.root.path ?? "";
+  const machine = store.data.facts.value?.name;
   askFirst({
     title: `Pause ${target} now?`,
     yes: "Pause now",
@@ -8410,8 +8546,8 @@ function askForPause(target) {
   });
 }
 function askForPreempt(target) {
-  const path = model.value?.root.path ?? "";
-  const machine = facts.value?.name;
+  const path = store.data.model.value?.root.path ?? "";
+  const machine = store.data.facts.value?.name;
   askFirst({
     title: `Preempt ${target}?`,
     yes: "Preempt",
@@ -8421,7 +8557,7 @@ function askForPreempt(target) {
   });
 }
 function ConfirmationSheet() {
-  tick.value;
+  store.playback.tick.value;
   const box = T2(null);
   const before = T2(null);
   const given = confirmation.value;
@@ -8484,7 +8620,7 @@ function StateControls({ node, state }) {
   const breakpoints = control()?.breakpoints;
   if (!breakpoints) return null;
   const { path, parent } = node;
-  const [machine, target] = [facts.value?.name, targetText()];
+  const [machine, target] = [store.data.facts.value?.name, targetText()];
   const ask2 = (name, title, yes, within3, end, more = { path }) => askFirst({
     title,
     yes,
@@ -8504,7 +8640,7 @@ function StateControls({ node, state }) {
   const stops = breakpoints.some(([at, after]) => at === path && after === null);
   const chosen2 = node.outcomes.includes(outcome) ? outcome : node.outcomes[0];
   const canJump = parent && parent.kind !== "concurrence";
-  const jump2 = () => parent && ask2("jump", `Continue ${target} at ${node.name}?`, "Jump", parent.path, `They end, and ${node.name} begins.`);
+  const jump = () => parent && ask2("jump", `Continue ${target} at ${node.name}?`, "Jump", parent.path, `They end, and ${node.name} begins.`);
   const preempt = () => ask2("preempt", `Preempt ${node.name} of ${target}?`, "Preempt", path, "The mission goes on with its transition.");
   const force = () => ask2("force", `End ${node.name} of ${target} with ${chosen2}?`, `End with ${chosen2}`, path, goesTo(node, chosen2), {
     path,
@@ -8522,7 +8658,7 @@ function StateControls({ node, state }) {
       }
     ),
     canJump && /* @__PURE__ */ a4($, { children: [
-      /* @__PURE__ */ a4(Command, { does: keyOf("jump", path), onClick: jump2, children: "Jump here" }),
+      /* @__PURE__ */ a4(Command, { does: keyOf("jump", path), onClick: jump, children: "Jump here" }),
       /* @__PURE__ */ a4(
         Command,
         {
@@ -8541,7 +8677,7 @@ function StateControls({ node, state }) {
   ] });
 }
 function goesTo(node, outcome) {
-  const target = model.value?.linkOf(node, outcome)?.target;
+  const target = store.data.model.value?.linkOf(node, outcome)?.target;
   return target ? `The mission goes on with ${shorten(target)}.` : "Its container decides how the mission goes on.";
 }
 
@@ -8562,8 +8698,8 @@ var KEYS = {
 };
 var dropped = y3(null);
 function Dock({ name, panels: panels2 }) {
-  const all = arrangementShown.value;
-  const docked2 = all[name].filter((one) => panelsThere.value.has(one.name));
+  const all = store.panels.arrangementShown.value;
+  const docked2 = all[name].filter((one) => store.panels.panelsThere.value.has(one.name));
   const at = dropped.value?.dock === name ? dropped.value.index : null;
   const width = name === "bottom" ? {} : { "--width": `${all.widths[name]}px` };
   const isEmpty = !docked2.length && at === null;
@@ -8590,7 +8726,7 @@ function Dock({ name, panels: panels2 }) {
   ] });
 }
 function Grip({ name }) {
-  const put2 = (dock, index = Infinity) => arrange(moved(arrangementShown.value, name, dock, index));
+  const put2 = (dock, index = Infinity) => store.panels.arrange(moved(store.panels.arrangementShown.value, name, dock, index));
   const onPointerDown = (e4) => {
     if (e4.button !== 0) return;
     e4.preventDefault();
@@ -8603,12 +8739,12 @@ function Grip({ name }) {
       dropped.value = null;
       if (!place || m5.type === "pointercancel") return;
       const behind = docked(place.dock)[place.index];
-      const index = behind ? placeOf(arrangementShown.value, behind)?.index : void 0;
+      const index = behind ? placeOf(store.panels.arrangementShown.value, behind)?.index : void 0;
       put2(place.dock, index);
     });
   };
   const onKeyDown = (e4) => {
-    const all = arrangementShown.value;
+    const all = store.panels.arrangementShown.value;
     const place = placeOf(all, name);
     if (e4.key === "ArrowUp" && place) put2(place.dock, Math.max(0, place.index - 1));
     else if (e4.key === "ArrowDown" && place && place.index < all[place.dock].length - 1)
@@ -8623,7 +8759,7 @@ function Grip({ name }) {
   return /* @__PURE__ */ a4("button", { class: "grip", "aria-label": title, title, onPointerDown, onKeyDown, children: "⋮" });
 }
 var gripOf = (name) => document.querySelector(`[data-panel=${name}] > .grip`);
-var docked = (name) => arrangementShown.value[name].map((one) => one.name).filter((one) => panelsThere.value.has(one));
+var docked = (name) => store.panels.arrangementShown.value[name].map((one) => one.name).filter((one) => store.panels.panelsThere.value.has(one));
 function boxesOfDocks() {
   const boxOf2 = (element) => {
     const { x: x3, y: y5, width: w5, height: h5 } = element.getBoundingClientRect();
@@ -8642,7 +8778,7 @@ function Handle({
   resize: resize2,
   sign: sign2
 }) {
-  const [shown2, setShown] = d2(0);
+  const [shown, setShown] = d2(0);
   A2(() => setShown(size()));
   const onPointerDown = (e4) => {
     if (e4.button !== 0) return;
@@ -8666,10 +8802,10 @@ function Handle({
       tabindex: 0,
       "aria-label": label,
       "aria-orientation": vertical ? "vertical" : "horizontal",
-      "aria-valuenow": Math.round(shown2),
+      "aria-valuenow": Math.round(shown),
       "aria-valuemin": 56,
       "aria-valuemax": 2e3,
-      "aria-valuetext": `${Math.round(shown2)} pixels`,
+      "aria-valuetext": `${Math.round(shown)} pixels`,
       onPointerDown,
       onKeyDown
     }
@@ -8681,8 +8817,8 @@ var WidthHandle = ({ dock }) => /* @__PURE__ */ a4(
     label: `width of the ${dock} side`,
     vertical: true,
     sign: dock === "left" ? 1 : -1,
-    size: () => arrangementShown.value.widths[dock],
-    resize: (width) => arrange(widened(arrangementShown.value, dock, width))
+    size: () => store.panels.arrangementShown.value.widths[dock],
+    resize: (width) => store.panels.arrange(widened(store.panels.arrangementShown.value, dock, width))
   }
 );
 var HeightHandle = ({ dock, name }) => /* @__PURE__ */ a4(
@@ -8692,14 +8828,14 @@ var HeightHandle = ({ dock, name }) => /* @__PURE__ */ a4(
     vertical: false,
     sign: dock === "bottom" ? -1 : 1,
     size: () => document.querySelector(`[data-panel=${name}]`)?.clientHeight ?? 0,
-    resize: (size) => arrange(resized(arrangementShown.value, name, size))
+    resize: (size) => store.panels.arrange(resized(store.panels.arrangementShown.value, name, size))
   }
 );
 function PanelLines() {
-  const all = arrangementShown.value;
+  const all = store.panels.arrangementShown.value;
   const choose2 = (name) => (e4) => {
     const dock = DOCKS.find((one) => one === fieldValue(e4)) ?? null;
-    arrange(moved(all, name, dock));
+    store.panels.arrange(moved(all, name, dock));
   };
   const select = ([name, title]) => {
     const panel = name;
@@ -8713,22 +8849,22 @@ function PanelLines() {
     Object.entries(TITLES).map(select),
     /* @__PURE__ */ a4("div", { class: "line", children: [
       /* @__PURE__ */ a4("span", { children: "As they were" }),
-      /* @__PURE__ */ a4("button", { onClick: () => arrange(null), children: "reset" })
+      /* @__PURE__ */ a4("button", { onClick: () => store.panels.arrange(null), children: "reset" })
     ] })
   ] });
 }
 function Parts() {
-  const part2 = ([name, title, path]) => {
-    const isShown2 = part.value === name;
+  const part = ([name, title, path]) => {
+    const isShown2 = store.view.part.value === name;
     const onClick = () => {
-      part.value = name;
+      store.view.part.value = name;
     };
     return /* @__PURE__ */ a4("button", { class: isShown2 ? "on" : "", "aria-current": isShown2 ? "page" : void 0, onClick, children: [
       /* @__PURE__ */ a4("svg", { viewBox: "0 0 24 24", "aria-hidden": "true", children: /* @__PURE__ */ a4("path", { d: path }) }),
       title
     ] });
   };
-  return /* @__PURE__ */ a4("nav", { class: "parts", "aria-label": "parts of the page", children: PARTS.filter(([name]) => name !== "map" || hasMap.value).map(part2) });
+  return /* @__PURE__ */ a4("nav", { class: "parts", "aria-label": "parts of the page", children: PARTS.filter(([name]) => name !== "map" || store.panels.hasMap.value).map(part) });
 }
 var PARTS = [
   ["machine", "Machine", "M3 4h7v6H3ZM14 14h7v6h-7ZM10 7h7v7"],
@@ -8757,25 +8893,25 @@ function lanesOf(rows, now) {
   };
 }
 function sceneOf(rows) {
-  const scene2 = new Scene();
+  const scene = new Scene();
   let now = 0;
   for (const row of rows) {
     const called2 = row.name ?? row.machine;
-    scene2.addEvents(
+    scene.addEvents(
       row.events.map(
         (e4) => "action" in e4 && /^\/?[^/]*$/.test(e4.action) ? { ...e4, action: `${called2}/${e4.action}` } : e4
       )
     );
-    scene2.addObserved(row.observed.map((one) => one.robot || one.what === "map" ? one : { ...one, robot: called2 }));
+    scene.addObserved(row.observed.map((one) => one.robot || one.what === "map" ? one : { ...one, robot: called2 }));
     for (const { stamp_ns } of [...row.events, ...row.observed]) now = Math.max(now, stamp_ns / 1e6);
   }
-  return { scene: scene2, now };
+  return { scene, now };
 }
 
 // src/panels/fleet.tsx
 var REFRESH_MS2 = 1e3;
 var MOST_ROWS3 = 32;
-var FleetPage = () => pageShown.value === "fleet" ? /* @__PURE__ */ a4(OpenFleet, {}) : null;
+var FleetPage = () => store.view.pageShown.value === "fleet" ? /* @__PURE__ */ a4(OpenFleet, {}) : null;
 function OpenFleet() {
   const [skip, setSkip] = d2(0);
   const [found, setFound] = d2({ rows: [], skip: 0, total: 0 });
@@ -8796,7 +8932,7 @@ function OpenFleet() {
   }, [skip]);
   const { rows, total: total2 } = found;
   const last = Math.min(found.skip + MOST_ROWS3, total2);
-  const { scene: scene2, now } = sceneOf(rows);
+  const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf(rows, now);
   return /* @__PURE__ */ a4("section", { class: "fleet", "aria-labelledby": "fleet-title", children: [
     /* @__PURE__ */ a4("header", { children: [
@@ -8822,7 +8958,7 @@ function OpenFleet() {
           shorten(row.reason, 60)
         ] })
       ] }, row.id)) }),
-      !scene2.isEmpty && /* @__PURE__ */ a4("div", { class: "fleet-map", children: /* @__PURE__ */ a4(FleetMap, { scene: scene2, now }) })
+      !scene.isEmpty && /* @__PURE__ */ a4("div", { class: "fleet-map", children: /* @__PURE__ */ a4(FleetMap, { scene, now }) })
     ] }),
     /* @__PURE__ */ a4("div", { class: "lanes", role: "list", "aria-label": `the last ${duration(seconds)}`, children: lanes.map((lane) => /* @__PURE__ */ a4($, { children: [
       /* @__PURE__ */ a4("span", { title: lane.name, children: shorten(lane.name, 24) }),
@@ -8911,34 +9047,34 @@ function standing(row) {
   return row.outcome === null ? "cut" : outcomeClass(row.outcome);
 }
 var pinOf = (row) => row.run || (row.stamp === null ? row.id : `${row.machine} ${row.stamp}`);
-function isShown(row, show3, pins2) {
-  if (show3 === "all") return true;
-  if (show3 === "pinned") return pins2.has(pinOf(row));
-  if (show3 === "durable") return row.run !== "" || row.mission !== null;
-  if (show3 === "asking") return row.asks;
-  return standing(row) === show3;
+function isShown(row, show2, pins) {
+  if (show2 === "all") return true;
+  if (show2 === "pinned") return pins.has(pinOf(row));
+  if (show2 === "durable") return row.run !== "" || row.mission !== null;
+  if (show2 === "asking") return row.asks;
+  return standing(row) === show2;
 }
 function hasText(row, text2) {
   const all = [row.machine, ...row.robots, row.reason, row.outcome ?? "", ...row.strip.map((piece) => piece[1])];
   const inside = all.join(" ").toLowerCase();
   return text2.toLowerCase().split(/\s+/).every((word) => inside.includes(word));
 }
-function chosen(rows, { show: show3, machine, robot, text: text2 }, pins2) {
+function chosen(rows, { show: show2, machine, robot, text: text2 }, pins) {
   const found = rows.filter(
-    (row) => isShown(row, show3, pins2) && (machine === null || row.machine === machine) && (robot === null || row.robots.includes(robot)) && hasText(row, text2)
+    (row) => isShown(row, show2, pins) && (machine === null || row.machine === machine) && (robot === null || row.robots.includes(robot)) && hasText(row, text2)
   );
-  const rank = (row) => row.live ? 0 : pins2.has(pinOf(row)) ? 1 : 2;
+  const rank = (row) => row.live ? 0 : pins.has(pinOf(row)) ? 1 : 2;
   return found.map((row, i4) => ({ row, i: i4 })).sort((a5, b3) => rank(a5.row) - rank(b3.row) || a5.i - b3.i).map(({ row }) => row);
 }
-var countsOf = (rows, pins2) => new Map(SHOWN.map((show3) => [show3, rows.filter((row) => isShown(row, show3, pins2)).length]));
+var countsOf = (rows, pins) => new Map(SHOWN.map((show2) => [show2, rows.filter((row) => isShown(row, show2, pins)).length]));
 function tally(rows, namesOf2) {
   const counts = /* @__PURE__ */ new Map();
   for (const row of rows) for (const name of namesOf2(row)) counts.set(name, (counts.get(name) ?? 0) + 1);
   return [...counts].sort((a5, b3) => b3[1] - a5[1] || (a5[0] < b3[0] ? -1 : 1));
 }
-function filterText({ show: show3, machine, robot, text: text2 }) {
+function filterText({ show: show2, machine, robot, text: text2 }) {
   const parts = [
-    show3 === "all" ? "" : SHOWN_NAMES[show3].toLowerCase(),
+    show2 === "all" ? "" : SHOWN_NAMES[show2].toLowerCase(),
     machine === null ? "" : `of ${machine}`,
     robot === null ? "" : `with ${robot}`,
     text2 && `with “${text2}”`
@@ -8947,8 +9083,8 @@ function filterText({ show: show3, machine, robot, text: text2 }) {
 }
 function secondsOf(row, now) {
   if (row.began === null) return null;
-  const runs3 = standing(row) === "live";
-  const end = row.ended ?? (runs3 ? now * 1e6 : row.last);
+  const runs2 = standing(row) === "live";
+  const end = row.ended ?? (runs2 ? now * 1e6 : row.last);
   return end === null ? null : Math.max(0, (end - row.began) / 1e9);
 }
 function beganText(ns, today) {
@@ -8980,9 +9116,9 @@ var SIGNS = {
 var WORDS = { live: "running", interrupted: "interrupted", queued: "queued" };
 var REFRESH_MS3 = 5e3;
 var KINDS = { live: "active", cut: "waiting", interrupted: "waiting", queued: "waiting" };
-var HomePage = () => pageShown.value === "runs" ? /* @__PURE__ */ a4(OpenHome, {}) : null;
+var HomePage = () => store.view.pageShown.value === "runs" ? /* @__PURE__ */ a4(OpenHome, {}) : null;
 var openSimulations = () => {
-  simulateOpen.value = true;
+  store.view.simulateOpen.value = true;
 };
 var lastWord = (path) => path.split("/").at(-1) || path;
 var ALL = { show: "all", machine: null, robot: null, text: "" };
@@ -8990,20 +9126,20 @@ function OpenHome() {
   const [filter, setFilter] = d2(ALL);
   const [most, setMost] = d2(MOST_ROWS4);
   const heading = T2(null);
-  const { machines: machines2 } = store_exports;
+  const { machines } = store.data;
   A2(() => heading.current?.focus(), []);
   A2(() => {
     refreshRuns();
-  }, [machines2.value]);
-  const { runs: runs3, folders, journals } = runs.value;
+  }, [machines.value]);
+  const { runs: runs2, folders, journals } = store.data.runs.value;
   A2(() => {
     if (!journals.length) return;
     const timer = setInterval(refreshRuns, REFRESH_MS3);
     return () => clearInterval(timer);
   }, [journals.length > 0]);
-  slowTick.value;
-  const pins2 = pins.value;
-  const rows = chosen(runs3, filter, pins2);
+  store.playback.slowTick.value;
+  const pins = store.view.pins.value;
+  const rows = chosen(runs2, filter, pins);
   const change2 = (some) => {
     setFilter({ ...filter, ...some });
     setMost(MOST_ROWS4);
@@ -9011,7 +9147,7 @@ function OpenHome() {
   const failed = rows.filter((row) => standing(row) === "failure").length;
   const failedText = failed ? `, ${failed} failed` : "";
   return /* @__PURE__ */ a4("section", { class: "home", "aria-labelledby": "home-title", children: [
-    /* @__PURE__ */ a4(Filters, { runs: runs3, filter, pins: pins2, onChange: change2 }),
+    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins, onChange: change2 }),
     /* @__PURE__ */ a4("div", { class: "run-list", children: [
       /* @__PURE__ */ a4("header", { children: [
         /* @__PURE__ */ a4("h2", { id: "home-title", tabindex: -1, ref: heading, children: "Runs" }),
@@ -9021,7 +9157,7 @@ function OpenHome() {
         ] })),
         journals.map((one) => /* @__PURE__ */ a4(JournalChip, { ...one })),
         /* @__PURE__ */ a4("span", { class: "spread" }),
-        /* @__PURE__ */ a4("span", { class: "hint", role: "status", children: runsKnown.value ? `${rows.length.toLocaleString("en")} run${rows.length === 1 ? "" : "s"}${failedText}` : "reading the runs…" }),
+        /* @__PURE__ */ a4("span", { class: "hint", role: "status", children: store.data.runsKnown.value ? `${rows.length.toLocaleString("en")} run${rows.length === 1 ? "" : "s"}${failedText}` : "reading the runs…" }),
         /* @__PURE__ */ a4(
           "input",
           {
@@ -9031,13 +9167,13 @@ function OpenHome() {
             onInput: (e4) => change2({ text: fieldValue(e4) })
           }
         ),
-        runs3.filter((row) => row.live).length > 1 && /* @__PURE__ */ a4("button", { onClick: () => showPage("fleet"), children: "Fleet" }),
+        runs2.filter((row) => row.live).length > 1 && /* @__PURE__ */ a4("button", { onClick: () => showPage("fleet"), children: "Fleet" }),
         /* @__PURE__ */ a4("button", { onClick: openSimulations, children: "Simulate" }),
-        model.value && /* @__PURE__ */ a4("button", { onClick: () => showPage("machine"), children: "Close" })
+        store.data.model.value && /* @__PURE__ */ a4("button", { onClick: () => showPage("machine"), children: "Close" })
       ] }),
-      runsProblem.value && /* @__PURE__ */ a4("p", { class: "error", children: runsProblem.value }),
-      !runs3.length && runsKnown.value && /* @__PURE__ */ a4(NoRuns, {}),
-      runs3.length > 0 && !rows.length && /* @__PURE__ */ a4("div", { class: "empty-list", children: [
+      store.data.runsProblem.value && /* @__PURE__ */ a4("p", { class: "error", children: store.data.runsProblem.value }),
+      !runs2.length && store.data.runsKnown.value && /* @__PURE__ */ a4(NoRuns, {}),
+      runs2.length > 0 && !rows.length && /* @__PURE__ */ a4("div", { class: "empty-list", children: [
         /* @__PURE__ */ a4("p", { children: [
           "No run is ",
           filterText(filter),
@@ -9045,19 +9181,19 @@ function OpenHome() {
         ] }),
         /* @__PURE__ */ a4("button", { onClick: () => setFilter(ALL), children: "Clear filters" })
       ] }),
-      rows.length > 0 && /* @__PURE__ */ a4(Rows2, { rows: rows.slice(0, most), pins: pins2 }),
+      rows.length > 0 && /* @__PURE__ */ a4(Rows2, { rows: rows.slice(0, most), pins }),
       /* @__PURE__ */ a4(More, { left: rows.length - most, onMore: () => setMost(most + 200) })
     ] })
   ] });
 }
-var JournalChip = ({ name, problem: problem2 }) => /* @__PURE__ */ a4("span", { class: problem2 ? "chip bad" : "chip", title: problem2 || name, children: [
+var JournalChip = ({ name, problem }) => /* @__PURE__ */ a4("span", { class: problem ? "chip bad" : "chip", title: problem || name, children: [
   "journal ",
   shorten(lastWord(name), 24),
-  problem2 && ": not readable"
+  problem && ": not readable"
 ] });
 function NoRuns() {
   const text2 = "smachpy run patrol --start-robot --view";
-  const copy2 = () => navigator.clipboard?.writeText(text2).then(() => notify("copied"));
+  const copy2 = () => navigator.clipboard?.writeText(text2).then(() => store.view.notify("copied"));
   return /* @__PURE__ */ a4("div", { class: "empty-list", children: [
     /* @__PURE__ */ a4("p", { children: "No runs yet. Make one:" }),
     /* @__PURE__ */ a4("p", { children: [
@@ -9068,12 +9204,12 @@ function NoRuns() {
   ] });
 }
 function Filters({
-  runs: runs3,
+  runs: runs2,
   filter,
-  pins: pins2,
+  pins,
   onChange
 }) {
-  const counts = countsOf(runs3, pins2);
+  const counts = countsOf(runs2, pins);
   const choice = (name, count, on2, choose2) => /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4("button", { class: on2 ? "on" : "", "aria-pressed": on2, onClick: choose2, children: [
     /* @__PURE__ */ a4("span", { children: shorten(name, 24) }),
     /* @__PURE__ */ a4("span", { class: "number", children: count })
@@ -9091,20 +9227,20 @@ function Filters({
   ] });
   return /* @__PURE__ */ a4("nav", { class: "filters", "aria-label": "filters", children: [
     /* @__PURE__ */ a4("h3", { children: "Show" }),
-    /* @__PURE__ */ a4("ul", { children: SHOWN.filter((show3) => show3 === "all" || (counts.get(show3) ?? 0) > 0 || filter.show === show3).map(
-      (show3) => choice(SHOWN_NAMES[show3], counts.get(show3) ?? 0, filter.show === show3, () => onChange({ show: show3 }))
+    /* @__PURE__ */ a4("ul", { children: SHOWN.filter((show2) => show2 === "all" || (counts.get(show2) ?? 0) > 0 || filter.show === show2).map(
+      (show2) => choice(SHOWN_NAMES[show2], counts.get(show2) ?? 0, filter.show === show2, () => onChange({ show: show2 }))
     ) }),
     names(
       "machine",
-      tally(runs3, (row) => [row.machine])
+      tally(runs2, (row) => [row.machine])
     ),
     names(
       "robot",
-      tally(runs3, (row) => row.robots)
+      tally(runs2, (row) => row.robots)
     )
   ] });
 }
-function Rows2({ rows, pins: pins2 }) {
+function Rows2({ rows, pins }) {
   const today = /* @__PURE__ */ new Date();
   return /* @__PURE__ */ a4("table", { class: "runs", children: [
     /* @__PURE__ */ a4("thead", { children: /* @__PURE__ */ a4("tr", { children: [
@@ -9115,7 +9251,7 @@ function Rows2({ rows, pins: pins2 }) {
       /* @__PURE__ */ a4("th", { children: "States" }),
       /* @__PURE__ */ a4("th", { class: "right", children: "Began" })
     ] }) }),
-    /* @__PURE__ */ a4("tbody", { children: rows.map((row) => /* @__PURE__ */ a4(Row, { row, pinned: pins2.has(pinOf(row)), today }, row.id)) })
+    /* @__PURE__ */ a4("tbody", { children: rows.map((row) => /* @__PURE__ */ a4(Row, { row, pinned: pins.has(pinOf(row)), today }, row.id)) })
   ] });
 }
 var UNNAMED = "SM_ROOT";
@@ -9133,7 +9269,7 @@ function Row({ row, pinned, today }) {
   };
   const pin = (e4) => {
     e4.stopPropagation();
-    togglePin(pinOf(row));
+    store.view.togglePin(pinOf(row));
   };
   const outage = outageText(row);
   const classes = `${row.problem ? "bad" : ""}${opens ? "" : " closed"}`;
@@ -9172,7 +9308,7 @@ function askForMission(row, mission, what) {
   const robots = row.robots.length ? ` on ${row.robots.join(", ")}` : "";
   const where = mission.active.length ? ` in ${mission.active.map(lastWord).join(", ")}` : "";
   const resumes = what === "resume";
-  const now = () => runs.value.runs.find((one) => one.mission?.id === mission.id)?.mission;
+  const now = () => store.data.runs.value.runs.find((one) => one.mission?.id === mission.id)?.mission;
   askFirst({
     title: `${resumes ? "Resume" : "Cancel"} ${row.machine}${robots}?`,
     yes: resumes ? "Resume" : "Cancel the mission",
@@ -9180,7 +9316,7 @@ function askForMission(row, mission, what) {
       `The mission ${mission.id} is ${mission.status}${where}.`,
       resumes ? "A process on the viewer's computer goes on with it at once, and moves its robots." : "It is preempted, now or when it is resumed, and ends."
     ],
-    situation: () => JSON.stringify([pageShown.value, now()?.status, now()?.can]),
+    situation: () => JSON.stringify([store.view.pageShown.value, now()?.status, now()?.can]),
     give: () => commandMission(mission, what)
   });
 }
@@ -9222,7 +9358,7 @@ function Strip2({ row, seconds }) {
       }
     );
   };
-  const gap2 = ([from, to]) => {
+  const gap = ([from, to]) => {
     const [x3, wide] = [100 * from / seconds, Math.max(0.8, 100 * (to - from) / seconds)];
     return /* @__PURE__ */ a4("rect", { class: "outage", x: `${x3}%`, y: "0", width: `${wide}%`, height: "24", children: /* @__PURE__ */ a4("title", { children: [
       "no process ran it for ",
@@ -9232,7 +9368,7 @@ function Strip2({ row, seconds }) {
   const names = row.strip.slice(0, 12).map((piece) => piece[1]);
   return /* @__PURE__ */ a4("svg", { class: "run-strip", height: "24", role: "img", "aria-label": names.join(", "), children: [
     row.strip.map(bar),
-    row.outages.map(gap2)
+    row.outages.map(gap)
   ] });
 }
 
@@ -9240,36 +9376,36 @@ function Strip2({ row, seconds }) {
 var MOST3 = 60;
 async function compare(page2, name) {
   if (!name) {
-    if (!comparison.value) return;
-    const { alone: alone2 } = comparison.value;
-    comparison.value = null;
-    show2(page2, alone2);
+    if (!store.data.comparison.value) return;
+    const { alone: alone2 } = store.data.comparison.value;
+    store.data.comparison.value = null;
+    show(page2, alone2);
     return;
   }
-  const asked2 = facts.value?.name;
+  const asked2 = store.data.facts.value?.name;
   const found = await ask(link("compare", `&with=${encoded2(name)}`));
-  const model2 = model.value;
-  if (!model2 || asked2 !== facts.value?.name) return;
+  const model = store.data.model.value;
+  if (!model || asked2 !== store.data.facts.value?.name) return;
   if (isFailure(found)) {
-    notify(found.text, "error");
+    store.view.notify(found.text, "error");
     return;
   }
-  const alone = comparison.value?.alone ?? model2.payload;
+  const alone = store.data.comparison.value?.alone ?? model.payload;
   const compared = { ...found, model: found.model };
-  comparison.value = { ...compared, alone };
-  show2(page2, compared.model);
+  store.data.comparison.value = { ...compared, alone };
+  show(page2, compared.model);
 }
-function show2(page2, payload) {
-  const opened3 = opened2.value;
-  setModel(payload);
-  keepOpened(new Set([...opened3].filter((path) => model.value?.get(path)?.children.length)));
+function show(page2, payload) {
+  const opened2 = store.view.opened.value;
+  store.view.setModel(payload);
+  store.view.keepOpened(new Set([...opened2].filter((path) => store.data.model.value?.get(path)?.children.length)));
   page2.select(null);
   page2.layout?.forget();
   page2.relayout({ frame: true });
 }
 function CompareLine({ page: page2, onDone }) {
-  const others = machines.value.filter((machine) => machine.name !== facts.value?.name);
-  if (isFile() || !model.value) return null;
+  const others = store.data.machines.value.filter((machine) => machine.name !== store.data.facts.value?.name);
+  if (isFile() || !store.data.model.value) return null;
   const title = others.length ? "" : "no other machine or recording here; try: smachpy view old.jsonl new.jsonl";
   const choose2 = (e4) => {
     compare(page2, fieldValue(e4));
@@ -9281,7 +9417,7 @@ function CompareLine({ page: page2, onDone }) {
       "select",
       {
         id: "compare",
-        value: comparison.value?.with ?? "",
+        value: store.data.comparison.value?.with ?? "",
         disabled: !others.length,
         title,
         onChange: choose2,
@@ -9294,7 +9430,7 @@ function CompareLine({ page: page2, onDone }) {
   ] });
 }
 function CompareChip({ page: page2 }) {
-  const found = comparison.value;
+  const found = store.data.comparison.value;
   if (!found) return null;
   return /* @__PURE__ */ a4("button", { class: "chip compare-chip", title: "show it alone again", onClick: () => compare(page2, ""), children: [
     "compared with ",
@@ -9303,12 +9439,12 @@ function CompareChip({ page: page2 }) {
   ] });
 }
 function Differences({ page: page2 }) {
-  const found = comparison.value;
+  const found = store.data.comparison.value;
   const [all, setAll] = d2(false);
   if (!found) return null;
-  const shown2 = all ? found.listed : found.listed.slice(0, MOST3);
+  const shown = all ? found.listed : found.listed.slice(0, MOST3);
   const [before, now] = found.runs;
-  const runs3 = before && now ? ` (${before} runs) to this (${now}); ×: visits per run` : "";
+  const runs2 = before && now ? ` (${before} runs) to this (${now}); ×: visits per run` : "";
   return /* @__PURE__ */ a4("section", { children: [
     /* @__PURE__ */ a4("h2", { children: [
       "Differences ",
@@ -9317,11 +9453,11 @@ function Differences({ page: page2 }) {
     /* @__PURE__ */ a4("p", { class: "hint", children: [
       "from ",
       found.with,
-      runs3
+      runs2
     ] }),
     !found.listed.length && /* @__PURE__ */ a4("p", { class: "hint", children: "no notable difference" }),
-    /* @__PURE__ */ a4("ul", { class: "differences", children: shown2.map((one) => /* @__PURE__ */ a4(Difference, { one, page: page2 })) }),
-    /* @__PURE__ */ a4(More, { left: found.listed.length - shown2.length, onMore: () => setAll(true) })
+    /* @__PURE__ */ a4("ul", { class: "differences", children: shown.map((one) => /* @__PURE__ */ a4(Difference, { one, page: page2 })) }),
+    /* @__PURE__ */ a4(More, { left: found.listed.length - shown.length, onMore: () => setAll(true) })
   ] });
 }
 var Difference = ({ one, page: page2 }) => /* @__PURE__ */ a4("li", { class: one.change, children: [
@@ -9401,19 +9537,19 @@ var LINES2 = 70;
 var LOOKED_AT = 6e3;
 var LONGEST = 200;
 function Log({ page: page2 }) {
-  slowTick.value;
+  store.playback.slowTick.value;
   const [text2, setText] = d2("");
   const [pages, setPages] = d2(1);
-  const end = eventsShown();
+  const end = store.playback.eventsShown();
   const first = Math.max(0, end - pages * LOOKED_AT);
   const most = pages * LINES2;
-  const wanted2 = text2.toLowerCase();
-  const kinds = KINDS_OF[logFilter.value];
+  const wanted = text2.toLowerCase();
+  const kinds = KINDS_OF[store.view.logFilter.value];
   const lines = [];
   let i4 = end - 1;
   for (; i4 >= first && lines.length < most; i4--) {
-    const e4 = run.events[i4];
-    const missing = i4 + 1 < end ? run.events[i4 + 1].dropped ?? 0 : 0;
+    const e4 = store.data.run.events[i4];
+    const missing = i4 + 1 < end ? store.data.run.events[i4 + 1].dropped ?? 0 : 0;
     if (missing)
       lines.push(
         /* @__PURE__ */ a4("li", { class: "hint", children: [
@@ -9422,28 +9558,37 @@ function Log({ page: page2 }) {
         ] }, -e4.seq)
       );
     if (!kinds.has(e4.kind)) continue;
-    const line = lineOf(e4, model.value?.get(e4.path));
-    if (wanted2 && !`${e4.path} ${line.text}`.toLowerCase().includes(wanted2)) continue;
+    const line = lineOf(e4, store.data.model.value?.get(e4.path));
+    if (wanted && !`${e4.path} ${line.text}`.toLowerCase().includes(wanted)) continue;
     const count = i4 + 1;
     const onClick = () => {
-      if (cursor.value !== null) seekTo(count);
+      if (store.playback.cursor.value !== null) store.playback.seekTo(count);
     };
     const t4 = e4.stamp_ns / 1e6;
     lines.push(
-      /* @__PURE__ */ a4("li", { class: isLit(e4.path, t4) ? "lit" : "", onClick, ...hoverHandlers(e4.path, t4), children: [
-        /* @__PURE__ */ a4("time", { children: instantText(t4, 2) }),
-        /* @__PURE__ */ a4(StateLink, { path: e4.path, page: page2, tabindex: lines.length ? -1 : 0 }),
-        " ",
-        /* @__PURE__ */ a4("span", { class: `word ${line.kind}`, children: shorten(line.text, LONGEST) }),
-        targetOf(e4)
-      ] }, e4.seq)
+      /* @__PURE__ */ a4(
+        "li",
+        {
+          class: store.pointer.isLit(e4.path, t4) ? "lit" : "",
+          onClick,
+          ...store.pointer.hoverHandlers(e4.path, t4),
+          children: [
+            /* @__PURE__ */ a4("time", { children: store.clock.instantText(t4, 2) }),
+            /* @__PURE__ */ a4(StateLink, { path: e4.path, page: page2, tabindex: lines.length ? -1 : 0 }),
+            " ",
+            /* @__PURE__ */ a4("span", { class: `word ${line.kind}`, children: shorten(line.text, LONGEST) }),
+            targetOf(e4)
+          ]
+        },
+        e4.seq
+      )
     );
   }
   const all = end.toLocaleString("en");
   const nothing = `nothing more in the last ${(end - first).toLocaleString("en")} of ${all} events; look at older ones`;
   return /* @__PURE__ */ a4(Section, { title: "Log", children: [
     /* @__PURE__ */ a4("div", { class: "filter", children: [
-      /* @__PURE__ */ a4("select", { "aria-label": "kinds", value: logFilter.value, onChange: chooseKinds, children: Object.keys(KINDS_OF).map((name) => /* @__PURE__ */ a4("option", { value: name, children: name })) }),
+      /* @__PURE__ */ a4("select", { "aria-label": "kinds", value: store.view.logFilter.value, onChange: chooseKinds, children: Object.keys(KINDS_OF).map((name) => /* @__PURE__ */ a4("option", { value: name, children: name })) }),
       /* @__PURE__ */ a4(
         "input",
         {
@@ -9468,12 +9613,12 @@ function moveFocus(e4) {
   e4.stopPropagation();
 }
 var chooseKinds = (e4) => {
-  logFilter.value = fieldValue(e4);
+  store.view.logFilter.value = fieldValue(e4);
 };
 function targetOf(e4) {
   if (e4.kind !== "Left") return "";
-  const node = model.value?.get(e4.path);
-  const link2 = node && model.value?.linkOf(node, e4.outcome);
+  const node = store.data.model.value?.get(e4.path);
+  const link2 = node && store.data.model.value?.linkOf(node, e4.outcome);
   return link2 && link2.target !== e4.outcome ? ` → ${shorten(link2.target)}` : "";
 }
 
@@ -9483,26 +9628,26 @@ var WIDEST = 960;
 var HEAD5 = 32;
 var FONTS_MS = 150;
 async function saveFilm(page2) {
-  const { run: run2 } = store_exports;
-  playing.value = null;
-  const shown2 = cursor.value;
-  const to = nowMs();
-  const stretch2 = stretch.value ?? { from: Math.max(run2.first() ?? to, to - LAST_MS), to };
-  if (filmed.value !== null || stretch2.from >= stretch2.to) return;
+  const { run } = store.data;
+  store.playback.playing.value = null;
+  const shown = store.playback.cursor.value;
+  const to = store.playback.nowMs();
+  const stretch = store.playback.stretch.value ?? { from: Math.max(run.first() ?? to, to - LAST_MS), to };
+  if (store.playback.filmed.value !== null || stretch.from >= stretch.to) return;
   const name = `${page2.fileName()}.gif`;
-  filmed.value = 0;
+  store.playback.filmed.value = 0;
   try {
-    const film = await draw(page2, stretch2, () => run2 === run && filmed.value !== null);
+    const film = await draw(page2, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
     if (film) save2(film, name);
   } catch (error) {
-    notify(`No film: ${messageOf(error)}`, "error");
+    store.view.notify(`No film: ${messageOf(error)}`, "error");
   } finally {
-    filmed.value = null;
-    if (run2 === run) seek(shown2);
+    store.playback.filmed.value = null;
+    if (run === store.data.run) store.playback.seek(shown);
   }
 }
-async function draw(page2, stretch2, isWanted) {
-  const instants2 = framesOf(stretch2);
+async function draw(page2, stretch, isWanted) {
+  const instants2 = framesOf(stretch);
   const style = await styleText();
   const canvas2 = document.createElement("canvas");
   const g5 = canvas2.getContext("2d", { willReadFrequently: true });
@@ -9516,11 +9661,11 @@ async function draw(page2, stretch2, isWanted) {
     worker.postMessage({ frameMs: FILM_FRAME_MS });
     for (const [i4, t4] of instants2.entries()) {
       if (!isWanted()) return null;
-      seek(t4);
+      store.playback.seek(t4);
       await paint(page2, canvas2, style, i4 === 0);
       const { data, width, height } = g5.getImageData(0, 0, canvas2.width, canvas2.height);
       await ask2({ data, width, height }, [data.buffer]);
-      if (isWanted()) filmed.value = Math.round(100 * (i4 + 1) / instants2.length);
+      if (isWanted()) store.playback.filmed.value = Math.round(100 * (i4 + 1) / instants2.length);
     }
     const film = await ask2("end");
     return film && new Blob([film], { type: "image/gif" });
@@ -9554,7 +9699,7 @@ async function paint(page2, canvas2, style, isFirst) {
   g5.fillText(page2.title(), 12, HEAD5 / 2);
   g5.textAlign = "right";
   g5.font = "600 15px 'JetBrains Mono', monospace";
-  g5.fillText(instantText(nowMs()), wide - 12, HEAD5 / 2);
+  g5.fillText(store.clock.instantText(store.playback.nowMs()), wide - 12, HEAD5 / 2);
   g5.textAlign = "left";
   g5.drawImage(picture, 0, HEAD5, stage.w, stage.h);
   if (floor3.clientWidth) g5.drawImage(floor3, stage.w, HEAD5, floor3.clientWidth, floor3.clientHeight);
@@ -9577,8 +9722,8 @@ async function pictureOf(svg2, style) {
 }
 async function styleText() {
   const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules].map((rule) => rule.cssText));
-  const wanted2 = rules.filter((rule) => !rule.startsWith("@font-face") || rule.includes("Inter"));
-  const text2 = wanted2.join("\n");
+  const wanted = rules.filter((rule) => !rule.startsWith("@font-face") || rule.includes("Inter"));
+  const text2 = wanted.join("\n");
   const [, address] = /url\("([^"]+inter\.woff2)"\)/.exec(text2) ?? [];
   if (!address) return text2;
   const font2 = await (await fetch(address)).blob();
@@ -9603,14 +9748,14 @@ function ShareButtons({ page: page2 }) {
     const address = page2.address();
     try {
       await navigator.clipboard.writeText(address);
-      notify(isFile() ? "Link copied, for who has this file" : "Link copied");
+      store.view.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
     } catch {
-      notify("This browser lets no page copy here: the address bar shows the link", "error");
+      store.view.notify("This browser lets no page copy here: the address bar shows the link", "error");
     }
   };
-  const done = filmed.value;
+  const done = store.playback.filmed.value;
   const stop = () => {
-    filmed.value = null;
+    store.playback.filmed.value = null;
   };
   return /* @__PURE__ */ a4("span", { class: "share", children: [
     done === null ? /* @__PURE__ */ a4(
@@ -9625,27 +9770,27 @@ function ShareButtons({ page: page2 }) {
       done,
       " % ✕"
     ] }),
-    /* @__PURE__ */ a4("button", { title: "note at the instant shown (n)", onClick: () => askForNote(), children: "Note" }),
+    /* @__PURE__ */ a4("button", { title: "note at the instant shown (n)", onClick: () => store.notes.begin(), children: "Note" }),
     /* @__PURE__ */ a4("button", { title: "copy the address of this view: instant, selection, open containers, notes", onClick: copy2, children: "Link" })
   ] });
 }
 function NoteDialog() {
   const [text2, setText] = d2("");
-  const at = noteAt.value;
+  const at = store.notes.writtenAt.value;
   if (at === null) return null;
   const close2 = () => {
-    noteAt.value = null;
+    store.notes.writtenAt.value = null;
     setText("");
   };
   const onSubmit = (e4) => {
     e4.preventDefault();
-    addNotes([{ at, text: text2 }]);
+    store.notes.add([{ at, text: text2 }]);
     close2();
   };
   return /* @__PURE__ */ a4(Dialog, { label: "note", class: "note-form", onClose: close2, children: /* @__PURE__ */ a4("form", { onSubmit, children: [
     /* @__PURE__ */ a4("h2", { children: [
       "Note at ",
-      instantText(at)
+      store.clock.instantText(at)
     ] }),
     /* @__PURE__ */ a4(
       "input",
@@ -9665,22 +9810,22 @@ function NoteDialog() {
     ] })
   ] }) });
 }
-function Notes() {
-  const notes2 = notes.value;
-  if (!notes2.length) return null;
-  return /* @__PURE__ */ a4(Section, { title: "Notes", count: notes2.length, children: /* @__PURE__ */ a4("ul", { class: "notes", children: notes2.map((note) => /* @__PURE__ */ a4("li", { children: [
-    /* @__PURE__ */ a4("button", { class: "link", onClick: () => seek(note.at), children: /* @__PURE__ */ a4("time", { children: instantText(note.at) }) }),
+function Notes2() {
+  const notes = store.notes.all.value;
+  if (!notes.length) return null;
+  return /* @__PURE__ */ a4(Section, { title: "Notes", count: notes.length, children: /* @__PURE__ */ a4("ul", { class: "notes", children: notes.map((note) => /* @__PURE__ */ a4("li", { children: [
+    /* @__PURE__ */ a4("button", { class: "link", onClick: () => store.playback.seek(note.at), children: /* @__PURE__ */ a4("time", { children: store.clock.instantText(note.at) }) }),
     /* @__PURE__ */ a4("span", { children: note.text }),
-    /* @__PURE__ */ a4("button", { class: "small", "aria-label": `remove the note ${note.text}`, onClick: () => removeNote(note), children: "✕" })
+    /* @__PURE__ */ a4("button", { class: "small", "aria-label": `remove the note ${note.text}`, onClick: () => store.notes.remove(note), children: "✕" })
   ] }, `${note.at} ${note.text}`)) }) });
 }
 
 // src/panels/numbers.tsx
 function Numbers() {
-  slowTick.value;
-  if (numbers.value === "none") return null;
-  const { taken, all } = coverage(model.value, shown().states);
-  const recorded = statistics.value;
+  store.playback.slowTick.value;
+  if (store.view.numbers.value === "none") return null;
+  const { taken, all } = coverage(store.data.model.value, store.playback.shown().states);
+  const recorded = store.data.statistics.value;
   return /* @__PURE__ */ a4(Section, { title: "Numbers", children: /* @__PURE__ */ a4("dl", { class: "facts", children: [
     /* @__PURE__ */ a4("dt", { children: "transitions taken" }),
     /* @__PURE__ */ a4("dd", { children: [
@@ -9717,7 +9862,7 @@ var ORDINARY_MS = 1e3;
 var MOST_ROWS5 = 24;
 var isOrdinary = ({ from, to, rows }) => to !== null && to - from < ORDINARY_MS && rows.every((row) => row.asked?.source === "concurrence" && row.abandoned === null);
 function Preempts({ page: page2, data, now }) {
-  const found = run.preemptAt(now);
+  const found = store.data.run.preemptAt(now);
   if (!found || found.from < (ms(data.started) ?? 0)) return null;
   if (found.to !== null && data.ended == null && now - found.to > RECENT_MS2) return null;
   if (isOrdinary(found)) return null;
@@ -9827,8 +9972,8 @@ function titleOf2(row) {
 }
 
 // src/panels/selected_state.tsx
-function SelectedState({ data, now, model: model2 }) {
-  const node = model2.get(selected.value);
+function SelectedState({ data, now, model }) {
+  const node = model.get(store.view.selected.value);
   if (!node) return null;
   const state = own(data.states, node.path);
   return /* @__PURE__ */ a4(Section, { title: node.name, children: [
@@ -9839,25 +9984,25 @@ function SelectedState({ data, now, model: model2 }) {
         /* @__PURE__ */ a4("dt", { children: name }),
         /* @__PURE__ */ a4("dd", { children: value })
       ] })),
-      /* @__PURE__ */ a4(Keys, { keys: model2.keys[node.path] })
+      /* @__PURE__ */ a4(Keys, { keys: model.keys[node.path] })
     ] }),
     state?.error && /* @__PURE__ */ a4("p", { class: "error", children: shorten(state.error, 2e3) }),
-    /* @__PURE__ */ a4("ul", { class: "outcomes", children: node.outcomes.map((outcome) => /* @__PURE__ */ a4(Outcome, { node, outcome, times: own(state?.outcomes, outcome), model: model2 })) })
+    /* @__PURE__ */ a4("ul", { class: "outcomes", children: node.outcomes.map((outcome) => /* @__PURE__ */ a4(Outcome, { node, outcome, times: own(state?.outcomes, outcome), model })) })
   ] });
 }
 function factsOf(node, state, now) {
   const running = state?.since != null ? (now - state.since / 1e6) / 1e3 : null;
-  const recorded = own(statistics.value?.states, node.path);
-  const facts2 = [
+  const recorded = own(store.data.statistics.value?.states, node.path);
+  const facts = [
     ["kind", `${KIND_NAMES[node.kind] ?? node.kind} (${node.type_name})`],
     ...node.details
   ];
-  facts2.push(["visits", state?.visits ?? 0]);
-  if (state?.visits) facts2.push(["time inside", duration(state.seconds + (running ?? 0))]);
-  if (running !== null) facts2.push(["running for", duration(running)]);
-  if (state?.attempt && state.attempt > 1) facts2.push(["attempt", state.attempt]);
-  if (recorded) facts2.push(["recorded runs", recordedText(recorded)]);
-  return facts2;
+  facts.push(["visits", state?.visits ?? 0]);
+  if (state?.visits) facts.push(["time inside", duration(state.seconds + (running ?? 0))]);
+  if (running !== null) facts.push(["running for", duration(running)]);
+  if (state?.attempt && state.attempt > 1) facts.push(["attempt", state.attempt]);
+  if (recorded) facts.push(["recorded runs", recordedText(recorded)]);
+  return facts;
 }
 function recordedText({ median, p95, failures, visits }) {
   const times = `median ${duration(median ?? 0)}, 95 % under ${duration(p95 ?? 0)}`;
@@ -9891,9 +10036,9 @@ function Outcome({
   node,
   outcome,
   times,
-  model: model2
+  model
 }) {
-  const link2 = model2.linkOf(node, outcome);
+  const link2 = model.linkOf(node, outcome);
   return /* @__PURE__ */ a4("li", { children: [
     /* @__PURE__ */ a4(OutcomeBreakpoint, { node, outcome }),
     /* @__PURE__ */ a4(Pill, { kind: endClass(node, outcome), children: shorten(outcome, 60) }),
@@ -9933,8 +10078,8 @@ function Userdata({ page: page2, data, now }) {
 function sorted(data) {
   const rank = /* @__PURE__ */ new Map();
   for (const { container, at } of Object.values(data.userdata)) {
-    const runs3 = own(data.states, container)?.since != null;
-    rank.set(container, Math.max(rank.get(container) ?? 0, runs3 ? RUNS : at));
+    const runs2 = own(data.states, container)?.since != null;
+    rank.set(container, Math.max(rank.get(container) ?? 0, runs2 ? RUNS : at));
   }
   return Object.entries(data.userdata).sort(
     ([a5, one], [b3, other]) => rank.get(other.container) - rank.get(one.container) || (a5 < b3 ? -1 : 1)
@@ -9964,7 +10109,7 @@ function Row3({
         "by ",
         /* @__PURE__ */ a4(StateLink, { path: entry.writer, page: page2 }),
         " at ",
-        instantText(entry.at / 1e6, 2)
+        store.clock.instantText(entry.at / 1e6, 2)
       ] })
     ] })
   ] });
@@ -9972,12 +10117,12 @@ function Row3({
 function Whole({ value }) {
   const branch = branchOf(value);
   if (typeof branch === "string") return /* @__PURE__ */ a4("pre", { children: branch.slice(0, LONGEST2) });
-  const item = ([name, part2]) => {
-    const inner = branchOf(part2);
+  const item = ([name, part]) => {
+    const inner = branchOf(part);
     return /* @__PURE__ */ a4("li", { children: [
       name !== null && /* @__PURE__ */ a4("b", { children: shorten(name, 80) }),
       " ",
-      typeof inner === "string" ? inner.slice(0, LONGEST2) : /* @__PURE__ */ a4(Whole, { value: part2 })
+      typeof inner === "string" ? inner.slice(0, LONGEST2) : /* @__PURE__ */ a4(Whole, { value: part })
     ] });
   };
   const left = branch.parts.length - MOST_ITEMS2;
@@ -9995,10 +10140,10 @@ function Whole({ value }) {
 }
 var wholeValues = y3({});
 function WholeValue({ entry }) {
-  const container = model.value?.get(entry.writer)?.parent?.path ?? entry.container;
-  const id = `${facts.value?.epoch} ${container} ${entry.key}`;
+  const container = store.data.model.value?.get(entry.writer)?.parent?.path ?? entry.container;
+  const id = `${store.data.facts.value?.epoch} ${container} ${entry.key}`;
   const found = wholeValues.value[id];
-  if (isFile() || facts.value?.recorded) return /* @__PURE__ */ a4("small", { children: "shortened when it was recorded" });
+  if (isFile() || store.data.facts.value?.recorded) return /* @__PURE__ */ a4("small", { children: "shortened when it was recorded" });
   const put2 = (answer) => {
     wholeValues.value = { ...wholeValues.value, [id]: answer };
   };
@@ -10025,12 +10170,12 @@ function WholeValue({ entry }) {
 }
 function Changes({ page: page2 }) {
   const [whole2, setWhole] = d2(false);
-  if (cursor.value === null) return null;
-  const { before, writes } = run.lastTransition(eventsShown());
-  const shown2 = whole2 ? writes : writes.slice(-MOST_CHANGES);
+  if (store.playback.cursor.value === null) return null;
+  const { before, writes } = store.data.run.lastTransition(store.playback.eventsShown());
+  const shown = whole2 ? writes : writes.slice(-MOST_CHANGES);
   return /* @__PURE__ */ a4(Section, { title: "Changed by this transition", children: [
     !writes.length && /* @__PURE__ */ a4("p", { class: "hint", children: "no userdata was written" }),
-    shown2.map((e4) => {
+    shown.map((e4) => {
       const was = own(before.userdata, `${containerOf(e4.path)} ${e4.key}`);
       return /* @__PURE__ */ a4("div", { class: "diff", children: [
         /* @__PURE__ */ a4("b", { children: e4.key }),
@@ -10045,44 +10190,44 @@ function Changes({ page: page2 }) {
         ] })
       ] });
     }),
-    /* @__PURE__ */ a4(More, { left: writes.length - shown2.length, onMore: () => setWhole(true) })
+    /* @__PURE__ */ a4(More, { left: writes.length - shown.length, onMore: () => setWhole(true) })
   ] });
 }
 
 // src/panels/why.tsx
 function WhyPanel({ page: page2 }) {
-  const why2 = why.value;
-  if (!why2) return null;
+  const why = store.data.why.value;
+  if (!why) return null;
   const copy2 = async () => {
     try {
-      await navigator.clipboard.writeText(why2.text);
-      notify("Copied");
+      await navigator.clipboard.writeText(why.text);
+      store.view.notify("Copied");
     } catch {
-      notify("This browser lets no page copy here: mark the text and copy it", "error");
+      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
     }
   };
-  const title = why2.outcome === null ? "Why has it no end?" : "Why did it end so?";
+  const title = why.outcome === null ? "Why has it no end?" : "Why did it end so?";
   return /* @__PURE__ */ a4(Section, { title, children: /* @__PURE__ */ a4("div", { class: "why", children: [
     /* @__PURE__ */ a4("span", { class: "why-tools", children: [
       /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy as text" }),
       /* @__PURE__ */ a4("button", { class: "small", "aria-label": "close", onClick: () => showWhy(false), children: "✕" })
     ] }),
-    !why2.steps.length && /* @__PURE__ */ a4("p", { class: "hint", children: "the causes are unknown" }),
-    /* @__PURE__ */ a4("ol", { children: why2.steps.map((step, i4) => /* @__PURE__ */ a4(Step, { step, first: i4 === 0, page: page2 })) })
+    !why.steps.length && /* @__PURE__ */ a4("p", { class: "hint", children: "the causes are unknown" }),
+    /* @__PURE__ */ a4("ol", { children: why.steps.map((step, i4) => /* @__PURE__ */ a4(Step, { step, first: i4 === 0, page: page2 })) })
   ] }) });
 }
 function Step({ step, first, page: page2 }) {
   const goThere = () => {
-    seek(step.stamp_ns / 1e6);
+    store.playback.seek(step.stamp_ns / 1e6);
     page2.goTo(step.path);
   };
   return /* @__PURE__ */ a4("li", { class: `${step.kind} ${first ? "first" : ""}`, children: [
     /* @__PURE__ */ a4("button", { class: "step", title: step.path, onClick: goThere, children: [
-      /* @__PURE__ */ a4("b", { children: nameOf(step.path) }),
+      /* @__PURE__ */ a4("b", { children: store.data.nameOf(step.path) }),
       " ",
       /* @__PURE__ */ a4("span", { class: `word ${step.kind}`, children: step.what }),
       " ",
-      /* @__PURE__ */ a4("time", { children: instantText(step.stamp_ns / 1e6, 2) })
+      /* @__PURE__ */ a4("time", { children: store.clock.instantText(step.stamp_ns / 1e6, 2) })
     ] }),
     step.reason && /* @__PURE__ */ a4("p", { children: step.reason }),
     step.detail && /* @__PURE__ */ a4("pre", { children: step.detail }),
@@ -10104,17 +10249,17 @@ function Step({ step, first, page: page2 }) {
 // src/panels/inspector.tsx
 var MOST_PROBLEMS = 30;
 function Inspector({ page: page2 }) {
-  slowTick.value;
-  const model2 = model.value;
-  if (!model2) return /* @__PURE__ */ a4("aside", { class: "inspector" });
-  const shared = { page: page2, data: shown(), now: nowMs() };
+  store.playback.slowTick.value;
+  const model = store.data.model.value;
+  if (!model) return /* @__PURE__ */ a4("aside", { class: "inspector" });
+  const shared = { page: page2, data: store.playback.shown(), now: store.playback.nowMs() };
   return /* @__PURE__ */ a4("aside", { class: "inspector", "aria-label": "details", children: [
     /* @__PURE__ */ a4(MissingEvents, { dropped: shared.data.dropped ?? 0 }),
     /* @__PURE__ */ a4(WhyPanel, { page: page2 }),
-    /* @__PURE__ */ a4(SelectedState, { ...shared, model: model2 }),
+    /* @__PURE__ */ a4(SelectedState, { ...shared, model }),
     /* @__PURE__ */ a4(Differences, { page: page2 }),
     /* @__PURE__ */ a4(Preempts, { ...shared }),
-    /* @__PURE__ */ a4(Notes, {}),
+    /* @__PURE__ */ a4(Notes2, {}),
     /* @__PURE__ */ a4(Goals, { ...shared }),
     /* @__PURE__ */ a4(Userdata, { ...shared }),
     /* @__PURE__ */ a4(Changes, { page: page2 }),
@@ -10124,11 +10269,11 @@ function Inspector({ page: page2 }) {
   ] });
 }
 function MissingEvents({ dropped: dropped2 }) {
-  const gap2 = gap.value;
+  const gap = store.data.gap.value;
   return /* @__PURE__ */ a4($, { children: [
-    gap2 !== null && /* @__PURE__ */ a4("p", { class: "hint gap", role: "status", children: [
+    gap !== null && /* @__PURE__ */ a4("p", { class: "hint gap", role: "status", children: [
       "This page missed ",
-      countOfEvents(gap2),
+      countOfEvents(gap),
       ". They and all before them are counted, but not in the timeline."
     ] }),
     dropped2 > 0 && /* @__PURE__ */ a4("p", { class: "hint gap", role: "status", children: [
@@ -10139,7 +10284,7 @@ function MissingEvents({ dropped: dropped2 }) {
   ] });
 }
 function Problems({ page: page2 }) {
-  const found = problems.value;
+  const found = store.data.problems.value;
   if (!found.length) return null;
   const text2 = (one) => shorten(one.text.startsWith(`${one.path}: `) ? one.text.slice(one.path.length + 2) : one.text, 600);
   return /* @__PURE__ */ a4("section", { children: /* @__PURE__ */ a4("details", { class: "fold-up", children: [
@@ -10159,10 +10304,10 @@ function Problems({ page: page2 }) {
 var NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the topic map.";
 var MOST_ROBOTS = 5;
 function MapPanel({ page: page2, children }) {
-  tick.value;
+  store.playback.tick.value;
   const { map } = page2;
-  const names = [...scene.robots].filter(([, robot]) => robot.poses.length).map(([name]) => name).sort();
-  const noMap = !scene.maps.length;
+  const names = [...store.data.scene.robots].filter(([, robot]) => robot.poses.length).map(([name]) => name).sort();
+  const noMap = !store.data.scene.maps.length;
   return /* @__PURE__ */ a4("section", { class: "map-panel", "aria-label": "map", children: [
     /* @__PURE__ */ a4("header", { children: [
       /* @__PURE__ */ a4("h2", { children: "Map" }),
@@ -10196,15 +10341,15 @@ function MapPanel({ page: page2, children }) {
   ] });
 }
 function Tip() {
-  const visit = hovered.value;
+  const visit = store.pointer.hovered.value;
   if (!visit) return null;
-  const goal = scene.goalOf(visit.path, visit.from);
-  const span = run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
+  const goal = store.data.scene.goalOf(visit.path, visit.from);
+  const span = store.data.run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
   const to = span?.to ?? null;
-  const place = goal ? scene.placeName(goal) : "";
-  const times = [visit.from, to].map((t4) => t4 === null ? "now" : instantText(t4)).join(" – ");
-  const took = ((to ?? nowMs()) - visit.from) / 1e3;
-  const title = nameOf(visit.path) + (place && ` → ${shorten(place, 30)}`);
+  const place = goal ? store.data.scene.placeName(goal) : "";
+  const times = [visit.from, to].map((t4) => t4 === null ? "now" : store.clock.instantText(t4)).join(" – ");
+  const took = ((to ?? store.playback.nowMs()) - visit.from) / 1e3;
+  const title = store.data.nameOf(visit.path) + (place && ` → ${shorten(place, 30)}`);
   return /* @__PURE__ */ a4("div", { class: "tip", role: "status", children: [
     /* @__PURE__ */ a4("b", { children: title }),
     /* @__PURE__ */ a4("span", { children: [
@@ -10256,28 +10401,28 @@ var KEYS2 = [
   ["Esc", "clear the selection"]
 ];
 function Overlay({ page: page2 }) {
-  const stale = facts.value?.stale;
-  if (failure.value)
-    return /* @__PURE__ */ a4("div", { class: "empty", children: /* @__PURE__ */ a4("p", { class: "error", children: failure.value }) });
-  if (!model.value) return /* @__PURE__ */ a4(Empty, {});
-  if (runStatus.value.word === "stale" && stale != null)
+  const stale = store.data.facts.value?.stale;
+  if (store.data.failure.value)
+    return /* @__PURE__ */ a4("div", { class: "empty", children: /* @__PURE__ */ a4("p", { class: "error", children: store.data.failure.value }) });
+  if (!store.data.model.value) return /* @__PURE__ */ a4(Empty, {});
+  if (store.status.runStatus.value.word === "stale" && stale != null)
     return /* @__PURE__ */ a4("div", { class: "banner waiting", children: [
       "Stale: no message from this machine since ",
       new Date(stale / 1e6).toLocaleTimeString("en-GB"),
       ". You see its last known state."
     ] });
-  if (connection.value === "lost")
+  if (store.data.connection.value === "lost")
     return /* @__PURE__ */ a4("div", { class: "banner waiting", children: [
-      problem.value || "The viewer's server does not answer.",
+      store.data.problem.value || "The viewer's server does not answer.",
       " You see the last known state; this page keeps trying."
     ] });
-  if (cursor.value !== null) {
-    const isOver = facts.value?.recorded || isFile();
-    const ago = ((run.last() ?? cursor.value) - cursor.value) / 1e3;
+  if (store.playback.cursor.value !== null) {
+    const isOver = store.data.facts.value?.recorded || isFile();
+    const ago = ((store.data.run.last() ?? store.playback.cursor.value) - store.playback.cursor.value) / 1e3;
     const when = isOver ? "before the end" : "ago";
     return /* @__PURE__ */ a4("div", { class: "banner past", children: [
       "Viewing ",
-      /* @__PURE__ */ a4("b", { children: instantText(cursor.value) }),
+      /* @__PURE__ */ a4("b", { children: store.clock.instantText(store.playback.cursor.value) }),
       ", ",
       duration(ago),
       " ",
@@ -10288,7 +10433,7 @@ function Overlay({ page: page2 }) {
       ] })
     ] });
   }
-  const after = facts.value?.after;
+  const after = store.data.facts.value?.after;
   if (after)
     return /* @__PURE__ */ a4("div", { class: "banner other", children: [
       "You see an earlier run.",
@@ -10298,7 +10443,7 @@ function Overlay({ page: page2 }) {
 }
 function RestartBanner({ before }) {
   const dismiss = () => {
-    dismissed.value = before;
+    store.view.dismissed.value = before;
   };
   return /* @__PURE__ */ a4("div", { class: "banner other restarted", role: "status", children: [
     "A new run began.",
@@ -10307,12 +10452,12 @@ function RestartBanner({ before }) {
   ] });
 }
 function PreemptBanner({ page: page2 }) {
-  tick.value;
-  const now = nowMs();
-  const found = run.now.ended == null ? run.preemptAt(now) : null;
-  const before = facts.value?.before;
+  store.playback.tick.value;
+  const now = store.playback.nowMs();
+  const found = store.data.run.now.ended == null ? store.data.run.preemptAt(now) : null;
+  const before = store.data.facts.value?.before;
   if (!found || found.to !== null)
-    return before && dismissed.value !== before ? /* @__PURE__ */ a4(RestartBanner, { before }) : null;
+    return before && store.view.dismissed.value !== before ? /* @__PURE__ */ a4(RestartBanner, { before }) : null;
   const by = askerText(found.rows[0].asked);
   const more = found.holds.length - MOST_HOLDS;
   return /* @__PURE__ */ a4("div", { class: "banner preempted preempt-banner", role: "status", children: [
@@ -10338,14 +10483,14 @@ function PreemptBanner({ page: page2 }) {
   ] });
 }
 function Empty() {
-  const name = wanted.value;
-  const list = machines.value;
-  if (connection.value === "lost")
+  const name = store.data.wanted.value;
+  const list = store.data.machines.value;
+  if (store.data.connection.value === "lost")
     return /* @__PURE__ */ a4("div", { class: "empty", children: /* @__PURE__ */ a4("p", { children: [
-      problem.value || "The viewer's server does not answer.",
+      store.data.problem.value || "The viewer's server does not answer.",
       " This page keeps trying."
     ] }) });
-  if (!isMissing.value) return null;
+  if (!store.data.isMissing.value) return null;
   const text2 = name ? `No machine is called “${shorten(name, 80)}”.` : "No machine on the network yet.";
   const others = list.slice(0, MOST_NAMES3);
   const more = list.length - others.length;
@@ -10365,7 +10510,7 @@ function Empty() {
   ] });
 }
 function Laying() {
-  const laid = laidOut.value;
+  const laid = store.view.laidOut.value;
   if (!laid) return null;
   const { done, all } = laid;
   const text2 = `${done.toLocaleString("en")} of ${all.toLocaleString("en")} states`;
@@ -10375,7 +10520,7 @@ function Laying() {
   ] });
 }
 function Legend() {
-  if (comparison.value) {
+  if (store.data.comparison.value) {
     const changes = ["added", "removed", "changed"];
     return /* @__PURE__ */ a4("div", { class: "legend", "aria-hidden": "true", children: changes.map((change2) => /* @__PURE__ */ a4("span", { children: [
       /* @__PURE__ */ a4("b", { class: change2 }),
@@ -10384,8 +10529,8 @@ function Legend() {
       change2
     ] })) });
   }
-  slowTick.value;
-  const scale = heatScale(numbers.value, shown().states, model.value);
+  store.playback.slowTick.value;
+  const scale = heatScale(store.view.numbers.value, store.playback.shown().states, store.data.model.value);
   return /* @__PURE__ */ a4("div", { class: "legend", "aria-hidden": "true", children: [
     scale && /* @__PURE__ */ a4("span", { class: "scale", children: [
       scale[0],
@@ -10396,17 +10541,17 @@ function Legend() {
       /* @__PURE__ */ a4("b", { class: kind }),
       text2
     ] })),
-    overview.value && /* @__PURE__ */ a4("span", { class: "hint", children: "double-click opens one" })
+    store.view.overview.value && /* @__PURE__ */ a4("span", { class: "hint", children: "double-click opens one" })
   ] });
 }
 function Notice() {
-  const notice2 = notice.value;
-  return /* @__PURE__ */ a4("div", { class: "notices", "aria-live": "assertive", children: notice2 && /* @__PURE__ */ a4("div", { class: `notice ${notice2.kind}`, children: notice2.text }) });
+  const notice = store.view.notice.value;
+  return /* @__PURE__ */ a4("div", { class: "notices", "aria-live": "assertive", children: notice && /* @__PURE__ */ a4("div", { class: `notice ${notice.kind}`, children: notice.text }) });
 }
 function Help() {
-  if (!help.value) return null;
+  if (!store.view.help.value) return null;
   const close2 = () => {
-    help.value = false;
+    store.view.help.value = false;
   };
   return /* @__PURE__ */ a4(Dialog, { label: "keys", class: "keys", onClose: close2, children: [
     /* @__PURE__ */ a4("header", { children: [
@@ -10422,9 +10567,9 @@ function Help() {
 function TokenDialog() {
   const [text2, setText] = d2("");
   const [wrong, setWrong] = d2(false);
-  if (!tokenAsked.value) return null;
+  if (!store.view.tokenAsked.value) return null;
   const close2 = () => {
-    tokenAsked.value = false;
+    store.view.tokenAsked.value = false;
   };
   const onSubmit = (e4) => {
     e4.preventDefault();
@@ -10469,11 +10614,11 @@ function ranked(items3, text2) {
   const found = items3.filter((item) => {
     if (kind !== null && item.kind !== kind) return false;
     const all = `${item.name} ${item.more}`.toLowerCase();
-    return item.kind === "instant" || parts.every((part2) => all.includes(part2));
+    return item.kind === "instant" || parts.every((part) => all.includes(part));
   });
   const rank = ({ name, kind: of }) => {
     const low = name.toLowerCase();
-    const place = low.startsWith(parts[0] ?? "") ? 0 : parts.every((part2) => low.includes(part2)) ? 1 : 2;
+    const place = low.startsWith(parts[0] ?? "") ? 0 : parts.every((part) => low.includes(part)) ? 1 : 2;
     return place * ORDER.length + ORDER.indexOf(of);
   };
   const ranks = new Map(found.map((item) => [item, rank(item)]));
@@ -10483,14 +10628,14 @@ function ranked(items3, text2) {
 // src/panels/palette.tsx
 var MOST_RUNS = 300;
 function itemsNow(page2, text2) {
-  return [...instants(text2), ...commands(page2), ...states(page2), ...keys(page2), ...runs2()];
+  return [...instants(text2), ...commands(page2), ...states(page2), ...keys(page2), ...runs()];
 }
 function instants(text2) {
   const seconds = parseInstant(asked(text2).words);
-  const began2 = began();
-  if (seconds === null || began2 === null) return [];
-  const at = began2 + 1e3 * seconds;
-  return [{ kind: "instant", name: runText(at), more: "go there", pick: () => seek(at) }];
+  const began = store.playback.began();
+  if (seconds === null || began === null) return [];
+  const at = began + 1e3 * seconds;
+  return [{ kind: "instant", name: store.clock.runText(at), more: "go there", pick: () => store.playback.seek(at) }];
 }
 function commands(page2) {
   const item = (name, keys2, pick, more = "") => {
@@ -10506,48 +10651,53 @@ function commands(page2) {
   found.push(
     item(isDark() ? "Light colours" : "Dark colours", "d", () => page2.setTheme(isDark() ? "light" : "dark")),
     item("All keys", "?", () => {
-      help.value = true;
+      store.view.help.value = true;
     })
   );
-  if (!model.value) return found;
-  const facts2 = control();
-  if (facts2 && hasToken() && whyDisarmed.value === null) {
-    const [name, what] = facts2.paused ? ["resume", "Resume"] : ["pause", "Pause"];
+  if (!store.data.model.value) return found;
+  const facts = control();
+  if (facts && hasToken() && store.status.whyDisarmed.value === null) {
+    const [name, what] = facts.paused ? ["resume", "Resume"] : ["pause", "Pause"];
     found.push(item(`${what} ${targetText()}`, "Space", () => command(name)));
-    if (facts2.paused) found.push(item(`Step ${targetText()}`, "s", () => command("step")));
+    if (facts.paused) found.push(item(`Step ${targetText()}`, "s", () => command("step")));
   }
   found.push(
-    item(follow.value ? "Do not follow" : "Follow", "o", () => page2.setFollow(!follow.value), "what runs"),
+    item(
+      store.view.follow.value ? "Do not follow" : "Follow",
+      "o",
+      () => page2.setFollow(!store.view.follow.value),
+      "what runs"
+    ),
     item("Live", "l", () => page2.timeline.live(), "the present, or the end"),
     item("Show everything", "0", () => page2.refit()),
     item("Whole run", "", () => page2.timeline.fitAll(), "in the timeline"),
-    item("Next failure", "f", () => jump("kind failure", 1)),
-    item("Next preempt", "p", () => jump("kind preempt", 1)),
-    item("Next goal", "g", () => jump("kind goal", 1)),
+    item("Next failure", "f", () => store.playback.jump("kind failure", 1)),
+    item("Next preempt", "p", () => store.playback.jump("kind preempt", 1)),
+    item("Next goal", "g", () => store.playback.jump("kind goal", 1)),
     item("Why?", "w", () => showWhy(), "from the first cause to the outcome"),
-    item("Note", "n", () => askForNote(), "at the instant shown"),
-    item("Implicit transitions", "i", () => page2.setImplicit(!implicit.value), "show or hide")
+    item("Note", "n", () => store.notes.begin(), "at the instant shown"),
+    item("Implicit transitions", "i", () => page2.setImplicit(!store.view.implicit.value), "show or hide")
   );
   return found;
 }
-var states = (page2) => (model.value?.order ?? []).map((node) => ({
+var states = (page2) => (store.data.model.value?.order ?? []).map((node) => ({
   kind: "state",
   name: node.name,
   more: node.parent ? node.parent.path : KIND_NAMES[node.kind],
   pick: () => page2.goTo(node.path)
 }));
-var keys = (page2) => Object.values(shown().userdata).map(({ key, value, writer, at }) => ({
+var keys = (page2) => Object.values(store.playback.shown().userdata).map(({ key, value, writer, at }) => ({
   kind: "key",
   name: key,
-  more: `${brief(value).slice(0, 60)} by ${nameOf(writer)}`,
+  more: `${brief(value).slice(0, 60)} by ${store.data.nameOf(writer)}`,
   pick: () => {
-    followedKey.value = key;
+    store.playback.followedKey.value = key;
     page2.goTo(writer);
-    if (cursor.value !== null || !goes.value) seek(at / 1e6);
+    if (store.playback.cursor.value !== null || !store.playback.goes.value) store.playback.seek(at / 1e6);
   }
 }));
-function runs2() {
-  const machines2 = machines.value.map(
+function runs() {
+  const machines = store.data.machines.value.map(
     ({ name, label, recorded }) => ({
       kind: "run",
       name: label,
@@ -10555,7 +10705,7 @@ function runs2() {
       pick: () => choose(name)
     })
   );
-  const others = runs.value.runs.filter(({ name }) => name === null).slice(0, MOST_RUNS);
+  const others = store.data.runs.value.runs.filter(({ name }) => name === null).slice(0, MOST_RUNS);
   const past = others.map(
     ({ id, machine, outcome, file }) => ({
       kind: "run",
@@ -10564,14 +10714,14 @@ function runs2() {
       pick: () => openRun(id)
     })
   );
-  return [...machines2, ...past];
+  return [...machines, ...past];
 }
 var SIGN_OF = Object.fromEntries(Object.entries(SIGNS2).map(([sign2, kind]) => [kind, sign2]));
 function Palette({ page: page2 }) {
-  return paletteOpen.value ? /* @__PURE__ */ a4(Open, { page: page2 }) : null;
+  return store.view.paletteOpen.value ? /* @__PURE__ */ a4(Open, { page: page2 }) : null;
 }
 var close = () => {
-  paletteOpen.value = false;
+  store.view.paletteOpen.value = false;
 };
 function Open({ page: page2 }) {
   const [text2, setText] = d2("");
@@ -10668,35 +10818,43 @@ var IconButton = ({
   ...more
 }) => /* @__PURE__ */ a4("button", { class: "icon-button", title, "aria-label": title, ...more, children: /* @__PURE__ */ a4("svg", { viewBox: "0 0 16 16", "aria-hidden": "true", children: /* @__PURE__ */ a4("path", { d: ICONS2[name] }) }) });
 function PlayBar({ page: page2 }) {
-  tick.value;
-  const first = run.first();
+  store.playback.tick.value;
+  const first = store.data.run.first();
   if (first === null) return null;
-  const goes2 = goes.value;
-  const live = cursor.value === null;
-  const end = isFile() || facts.value?.recorded ? "End" : "Live";
+  const goes = store.playback.goes.value;
+  const live = store.playback.cursor.value === null;
+  const end = isFile() || store.data.facts.value?.recorded ? "End" : "Live";
   return /* @__PURE__ */ a4("div", { class: "play", role: "region", "aria-label": "play bar", children: [
     /* @__PURE__ */ a4("span", { class: "group", children: [
-      /* @__PURE__ */ a4(IconButton, { name: "begin", title: "to the beginning (Home)", onClick: () => seek(first) }),
-      /* @__PURE__ */ a4(IconButton, { name: "back", title: "one event back (,)", onClick: () => seekEvent(-1) }),
+      /* @__PURE__ */ a4(IconButton, { name: "begin", title: "to the beginning (Home)", onClick: () => store.playback.seek(first) }),
+      /* @__PURE__ */ a4(IconButton, { name: "back", title: "one event back (,)", onClick: () => store.playback.seekEvent(-1) }),
       /* @__PURE__ */ a4(
         IconButton,
         {
-          name: goes2 ? "pause" : "play",
-          title: goes2 ? "hold the picture" : "play",
+          name: goes ? "pause" : "play",
+          title: goes ? "hold the picture" : "play",
           id: "play",
-          onClick: () => togglePlaying()
+          onClick: () => store.playback.togglePlaying()
         }
       ),
-      /* @__PURE__ */ a4(IconButton, { name: "forward", title: "one event forward (.)", onClick: () => seekEvent(1) }),
+      /* @__PURE__ */ a4(IconButton, { name: "forward", title: "one event forward (.)", onClick: () => store.playback.seekEvent(1) }),
       /* @__PURE__ */ a4(IconButton, { name: "end", title: "to the end (End)", onClick: () => page2.timeline.live() })
     ] }),
-    /* @__PURE__ */ a4(Clock, {}),
+    /* @__PURE__ */ a4(Clock2, {}),
     /* @__PURE__ */ a4("label", { class: "rate", children: [
       /* @__PURE__ */ a4("span", { class: "hidden", children: "speed" }),
-      /* @__PURE__ */ a4("select", { value: rate.value, title: "speed", onChange: (e4) => setRate(Number(fieldValue(e4))), children: RATES.map((rate2) => /* @__PURE__ */ a4("option", { value: rate2, children: [
-        rate2,
-        " ×"
-      ] })) })
+      /* @__PURE__ */ a4(
+        "select",
+        {
+          value: store.playback.rate.value,
+          title: "speed",
+          onChange: (e4) => store.playback.setRate(Number(fieldValue(e4))),
+          children: RATES.map((rate) => /* @__PURE__ */ a4("option", { value: rate, children: [
+            rate,
+            " ×"
+          ] }))
+        }
+      )
     ] }),
     /* @__PURE__ */ a4(LoopButton, {}),
     /* @__PURE__ */ a4(Jumps, {}),
@@ -10714,8 +10872,8 @@ function PlayBar({ page: page2 }) {
   ] });
 }
 function LoopButton() {
-  const [on2, found] = [looping.value, stretch.value];
-  const what = found ? `from ${instantText(found.from)} to ${instantText(found.to)}` : "over the selected state's visit; drag in the timeline to select a stretch";
+  const [on2, found] = [store.playback.looping.value, store.playback.stretch.value];
+  const what = found ? `from ${store.clock.instantText(found.from)} to ${store.clock.instantText(found.to)}` : "over the selected state's visit; drag in the timeline to select a stretch";
   return /* @__PURE__ */ a4(
     IconButton,
     {
@@ -10724,25 +10882,26 @@ function LoopButton() {
       "aria-pressed": on2,
       id: "loop",
       title: `loop ${what} (r)`,
-      onClick: () => toggleLoop()
+      onClick: () => store.playback.toggleLoop()
     }
   );
 }
-function Clock() {
-  tick.value;
-  const last = run.last() ?? 0;
+function Clock2() {
+  store.playback.tick.value;
+  const last = store.data.run.last() ?? 0;
   const [typed, setTyped] = d2(null);
   const onChange = (e4) => {
     const seconds = parseInstant(fieldValue(e4));
-    if (seconds === null) notify(`Instant: got ${shorten(fieldValue(e4), 30)}; expected such as 01:32.5`, "error");
-    else seek((began() ?? 0) + seconds * 1e3);
+    if (seconds === null)
+      store.view.notify(`Instant: got ${shorten(fieldValue(e4), 30)}; expected such as 01:32.5`, "error");
+    else store.playback.seek((store.playback.began() ?? 0) + seconds * 1e3);
     e4.target.blur();
   };
   const onFocus = (e4) => {
     setTyped(fieldValue(e4));
     e4.target.select();
   };
-  const text2 = typed ?? runText(nowMs());
+  const text2 = typed ?? store.clock.runText(store.playback.nowMs());
   return /* @__PURE__ */ a4("span", { class: "clock", children: [
     /* @__PURE__ */ a4(
       "input",
@@ -10760,16 +10919,16 @@ function Clock() {
     ),
     /* @__PURE__ */ a4("small", { children: [
       "/ ",
-      runText(Math.max(last, nowMs()))
+      store.clock.runText(Math.max(last, store.playback.nowMs()))
     ] })
   ] });
 }
 function Jumps() {
-  slowTick.value;
-  const keys2 = [...marks.keys].sort();
-  const key = followedKey.value ?? keys2[0];
+  store.playback.slowTick.value;
+  const keys2 = [...store.data.marks.keys].sort();
+  const key = store.playback.followedKey.value ?? keys2[0];
   const choose2 = (e4) => {
-    followedKey.value = fieldValue(e4);
+    store.playback.followedKey.value = fieldValue(e4);
   };
   return /* @__PURE__ */ a4("span", { class: "jumps", role: "group", "aria-label": "go to the next", children: [
     /* @__PURE__ */ a4("span", { class: "hint", children: "Next" }),
@@ -10785,7 +10944,7 @@ function Jumps() {
   ] });
 }
 function Jump({ name, letter, children }) {
-  const ahead = jumpOf(name, 1) !== null;
+  const ahead = store.playback.jumpOf(name, 1) !== null;
   const title = `${ahead ? "go there" : "none ahead"} (${letter.toLowerCase()}); before it: Shift+${letter}`;
   return /* @__PURE__ */ a4(
     "button",
@@ -10793,7 +10952,7 @@ function Jump({ name, letter, children }) {
       class: ahead ? "" : "none",
       "aria-disabled": !ahead,
       title,
-      onClick: (e4) => jump(name, e4.shiftKey ? -1 : 1),
+      onClick: (e4) => store.playback.jump(name, e4.shiftKey ? -1 : 1),
       children: [
         children,
         /* @__PURE__ */ a4("kbd", { children: letter })
@@ -10849,14 +11008,14 @@ var doc = domEnv ? document : null;
 var win = domEnv ? window : null;
 var nav = domEnv ? navigator : null;
 var pxRatio;
-var query2;
+var query;
 function setPxRatio() {
   let _pxRatio = devicePixelRatio;
   if (pxRatio != _pxRatio) {
     pxRatio = _pxRatio;
-    query2 && off(change, query2, setPxRatio);
-    query2 = matchMedia(`(min-resolution: ${pxRatio - 1e-3}dppx) and (max-resolution: ${pxRatio + 1e-3}dppx)`);
-    on(change, query2, setPxRatio);
+    query && off(change, query, setPxRatio);
+    query = matchMedia(`(min-resolution: ${pxRatio - 1e-3}dppx) and (max-resolution: ${pxRatio + 1e-3}dppx)`);
+    on(change, query, setPxRatio);
     win.dispatchEvent(new CustomEvent(dppxchange));
   }
 }
@@ -13009,9 +13168,9 @@ function uPlot(opts, data, then) {
   const _timeSeriesVal = timeSeriesVal(_tzDate, timeSeriesStamp(_timeSeriesStamp, _fmtDate));
   const activeIdxs = [];
   const legend = self.legend = assign({}, legendOpts, opts.legend);
-  const cursor2 = self.cursor = assign({}, cursorOpts, { drag: { y: mode == 2 } }, opts.cursor);
+  const cursor = self.cursor = assign({}, cursorOpts, { drag: { y: mode == 2 } }, opts.cursor);
   const showLegend = legend.show;
-  const showCursor = cursor2.show;
+  const showCursor = cursor.show;
   const markers = legend.markers;
   {
     legend.idxs = activeIdxs;
@@ -13079,7 +13238,7 @@ function uPlot(opts, data, then) {
       if (!markers.show)
         text2.style.color = s4.width > 0 ? markers.stroke(self, i4) : markers.fill(self, i4);
       onMouse("click", label, (e4) => {
-        if (cursor2._lock)
+        if (cursor._lock)
           return;
         setCursorEvent(e4);
         let seriesIdx = series.indexOf(s4);
@@ -13093,7 +13252,7 @@ function uPlot(opts, data, then) {
       }, false);
       if (cursorFocus) {
         onMouse(mouseenter, label, (e4) => {
-          if (cursor2._lock)
+          if (cursor._lock)
             return;
           setCursorEvent(e4);
           setSeries(series.indexOf(s4), FOCUS_TRUE, true, syncOpts.setSeries);
@@ -13110,7 +13269,7 @@ function uPlot(opts, data, then) {
   const mouseListeners = /* @__PURE__ */ new Map();
   function onMouse(ev, targ, fn, onlyTarg = true) {
     const targListeners = mouseListeners.get(targ) || {};
-    const listener = cursor2.bind[ev](self, targ, fn, onlyTarg);
+    const listener = cursor.bind[ev](self, targ, fn, onlyTarg);
     if (listener) {
       on(ev, targ, targListeners[ev] = listener);
       mouseListeners.set(targ, targListeners);
@@ -13256,20 +13415,20 @@ function uPlot(opts, data, then) {
       }
     });
   }
-  if (cursor2.dataIdx == null) {
-    let hov = cursor2.hover;
+  if (cursor.dataIdx == null) {
+    let hov = cursor.hover;
     let skip = hov.skip = new Set(hov.skip ?? []);
     skip.add(void 0);
     let prox = hov.prox = fnOrSelf(hov.prox);
     let bias = hov.bias ??= 0;
-    cursor2.dataIdx = (self2, seriesIdx, cursorIdx, valAtPosX) => {
+    cursor.dataIdx = (self2, seriesIdx, cursorIdx, valAtPosX) => {
       if (seriesIdx == 0)
         return cursorIdx;
       let idx2 = cursorIdx;
       let _prox = prox(self2, seriesIdx, cursorIdx, valAtPosX) ?? inf;
       let withProx = _prox >= 0 && _prox < inf;
       let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
-      let cursorLft = cursor2.left;
+      let cursorLft = cursor.left;
       let xValues = data[0];
       let yValues = data[seriesIdx];
       if (skip.has(yValues[cursorIdx])) {
@@ -13315,17 +13474,17 @@ function uPlot(opts, data, then) {
     };
   }
   const setCursorEvent = (e4) => {
-    cursor2.event = e4;
+    cursor.event = e4;
   };
-  cursor2.idxs = activeIdxs;
-  cursor2._lock = false;
-  let points2 = cursor2.points;
+  cursor.idxs = activeIdxs;
+  cursor._lock = false;
+  let points2 = cursor.points;
   points2.show = fnOrSelf(points2.show);
   points2.size = fnOrSelf(points2.size);
   points2.stroke = fnOrSelf(points2.stroke);
   points2.width = fnOrSelf(points2.width);
   points2.fill = fnOrSelf(points2.fill);
-  const focus = self.focus = assign({}, opts.focus || { alpha: 0.3 }, cursor2.focus);
+  const focus = self.focus = assign({}, opts.focus || { alpha: 0.3 }, cursor.focus);
   const cursorFocus = focus.prox >= 0;
   const cursorOnePt = cursorFocus && points2.one;
   let cursorPts = [];
@@ -13518,7 +13677,7 @@ function uPlot(opts, data, then) {
         autoScaleX();
       else
         _setScale(xScaleKey, xsc.min, xsc.max);
-      shouldSetCursor = shouldSetCursor || cursor2.left >= 0;
+      shouldSetCursor = shouldSetCursor || cursor.left >= 0;
       shouldSetLegend = true;
       commit();
     }
@@ -13728,7 +13887,7 @@ function uPlot(opts, data, then) {
         shouldConvergeSize = true;
         fire("setScale", k4);
       }
-      if (showCursor && cursor2.left >= 0)
+      if (showCursor && cursor.left >= 0)
         shouldSetCursor = shouldSetLegend = true;
     }
     for (let k4 in pendScales)
@@ -13771,9 +13930,9 @@ function uPlot(opts, data, then) {
           s4._paths != null && drawPath(i4, false);
           {
             let _gaps = s4._paths != null ? s4._paths.gaps : null;
-            let show3 = s4.points.show(self, i4, i0, i1, _gaps);
-            let idxs2 = s4.points.filter(self, i4, show3, _gaps);
-            if (show3 || idxs2) {
+            let show2 = s4.points.show(self, i4, i0, i1, _gaps);
+            let idxs2 = s4.points.filter(self, i4, show2, _gaps);
+            if (show2 || idxs2) {
               s4.points._paths = s4.points.paths(self, i4, i0, i1, idxs2);
               drawPath(i4, true);
             }
@@ -14194,11 +14353,11 @@ function uPlot(opts, data, then) {
         resetYSeries(false);
         let pctWid = plotWidCss / _plotWidCss;
         let pctHgt = plotHgtCss / _plotHgtCss;
-        if (showCursor && !shouldSetCursor && cursor2.left >= 0) {
-          cursor2.left *= pctWid;
-          cursor2.top *= pctHgt;
-          vCursor && elTrans(vCursor, round(cursor2.left), 0, plotWidCss, plotHgtCss);
-          hCursor && elTrans(hCursor, 0, round(cursor2.top), plotWidCss, plotHgtCss);
+        if (showCursor && !shouldSetCursor && cursor.left >= 0) {
+          cursor.left *= pctWid;
+          cursor.top *= pctHgt;
+          vCursor && elTrans(vCursor, round(cursor.left), 0, plotWidCss, plotHgtCss);
+          hCursor && elTrans(hCursor, 0, round(cursor.top), plotWidCss, plotHgtCss);
           for (let i4 = 0; i4 < cursorPts.length; i4++) {
             let pt = cursorPts[i4];
             if (pt != null) {
@@ -14299,13 +14458,13 @@ function uPlot(opts, data, then) {
   let mouseLeft1;
   let mouseTop1;
   let dragging = false;
-  const drag2 = cursor2.drag;
+  const drag2 = cursor.drag;
   let dragX = drag2.x;
   let dragY = drag2.y;
   if (showCursor) {
-    if (cursor2.x)
+    if (cursor.x)
       xCursor = placeDiv(CURSOR_X, over);
-    if (cursor2.y)
+    if (cursor.y)
       yCursor = placeDiv(CURSOR_Y, over);
     if (scaleX.ori == 0) {
       vCursor = xCursor;
@@ -14314,8 +14473,8 @@ function uPlot(opts, data, then) {
       vCursor = yCursor;
       hCursor = xCursor;
     }
-    mouseLeft1 = cursor2.left;
-    mouseTop1 = cursor2.top;
+    mouseLeft1 = cursor.left;
+    mouseTop1 = cursor.top;
   }
   const select = self.select = assign({
     show: true,
@@ -14419,7 +14578,7 @@ function uPlot(opts, data, then) {
   }
   if (showLegend && cursorFocus) {
     onMouse(mouseleave, legendTable, (e4) => {
-      if (cursor2._lock)
+      if (cursor._lock)
         return;
       setCursorEvent(e4);
       if (focusedSeries != null)
@@ -14523,9 +14682,9 @@ function uPlot(opts, data, then) {
   function updateCursor(src, _fire, _pub) {
     rawMouseLeft1 = mouseLeft1;
     rawMouseTop1 = mouseTop1;
-    [mouseLeft1, mouseTop1] = cursor2.move(self, mouseLeft1, mouseTop1);
-    cursor2.left = mouseLeft1;
-    cursor2.top = mouseTop1;
+    [mouseLeft1, mouseTop1] = cursor.move(self, mouseLeft1, mouseTop1);
+    cursor.left = mouseLeft1;
+    cursor.top = mouseTop1;
     if (showCursor) {
       vCursor && elTrans(vCursor, round(mouseLeft1), 0, plotWidCss, plotHgtCss);
       hCursor && elTrans(hCursor, 0, round(mouseTop1), plotWidCss, plotHgtCss);
@@ -14537,7 +14696,7 @@ function uPlot(opts, data, then) {
     let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
     let yDim = scaleX.ori == 1 ? plotWidCss : plotHgtCss;
     if (mouseLeft1 < 0 || dataLen == 0 || noDataInRange) {
-      idx = cursor2.idx = null;
+      idx = cursor.idx = null;
       for (let i4 = 0; i4 < series.length; i4++) {
         let pt = cursorPts[i4];
         pt != null && elTrans(pt, -10, -10, plotWidCss, plotHgtCss);
@@ -14553,7 +14712,7 @@ function uPlot(opts, data, then) {
       if (mode == 1) {
         mouseXPos = scaleX.ori == 0 ? mouseLeft1 : mouseTop1;
         valAtPosX = posToVal(mouseXPos, xScaleKey);
-        idx = cursor2.idx = closestIdx(valAtPosX, data[0], i0, i1);
+        idx = cursor.idx = closestIdx(valAtPosX, data[0], i0, i1);
         xPos = valToPosX(data[0][idx], scaleX, xDim, 0);
       }
       let _ptLft = -10;
@@ -14567,7 +14726,7 @@ function uPlot(opts, data, then) {
         let s4 = series[i4];
         let idx1 = activeIdxs[i4];
         let yVal1 = idx1 == null ? null : mode == 1 ? data[i4][idx1] : data[i4][1][idx1];
-        let idx2 = cursor2.dataIdx(self, i4, idx, valAtPosX);
+        let idx2 = cursor.dataIdx(self, i4, idx, valAtPosX);
         let yVal2 = idx2 == null ? null : mode == 1 ? data[i4][idx2] : data[i4][1][idx2];
         shouldSetLegend = shouldSetLegend || yVal2 != yVal1 || idx2 != idx1;
         activeIdxs[i4] = idx2;
@@ -14806,7 +14965,7 @@ function uPlot(opts, data, then) {
     }
   }
   function mouseMove(e4, src, _l, _t, _w, _h, _i) {
-    if (cursor2._lock)
+    if (cursor._lock)
       return;
     if (dragging && e4 != null && e4.movementX == 0 && e4.movementY == 0)
       return;
@@ -14859,7 +15018,7 @@ function uPlot(opts, data, then) {
     if (initial) {
       rawMouseLeft0 = _l;
       rawMouseTop0 = _t;
-      [mouseLeft0, mouseTop0] = cursor2.move(self, _l, _t);
+      [mouseLeft0, mouseTop0] = cursor.move(self, _l, _t);
     } else {
       mouseLeft1 = _l;
       mouseTop1 = _t;
@@ -14924,8 +15083,8 @@ function uPlot(opts, data, then) {
         }
       }
       hideSelect();
-    } else if (cursor2.lock) {
-      cursor2._lock = !cursor2._lock;
+    } else if (cursor.lock) {
+      cursor._lock = !cursor._lock;
       updateCursor(src, true, e4 != null);
     }
     if (e4 != null) {
@@ -14934,7 +15093,7 @@ function uPlot(opts, data, then) {
     }
   }
   function mouseLeave(e4, src, _l, _t, _w, _h, _i) {
-    if (cursor2._lock)
+    if (cursor._lock)
       return;
     setCursorEvent(e4);
     let _dragging = dragging;
@@ -14969,7 +15128,7 @@ function uPlot(opts, data, then) {
       dragging = _dragging;
   }
   function dblClick(e4, src, _l, _t, _w, _h, _i) {
-    if (cursor2._lock)
+    if (cursor._lock)
       return;
     setCursorEvent(e4);
     autoScaleX();
@@ -15031,10 +15190,10 @@ function uPlot(opts, data, then) {
     scales: [xScaleKey, series[1] ? series[1].scale : null],
     match: [retEq, retEq, seriesIdxMatcher],
     values: [null, null]
-  }, cursor2.sync);
+  }, cursor.sync);
   if (syncOpts.match.length == 2)
     syncOpts.match.push(seriesIdxMatcher);
-  cursor2.sync = syncOpts;
+  cursor.sync = syncOpts;
   const syncKey = syncOpts.key;
   const sync = _sync(syncKey);
   function pubSync(type, src, x3, y5, w5, h5, i4) {
@@ -15159,10 +15318,10 @@ var Plot = class {
     );
     element.addEventListener("pointerdown", (e4) => this.#down(e4));
     element.addEventListener("pointermove", (e4) => {
-      pointed.value = this.#timeAt(e4);
+      store.pointer.pointed.value = this.#timeAt(e4);
     });
     element.addEventListener("pointerleave", () => {
-      pointed.value = null;
+      store.pointer.pointed.value = null;
     });
   }
   destroy() {
@@ -15176,10 +15335,10 @@ var Plot = class {
     const [width, height] = [element.clientWidth, element.clientHeight];
     if (!width || !height) return;
     this.range = range;
-    for (const one of this.samples) one.update(run, scene.series);
+    for (const one of this.samples) one.update(store.data.run, store.data.scene.series);
     if (chart.width !== width || chart.height !== height) chart.setSize({ width, height });
     chart.batch(() => {
-      chart.setData(aligned(this.samples, range.from, range.to, nowMs()), false);
+      chart.setData(aligned(this.samples, range.from, range.to, store.playback.nowMs()), false);
       chart.setScale("x", { min: range.from, max: range.to });
     });
   }
@@ -15188,22 +15347,23 @@ var Plot = class {
     const { ctx: g5, bbox } = this.chart;
     const at = (t4) => bbox.left + (t4 - this.range.from) / (this.range.to - this.range.from) * bbox.width;
     const within3 = (px) => Math.max(bbox.left, Math.min(px, bbox.left + bbox.width));
-    const band = (from, to, name, part2 = 1) => {
-      g5.globalAlpha = part2;
+    const band = (from, to, name, part = 1) => {
+      g5.globalAlpha = part;
       g5.fillStyle = this.#colours.of(name);
       g5.fillRect(within3(from), bbox.top, Math.max(0, within3(to) - within3(from)), bbox.height);
     };
     const ratio = devicePixelRatio || 1;
     g5.save();
-    const span = hoveredSpan();
-    if (span) band(at(span.from), at(span.to ?? nowMs()), "halo", 0.22);
-    const stretch2 = stretch.value;
-    if (stretch2) band(at(stretch2.from), at(stretch2.to), "ink", 0.1);
-    if (cursor.value !== null) {
-      band(at(cursor.value), bbox.left + bbox.width, "background", 0.55);
-      band(at(cursor.value) - ratio, at(cursor.value) + ratio, "active");
+    const span = store.pointer.hoveredSpan();
+    if (span) band(at(span.from), at(span.to ?? store.playback.nowMs()), "halo", 0.22);
+    const stretch = store.playback.stretch.value;
+    if (stretch) band(at(stretch.from), at(stretch.to), "ink", 0.1);
+    if (store.playback.cursor.value !== null) {
+      band(at(store.playback.cursor.value), bbox.left + bbox.width, "background", 0.55);
+      band(at(store.playback.cursor.value) - ratio, at(store.playback.cursor.value) + ratio, "active");
     }
-    if (pointed.value !== null) band(at(pointed.value), at(pointed.value) + ratio, "muted");
+    if (store.pointer.pointed.value !== null)
+      band(at(store.pointer.pointed.value), at(store.pointer.pointed.value) + ratio, "muted");
     g5.restore();
   }
   #timeAt(e4) {
@@ -15213,9 +15373,9 @@ var Plot = class {
   }
   #down(e4) {
     if (e4.button !== 0) return;
-    const seek2 = (m5) => seek(this.#timeAt(m5));
-    seek2(e4);
-    drag(seek2);
+    const seek = (m5) => store.playback.seek(this.#timeAt(m5));
+    seek(e4);
+    drag(seek);
   }
 };
 function breaksOf(chart, number, first, last) {
@@ -15245,9 +15405,9 @@ var GROUPS = [
   ["userdata", "userdata"],
   ["feedback", "feedback"]
 ];
-var unitFor = (origin) => origin.source === "topic" ? scene.series.get(origin.owner)?.unit ?? "" : unitOf(origin);
+var unitFor = (origin) => origin.source === "topic" ? store.data.scene.series.get(origin.owner)?.unit ?? "" : unitOf(origin);
 function PlotsPanel({ page: page2 }) {
-  const plots = plotsShown.value;
+  const plots = store.panels.plotsShown.value;
   return /* @__PURE__ */ a4("section", { class: `plots ${plots.length ? "" : "none"}`, "aria-label": "plots", children: plots.map((ids, i4) => /* @__PURE__ */ a4(PlotRow, { page: page2, ids, number: i4 }, ids.join(" "))) });
 }
 function PlotRow({ page: page2, ids, number }) {
@@ -15268,11 +15428,11 @@ function PlotRow({ page: page2, ids, number }) {
           origin,
           label: namesOf(origins)[i4],
           colour: i4,
-          onRemove: () => removeLine(number, ids[i4])
+          onRemove: () => store.panels.removeLine(number, ids[i4])
         },
         ids[i4]
       )),
-      /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4(AddLine, { label: "add a line to this plot", text: "+", onPick: (id) => addLine(number, id) }) })
+      /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4(AddLine, { label: "add a line to this plot", text: "+", onPick: (id) => store.panels.addLine(number, id) }) })
     ] }),
     /* @__PURE__ */ a4("div", { class: "plot-area", ref: place })
   ] });
@@ -15288,11 +15448,11 @@ function Line({
   colour,
   onRemove
 }) {
-  tick.value;
+  store.playback.tick.value;
   const samples = T2(null);
   samples.current ??= new Samples(idOf(origin));
-  const list = samples.current.update(run, scene.series);
-  const value = valueAt(list, pointed.value ?? nowMs());
+  const list = samples.current.update(store.data.run, store.data.scene.series);
+  const value = valueAt(list, store.pointer.pointed.value ?? store.playback.nowMs());
   const nothing = list.length ? "–" : "no values yet";
   const text2 = value === null ? nothing : `${numberText(value)} ${unitFor(origin)}`.trim();
   const title = [labelOf(origin), ownerOf(origin)].filter(Boolean).join(", ");
@@ -15306,9 +15466,9 @@ function Line({
 function AddLine({ label, text: text2, onPick }) {
   const [found, setFound] = d2([]);
   const look = () => {
-    const shown2 = new Set(plotsShown.value.flat());
-    const all = originsIn(shown(), scene.series.keys());
-    setFound(all.filter((one) => !shown2.has(idOf(one))));
+    const shown = new Set(store.panels.plotsShown.value.flat());
+    const all = originsIn(store.playback.shown(), store.data.scene.series.keys());
+    setFound(all.filter((one) => !shown.has(idOf(one))));
   };
   const onChange = (e4) => {
     const id = fieldValue(e4);
@@ -15345,7 +15505,7 @@ function AddLine({ label, text: text2, onPick }) {
 var CLOSES_MS = 3e3;
 var URGENT_S = 10;
 function questionsOf(data, now) {
-  const shown2 = [];
+  const shown = [];
   for (const [path, state] of Object.entries(data.states)) {
     const { question } = state;
     if (!question) continue;
@@ -15354,9 +15514,9 @@ function questionsOf(data, now) {
     if (!isOpen2 && (data.ended != null || !(ago < CLOSES_MS))) continue;
     const waited = (now - (ms(question.asked) ?? 0)) / 1e3;
     const left = Math.max(0, question.patience - waited);
-    shown2.push({ ...question, path, left, share: Math.min(1, left / question.patience), isOpen: isOpen2, ago });
+    shown.push({ ...question, path, left, share: Math.min(1, left / question.patience), isOpen: isOpen2, ago });
   }
-  return shown2.sort((a5, b3) => a5.asked - b3.asked || (a5.path < b3.path ? -1 : 1));
+  return shown.sort((a5, b3) => a5.asked - b3.asked || (a5.path < b3.path ? -1 : 1));
 }
 var isUrgent = (one) => one.isOpen && one.left <= URGENT_S;
 function buttonsOf({ answers, words: words2, default: otherwise }) {
@@ -15368,8 +15528,8 @@ function answerText({ answer, by, ago }) {
   const seconds = `${Math.max(0, Math.round(ago / 1e3))} s ago`;
   return by ? `answered ${answer} by ${by}, ${seconds}` : `nobody answered: ${answer}, ${seconds}`;
 }
-function titleOf3(title, shown2, elsewhere) {
-  const waiting = shown2.filter((one) => one.isOpen);
+function titleOf3(title, shown, elsewhere) {
+  const waiting = shown.filter((one) => one.isOpen);
   const urgent = waiting.find(isUrgent);
   const count = waiting.length + elsewhere;
   if (urgent && Math.floor(urgent.left) % 2) return `? ${urgent.text}`;
@@ -15386,31 +15546,34 @@ var TONES = [880, 1175];
 var TONE_S = 0.16;
 var sounded = /* @__PURE__ */ new Set();
 function questionsShown() {
-  const isOver = isFile() || facts.value?.recorded;
-  if (isOver) return questionsOf(shown(), cursor.value ?? nowMs()).filter((one) => one.isOpen);
-  return questionsOf(run.now, liveMs());
+  const isOver = isFile() || store.data.facts.value?.recorded;
+  if (isOver)
+    return questionsOf(store.playback.shown(), store.playback.cursor.value ?? store.playback.nowMs()).filter(
+      (one) => one.isOpen
+    );
+  return questionsOf(store.data.run.now, store.data.liveMs());
 }
 function Questions({ page: page2 }) {
-  tick.value;
-  const shown2 = model.value ? questionsShown() : [];
-  const held = control() && cursor.value === null ? heldStates(run.now) : [];
-  const facts2 = facts.value;
-  const others = machines.value.filter((one) => one.name !== facts2?.name && one.stale == null);
+  store.playback.tick.value;
+  const shown = store.data.model.value ? questionsShown() : [];
+  const held = control() && store.playback.cursor.value === null ? heldStates(store.data.run.now) : [];
+  const facts = store.data.facts.value;
+  const others = store.data.machines.value.filter((one) => one.name !== facts?.name && one.stale == null);
   const asking = isFile() ? [] : others.filter((one) => one.questions);
   const elsewhere = asking.reduce((sum, one) => sum + (one.questions ?? 0), 0);
-  const title = titleOf3(facts2 ? `${facts2.label} – smachpy` : "smachpy", shown2, elsewhere);
+  const title = titleOf3(facts ? `${facts.label} – smachpy` : "smachpy", shown, elsewhere);
   A2(() => {
     if (!isFile()) document.title = title;
   }, [title]);
   A2(() => {
-    if (isFile() || facts2?.recorded) return;
-    const unsounded = shown2.filter((one) => one.isOpen && !sounded.has(one.asked));
+    if (isFile() || facts?.recorded) return;
+    const unsounded = shown.filter((one) => one.isOpen && !sounded.has(one.asked));
     for (const one of unsounded) sounded.add(one.asked);
-    if (unsounded.length && sound.value) chime();
+    if (unsounded.length && store.view.sound.value) chime();
   });
-  if (!shown2.length && !held.length && !asking.length) return null;
+  if (!shown.length && !held.length && !asking.length) return null;
   return /* @__PURE__ */ a4("section", { class: "questions", "aria-label": "questions", children: [
-    shown2.map((one) => /* @__PURE__ */ a4(Card, { one, page: page2 }, `${one.path} ${one.asked}`)),
+    shown.map((one) => /* @__PURE__ */ a4(Card, { one, page: page2 }, `${one.path} ${one.asked}`)),
     held.map((path) => /* @__PURE__ */ a4(HeldCard, { path, page: page2 }, path)),
     asking.slice(0, MOST_ELSEWHERE).map((one) => /* @__PURE__ */ a4(Elsewhere, { machine: one }, one.name))
   ] });
@@ -15433,7 +15596,7 @@ function Card({ one, page: page2 }) {
   }, []);
   const give = async (answer) => {
     setSent(true);
-    const by = operator.value.trim() || void 0;
+    const by = store.view.operator.value.trim() || void 0;
     if (!await command("answer", { path: one.path, answer, by })) setSent(false);
   };
   const id = `question-${encoded2(one.path)}`;
@@ -15462,8 +15625,8 @@ function Buttons({
   give,
   page: page2
 }) {
-  if (isFile() || facts.value?.recorded) return null;
-  if (cursor.value !== null)
+  if (isFile() || store.data.facts.value?.recorded) return null;
+  if (store.playback.cursor.value !== null)
     return /* @__PURE__ */ a4("div", { class: "answers", children: /* @__PURE__ */ a4("button", { class: "answer primary", onClick: () => page2.timeline.live(), children: "Back to live to answer" }) });
   const may = canAnswer();
   const button = ({ answer, text: text2, isFirst }) => /* @__PURE__ */ a4(
@@ -15535,26 +15698,26 @@ function chime() {
 
 // src/core/simulations.ts
 var WHOLE = /^\s*-?\d{1,9}\s*$/;
-function startOf({ mission, runs: runs3, vary, seed, limit, compare: compare2 }) {
-  const problems2 = [
+function startOf({ mission, runs: runs2, vary, seed, limit, compare: compare2 }) {
+  const problems = [
     mission ? "" : "mission: got none; expected one",
-    WHOLE.test(runs3) && Number(runs3) >= 1 ? "" : `runs: got ${runs3 || "nothing"}; expected a whole number from 1 on`,
+    WHOLE.test(runs2) && Number(runs2) >= 1 ? "" : `runs: got ${runs2 || "nothing"}; expected a whole number from 1 on`,
     WHOLE.test(seed) ? "" : `seed: got ${seed || "nothing"}; expected a whole number`
   ].filter(Boolean);
   const lines = vary.split("\n").map((line) => line.trim()).filter(Boolean);
-  const asked2 = { command: "start", mission, runs: Number(runs3), vary: lines, seed: Number(seed), limit, compare: compare2 };
-  return { asked: problems2.length ? null : asked2, problem: problems2.join("; ") };
+  const asked2 = { command: "start", mission, runs: Number(runs2), vary: lines, seed: Number(seed), limit, compare: compare2 };
+  return { asked: problems.length ? null : asked2, problem: problems.join("; ") };
 }
 var doneOf = ({ outcomes, failed }) => Object.values(outcomes).reduce((sum, count) => sum + count, failed);
 
 // src/panels/simulate.tsx
 var REFRESH_MS4 = 1e3;
 var FORM = { mission: "", runs: "20", vary: "", seed: "1", limit: "4h", compare: "" };
-var SimulateDialog = () => simulateOpen.value ? /* @__PURE__ */ a4(OpenDialog, {}) : null;
+var SimulateDialog = () => store.view.simulateOpen.value ? /* @__PURE__ */ a4(OpenDialog, {}) : null;
 function OpenDialog() {
   const [form, setForm] = d2(FORM);
-  const [problems2, setProblems] = d2("");
-  const { missions, batches } = simulations.value;
+  const [problems, setProblems] = d2("");
+  const { missions, batches } = store.data.simulations.value;
   const names = Object.keys(missions);
   const mission = form.mission || names[0] || "";
   A2(() => {
@@ -15563,12 +15726,12 @@ function OpenDialog() {
     return () => clearInterval(timer);
   }, []);
   const close2 = () => {
-    simulateOpen.value = false;
+    store.view.simulateOpen.value = false;
   };
   const onSubmit = async (e4) => {
     e4.preventDefault();
-    const { asked: asked2, problem: problem2 } = startOf({ ...form, mission });
-    setProblems(problem2);
+    const { asked: asked2, problem } = startOf({ ...form, mission });
+    setProblems(problem);
     if (!asked2) return;
     const answer = await askSimulation(asked2);
     setProblems(answer.ok ? "" : answer.text ?? "refused");
@@ -15623,7 +15786,7 @@ function OpenDialog() {
           ] }))
         ] })
       ] }),
-      problems2 && /* @__PURE__ */ a4("p", { class: "problem wide", children: problems2 }),
+      problems && /* @__PURE__ */ a4("p", { class: "problem wide", children: problems }),
       /* @__PURE__ */ a4("p", { class: "wide", children: [
         /* @__PURE__ */ a4("button", { class: "primary", type: "submit", children: "Start" }),
         /* @__PURE__ */ a4("span", { class: "hint", children: shorten(missions[mission] ?? "", 90) })
@@ -15633,9 +15796,9 @@ function OpenDialog() {
   ] });
 }
 function BatchRow({ batch }) {
-  const { id, mission, runs: runs3, running, outcomes, failed, problem: problem2, report, vary } = batch;
+  const { id, mission, runs: runs2, running, outcomes, failed, problem, report, vary } = batch;
   const done = doneOf(batch);
-  const why2 = problem2 || batch.first_failure;
+  const why = problem || batch.first_failure;
   const stop = () => askSimulation({ command: "stop", batch: id });
   return /* @__PURE__ */ a4("li", { children: [
     /* @__PURE__ */ a4("div", { children: [
@@ -15648,11 +15811,11 @@ function BatchRow({ batch }) {
     ] }),
     /* @__PURE__ */ a4("div", { children: [
       running ? /* @__PURE__ */ a4($, { children: [
-        /* @__PURE__ */ a4("progress", { max: runs3, value: done }),
+        /* @__PURE__ */ a4("progress", { max: runs2, value: done }),
         " ",
         done,
         " of ",
-        runs3,
+        runs2,
         " "
       ] }) : `${done} runs `,
       Object.entries(outcomes).map(([outcome, count]) => /* @__PURE__ */ a4($, { children: [
@@ -15680,7 +15843,7 @@ function BatchRow({ batch }) {
         }
       )
     ] }),
-    why2 && /* @__PURE__ */ a4("small", { class: "problem", children: shorten(why2, 200) })
+    why && /* @__PURE__ */ a4("small", { class: "problem", children: shorten(why, 200) })
   ] });
 }
 
@@ -15690,15 +15853,15 @@ var MOST_ACTIVE = 200;
 var FollowButton = ({ page: page2 }) => /* @__PURE__ */ a4(
   "button",
   {
-    class: follow.value ? "on" : "",
-    "aria-pressed": follow.value,
+    class: store.view.follow.value ? "on" : "",
+    "aria-pressed": store.view.follow.value,
     title: "follow the running states (o)",
-    onClick: () => page2.setFollow(!follow.value),
+    onClick: () => page2.setFollow(!store.view.follow.value),
     children: "Follow"
   }
 );
 var toggleTree = () => {
-  treeOpen.value = !treeOpen.value;
+  store.view.treeOpen.value = !store.view.treeOpen.value;
 };
 function ViewMenu({ page: page2 }) {
   const [open, setOpen] = d2(false);
@@ -15725,18 +15888,18 @@ function ViewMenu({ page: page2 }) {
     if (e4.relatedTarget && !box.current?.contains(e4.relatedTarget)) setOpen(false);
   };
   const showKeys = () => {
-    help.value = true;
+    store.view.help.value = true;
     setOpen(false);
   };
   const onShortcuts = (e4) => {
-    shortcuts.value = e4.target.checked;
-    save("shortcuts", shortcuts.value);
+    store.view.shortcuts.value = e4.target.checked;
+    save("shortcuts", store.view.shortcuts.value);
   };
   const find = () => {
-    paletteOpen.value = true;
+    store.view.paletteOpen.value = true;
     setOpen(false);
   };
-  const onMachine2 = pageShown.value === "machine";
+  const onMachine2 = store.view.pageShown.value === "machine";
   const onImplicit = (e4) => page2.setImplicit(e4.target.checked);
   const onTheme = (e4) => page2.setTheme(fieldValue(e4));
   return /* @__PURE__ */ a4("div", { class: "menu", ref: box, onFocusOut, children: [
@@ -15752,20 +15915,20 @@ function ViewMenu({ page: page2 }) {
         /* @__PURE__ */ a4(Levels, { page: page2 }),
         /* @__PURE__ */ a4("label", { class: "line", children: [
           /* @__PURE__ */ a4("span", { children: "Implicit transitions" }),
-          /* @__PURE__ */ a4("input", { type: "checkbox", checked: implicit.value, onChange: onImplicit })
+          /* @__PURE__ */ a4("input", { type: "checkbox", checked: store.view.implicit.value, onChange: onImplicit })
         ] }),
         /* @__PURE__ */ a4(NumbersLine, { page: page2 }),
         /* @__PURE__ */ a4(CompareLine, { page: page2, onDone: () => setOpen(false) })
       ] }),
       /* @__PURE__ */ a4("label", { class: "line", children: [
         /* @__PURE__ */ a4("span", { children: "Colours" }),
-        /* @__PURE__ */ a4("select", { value: theme.value, onChange: onTheme, children: [
+        /* @__PURE__ */ a4("select", { value: store.view.theme.value, onChange: onTheme, children: [
           /* @__PURE__ */ a4("option", { value: "system", children: "as the system" }),
           /* @__PURE__ */ a4("option", { value: "light", children: "light" }),
           /* @__PURE__ */ a4("option", { value: "dark", children: "dark" })
         ] })
       ] }),
-      onMachine2 && !isPhone.value && /* @__PURE__ */ a4(PanelLines, {}),
+      onMachine2 && !store.view.isPhone.value && /* @__PURE__ */ a4(PanelLines, {}),
       !isFile() && /* @__PURE__ */ a4(AboutQuestions, {}),
       onMachine2 && !isFile() && /* @__PURE__ */ a4(Downloads, {}),
       /* @__PURE__ */ a4("div", { class: "line", children: [
@@ -15774,33 +15937,33 @@ function ViewMenu({ page: page2 }) {
       ] }),
       /* @__PURE__ */ a4("label", { class: "line", children: [
         /* @__PURE__ */ a4("span", { children: "Single keys are shortcuts" }),
-        /* @__PURE__ */ a4("input", { type: "checkbox", checked: shortcuts.value, onChange: onShortcuts })
+        /* @__PURE__ */ a4("input", { type: "checkbox", checked: store.view.shortcuts.value, onChange: onShortcuts })
       ] })
     ] })
   ] });
 }
 function AboutQuestions() {
   const onSound = (e4) => {
-    sound.value = e4.target.checked;
-    save("sound", sound.value);
+    store.view.sound.value = e4.target.checked;
+    save("sound", store.view.sound.value);
   };
   const onName = (e4) => {
-    operator.value = fieldValue(e4);
-    save("operator", operator.value);
+    store.view.operator.value = fieldValue(e4);
+    save("operator", store.view.operator.value);
   };
   return /* @__PURE__ */ a4($, { children: [
     /* @__PURE__ */ a4("label", { class: "line", children: [
       /* @__PURE__ */ a4("span", { children: "Sound for questions" }),
-      /* @__PURE__ */ a4("input", { type: "checkbox", checked: sound.value, onChange: onSound })
+      /* @__PURE__ */ a4("input", { type: "checkbox", checked: store.view.sound.value, onChange: onSound })
     ] }),
     /* @__PURE__ */ a4("label", { class: "line", children: [
       /* @__PURE__ */ a4("span", { children: "You answer as" }),
-      /* @__PURE__ */ a4("input", { maxlength: 60, placeholder: "your name", value: operator.value, onInput: onName })
+      /* @__PURE__ */ a4("input", { maxlength: 60, placeholder: "your name", value: store.view.operator.value, onInput: onName })
     ] })
   ] });
 }
 function Levels({ page: page2 }) {
-  const depths = model.value?.order.map((node) => node.depth) ?? [];
+  const depths = store.data.model.value?.order.map((node) => node.depth) ?? [];
   const deepest = depths.reduce((most, depth) => Math.max(most, depth), 1);
   const levels = Array.from({ length: Math.min(deepest, MOST_LEVELS) }, (_5, i4) => i4 + 1);
   return /* @__PURE__ */ a4("div", { class: "line", children: [
@@ -15812,14 +15975,14 @@ function Levels({ page: page2 }) {
   ] });
 }
 function NumbersLine({ page: page2 }) {
-  const isMissing2 = (mode) => OF_RECORDED_RUNS.includes(mode) && !statistics.value;
+  const isMissing = (mode) => OF_RECORDED_RUNS.includes(mode) && !store.data.statistics.value;
   return /* @__PURE__ */ a4("label", { class: "line", children: [
     /* @__PURE__ */ a4("span", { children: "Numbers" }),
-    /* @__PURE__ */ a4("select", { value: numbers.value, onChange: (e4) => page2.setNumbers(fieldValue(e4)), children: MODES.map(([mode, text2]) => /* @__PURE__ */ a4("option", { value: mode, disabled: isMissing2(mode), children: text2 })) })
+    /* @__PURE__ */ a4("select", { value: store.view.numbers.value, onChange: (e4) => page2.setNumbers(fieldValue(e4)), children: MODES.map(([mode, text2]) => /* @__PURE__ */ a4("option", { value: mode, disabled: isMissing(mode), children: text2 })) })
   ] });
 }
 function Downloads() {
-  const active = activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded2(path)}`);
+  const active = store.status.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded2(path)}`);
   const looks = `&theme=${isDark() ? "dark" : "light"}${active.join("")}`;
   const picture = (format) => /* @__PURE__ */ a4("a", { class: "button", href: link("picture", `&format=${format}${looks}`), download: true, children: format });
   return /* @__PURE__ */ a4($, { children: [
@@ -15840,25 +16003,25 @@ function Downloads() {
 // src/panels/top_bar.tsx
 var MOST_FOUND = 12;
 function TopBar({ page: page2 }) {
-  if (pageShown.value !== "machine")
+  if (store.view.pageShown.value !== "machine")
     return /* @__PURE__ */ a4("header", { class: "top", children: [
       /* @__PURE__ */ a4(RunsButton, {}),
-      model.value && /* @__PURE__ */ a4("button", { class: "back", title: "back to this machine (Esc)", onClick: () => showPage("machine"), children: [
+      store.data.model.value && /* @__PURE__ */ a4("button", { class: "back", title: "back to this machine (Esc)", onClick: () => showPage("machine"), children: [
         "← ",
-        shorten(facts.value?.label ?? "", 40)
+        shorten(store.data.facts.value?.label ?? "", 40)
       ] }),
       /* @__PURE__ */ a4("span", { class: "spread" }),
       /* @__PURE__ */ a4(ViewMenu, { page: page2 }),
       /* @__PURE__ */ a4(ActionsButton, { id: "actions" })
     ] });
-  const status = runStatus.value;
-  const problems2 = problems.value.length;
+  const status = store.status.runStatus.value;
+  const problems = store.data.problems.value.length;
   return /* @__PURE__ */ a4("header", { class: "top", children: [
     /* @__PURE__ */ a4(
       "button",
       {
         class: "states-button",
-        "aria-expanded": treeOpen.value,
+        "aria-expanded": store.view.treeOpen.value,
         title: "the states as a tree (t)",
         onClick: toggleTree,
         children: "States"
@@ -15870,16 +16033,16 @@ function TopBar({ page: page2 }) {
     canAskWhy() && /* @__PURE__ */ a4(
       "button",
       {
-        class: `why-button ${why.value ? "on" : ""}`,
-        "aria-pressed": why.value !== null,
+        class: `why-button ${store.data.why.value ? "on" : ""}`,
+        "aria-pressed": store.data.why.value !== null,
         title: "from the first cause to the outcome (w)",
         onClick: () => showWhy(),
         children: "Why?"
       }
     ),
-    problems2 > 0 && /* @__PURE__ */ a4("span", { class: "chip", title: "problems of the machine's structure; see the inspector", children: [
+    problems > 0 && /* @__PURE__ */ a4("span", { class: "chip", title: "problems of the machine's structure; see the inspector", children: [
       "⚠ ",
-      problems2
+      problems
     ] }),
     /* @__PURE__ */ a4(CompareChip, { page: page2 }),
     /* @__PURE__ */ a4(Crumbs, { page: page2 }),
@@ -15892,7 +16055,7 @@ function TopBar({ page: page2 }) {
 }
 function RunsButton() {
   if (isFile()) return null;
-  const open = pageShown.value === "runs";
+  const open = store.view.pageShown.value === "runs";
   return /* @__PURE__ */ a4(
     "button",
     {
@@ -15906,17 +16069,17 @@ function RunsButton() {
   );
 }
 function canAskWhy() {
-  tick.value;
-  const { now } = run;
-  const about = facts.value;
+  store.playback.tick.value;
+  const { now } = store.data.run;
+  const about = store.data.facts.value;
   return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
 }
 function Chooser() {
-  const facts2 = facts.value;
-  const list = machines.value;
-  const name = facts2 ? shorten(facts2.label, 60) : "no machine yet";
-  const others = list.some((machine) => machine.name !== facts2?.name);
-  if (isFile() || !others) return /* @__PURE__ */ a4("h1", { title: facts2?.name, children: name });
+  const facts = store.data.facts.value;
+  const list = store.data.machines.value;
+  const name = facts ? shorten(facts.label, 60) : "no machine yet";
+  const others = list.some((machine) => machine.name !== facts?.name);
+  if (isFile() || !others) return /* @__PURE__ */ a4("h1", { title: facts?.name, children: name });
   const choice = (machine) => {
     const title = machine.node ? `in node ${machine.node}` : "";
     return /* @__PURE__ */ a4("option", { value: machine.name, title, children: [
@@ -15927,8 +16090,8 @@ function Chooser() {
   };
   return /* @__PURE__ */ a4("label", { class: "chooser", children: [
     /* @__PURE__ */ a4("span", { class: "hidden", children: "machine" }),
-    /* @__PURE__ */ a4("select", { value: facts2?.name ?? "", onChange: (e4) => choose(fieldValue(e4)), children: [
-      !facts2 && /* @__PURE__ */ a4("option", { value: "", disabled: true, children: shorten(wanted.value || "choose a machine", 60) }),
+    /* @__PURE__ */ a4("select", { value: facts?.name ?? "", onChange: (e4) => choose(fieldValue(e4)), children: [
+      !facts && /* @__PURE__ */ a4("option", { value: "", disabled: true, children: shorten(store.data.wanted.value || "choose a machine", 60) }),
       list.map(choice)
     ] })
   ] });
@@ -15940,18 +16103,18 @@ function statusOf3({ recorded, stale, ended, outcome, questions }) {
   return stale != null ? "stale" : "running";
 }
 function Crumbs({ page: page2 }) {
-  const model2 = model.value;
-  const selected2 = selected.value;
-  const leaves = activeLeaves.value;
-  const node = model2?.get(selected2 ?? leaves[0]);
-  if (!model2 || !node) return null;
-  const more = selected2 ? 0 : leaves.length - 1;
+  const model = store.data.model.value;
+  const selected = store.view.selected.value;
+  const leaves = store.status.activeLeaves.value;
+  const node = model?.get(selected ?? leaves[0]);
+  if (!model || !node) return null;
+  const more = selected ? 0 : leaves.length - 1;
   const crumb = (one, i4) => /* @__PURE__ */ a4($, { children: [
     i4 > 0 && /* @__PURE__ */ a4("i", { children: "›" }),
     /* @__PURE__ */ a4("button", { onClick: () => page2.goTo(one.path), children: one.name })
   ] });
-  return /* @__PURE__ */ a4("nav", { class: "crumbs", "aria-label": `path of the ${selected2 ? "selected" : "active"} state`, children: [
-    [...model2.ancestors(node.path), node].map(crumb),
+  return /* @__PURE__ */ a4("nav", { class: "crumbs", "aria-label": `path of the ${selected ? "selected" : "active"} state`, children: [
+    [...model.ancestors(node.path), node].map(crumb),
     more > 0 && /* @__PURE__ */ a4("span", { class: "chip", title: leaves.join("\n"), children: [
       "+",
       more,
@@ -15961,29 +16124,29 @@ function Crumbs({ page: page2 }) {
 }
 function Search({ page: page2 }) {
   const [at, setAt] = d2(0);
-  const text2 = query.value;
-  const found = text2 ? model.value?.search(text2) ?? [] : [];
-  const shown2 = found.slice(0, MOST_FOUND);
+  const text2 = store.view.query.value;
+  const found = text2 ? store.data.model.value?.search(text2) ?? [] : [];
+  const shown = found.slice(0, MOST_FOUND);
   const pick = (node) => {
     if (!node) return;
     page2.goTo(node.path);
-    query.value = "";
+    store.view.query.value = "";
     if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
   };
   const onKeyDown = (e4) => {
-    if (e4.key === "Enter") pick(shown2[Math.min(at, shown2.length - 1)]);
+    if (e4.key === "Enter") pick(shown[Math.min(at, shown.length - 1)]);
     else if (e4.key === "Escape") {
-      query.value = "";
+      store.view.query.value = "";
       e4.target.blur();
     } else if (e4.key === "ArrowDown" || e4.key === "ArrowUp") {
-      const to = e4.key === "ArrowDown" ? Math.min(at + 1, shown2.length - 1) : at - 1;
+      const to = e4.key === "ArrowDown" ? Math.min(at + 1, shown.length - 1) : at - 1;
       setAt(Math.max(to, 0));
       e4.preventDefault();
     } else return;
     e4.stopPropagation();
   };
   const onInput = (e4) => {
-    query.value = fieldValue(e4);
+    store.view.query.value = fieldValue(e4);
     setAt(0);
   };
   A2(() => page2.markHits(found.map((node) => node.path)), [text2]);
@@ -16003,11 +16166,11 @@ function Search({ page: page2 }) {
     ),
     !text2 && /* @__PURE__ */ a4("kbd", { children: "/" }),
     text2 && /* @__PURE__ */ a4("ul", { class: "results", role: "listbox", children: [
-      shown2.map((node, i4) => /* @__PURE__ */ a4(Found, { node, chosen: i4 === at, onPick: pick }, node.path)),
+      shown.map((node, i4) => /* @__PURE__ */ a4(Found, { node, chosen: i4 === at, onPick: pick }, node.path)),
       !found.length && /* @__PURE__ */ a4("li", { class: "none", children: "no state of this name" }),
-      found.length > shown2.length && /* @__PURE__ */ a4("li", { class: "none", children: [
+      found.length > shown.length && /* @__PURE__ */ a4("li", { class: "none", children: [
         "and ",
-        found.length - shown2.length,
+        found.length - shown.length,
         " more"
       ] })
     ] })
@@ -16040,24 +16203,24 @@ function Tree({ page: page2 }) {
   const [folded, setFolded] = d2(() => /* @__PURE__ */ new Map());
   const [chosen2, setChosen] = d2(null);
   const box = T2(null);
-  tick.value;
-  const model2 = model.value;
-  if (!model2) return /* @__PURE__ */ a4("aside", { class: "tree" });
-  const states2 = shown().states;
-  const isOpen2 = (node) => folded.get(node.path) ?? (own(states2, node.path)?.since != null || opened2.value.has(node.path));
-  const rows = visibleRows(model2.root, isOpen2);
+  store.playback.tick.value;
+  const model = store.data.model.value;
+  if (!model) return /* @__PURE__ */ a4("aside", { class: "tree" });
+  const states2 = store.playback.shown().states;
+  const isOpen2 = (node) => folded.get(node.path) ?? (own(states2, node.path)?.since != null || store.view.opened.value.has(node.path));
+  const rows = visibleRows(model.root, isOpen2);
   const height = box.current?.clientHeight ?? 800;
   const first = Math.max(0, Math.floor(top / ROW2) - SPARE);
   const inView = rows.slice(first, first + Math.ceil(height / ROW2) + 2 * SPARE);
   const at = Math.max(
     0,
-    rows.findIndex((node) => node.path === (chosen2 ?? selected.value))
+    rows.findIndex((node) => node.path === (chosen2 ?? store.view.selected.value))
   );
   const fold = (node) => setFolded(new Map(folded).set(node.path, !isOpen2(node)));
   const goTo = (node) => {
     setChosen(node.path);
     page2.goTo(node.path);
-    treeOpen.value = false;
+    store.view.treeOpen.value = false;
   };
   const choose2 = (row) => {
     const to = Math.max(0, Math.min(row, rows.length - 1));
@@ -16130,7 +16293,7 @@ function Row4({
   onFold
 }) {
   const active = state?.since != null;
-  const selected2 = selected.value === node.path;
+  const selected = store.view.selected.value === node.path;
   const isContainer = node.children.length > 0;
   const kind = state?.outcome != null ? endClass(node, state.outcome) : null;
   const visits = state?.visits ?? 0;
@@ -16146,12 +16309,12 @@ function Row4({
       role: "treeitem",
       id: `row-${node.number}`,
       "aria-level": node.depth + 1,
-      "aria-selected": selected2,
+      "aria-selected": selected,
       "aria-expanded": isContainer ? open : void 0,
       title: node.path,
       style,
       onClick,
-      class: [...classes, selected2 && "selected"].filter(Boolean).join(" "),
+      class: [...classes, selected && "selected"].filter(Boolean).join(" "),
       children: [
         isContainer ? /* @__PURE__ */ a4("button", { class: "fold", tabindex: -1, "aria-label": open ? "close" : "open", onClick: onFoldClick, children: open ? "▾" : "▸" }) : /* @__PURE__ */ a4("span", { class: "kind", children: GLYPHS[node.kind] ?? "·" }),
         /* @__PURE__ */ a4("span", { class: "name", children: node.name }),
@@ -16191,8 +16354,8 @@ function StripTools() {
       {
         "aria-label": "clock",
         title: "how instants are told everywhere (c)",
-        value: clock.value,
-        onChange: (e4) => setClock(fieldValue(e4)),
+        value: store.clock.chosen.value,
+        onChange: (e4) => store.clock.choose(fieldValue(e4)),
         children: [
           /* @__PURE__ */ a4("option", { value: "run", children: "run time" }),
           /* @__PURE__ */ a4("option", { value: "wall", children: "wall clock" }),
@@ -16206,9 +16369,9 @@ function StripTools() {
         class: "lane-filter",
         "aria-label": "lanes to show, by their names",
         placeholder: "lanes",
-        value: laneFilter.value,
+        value: store.view.laneFilter.value,
         onInput: (e4) => {
-          laneFilter.value = fieldValue(e4);
+          store.view.laneFilter.value = fieldValue(e4);
         }
       }
     )
@@ -16220,7 +16383,7 @@ function TimeTools() {
     timeline.fitAll();
     timeline.draw();
   };
-  const addPlot = (id) => setPlots([...plotsShown.value, [id]]);
+  const addPlot = (id) => store.panels.setPlots([...store.panels.plotsShown.value, [id]]);
   return /* @__PURE__ */ a4("div", { class: "time-tools", children: [
     /* @__PURE__ */ a4("button", { title: "show the whole run", onClick: showAll, children: "All" }),
     /* @__PURE__ */ a4(AddLine, { label: "plot a number of the run", text: "Plot", onPick: addPlot })
@@ -16246,21 +16409,21 @@ var panels = {
   plots: () => /* @__PURE__ */ a4(PlotsPanel, { page })
 };
 function App() {
-  const paused = facts.value?.control?.paused && cursor.value === null;
+  const paused = store.data.facts.value?.control?.paused && store.playback.cursor.value === null;
   A2(() => {
     page.start().catch((error) => {
-      failure.value = `The viewer could not start: ${messageOf(error)}`;
+      store.data.failure.value = `The viewer could not start: ${messageOf(error)}`;
     });
   }, []);
   const classes = [
     "app",
     paused && "paused",
-    cursor.value !== null && "past",
-    treeOpen.value && "with-tree",
-    isMissing.value && "without-machine",
-    control() && pageShown.value === "machine" && "operated",
-    `part-${part.value}`,
-    `on-${pageShown.value}`
+    store.playback.cursor.value !== null && "past",
+    store.view.treeOpen.value && "with-tree",
+    store.data.isMissing.value && "without-machine",
+    control() && store.view.pageShown.value === "machine" && "operated",
+    `part-${store.view.part.value}`,
+    `on-${store.view.pageShown.value}`
   ];
   return /* @__PURE__ */ a4("div", { class: classes.filter(Boolean).join(" "), children: [
     /* @__PURE__ */ a4(TopBar, { page }),
@@ -16296,6 +16459,6 @@ function App() {
 applyTheme();
 var page = new Page(svg, minimap, canvas, floor2, whole);
 listenToKeys(page);
-window.smachpy = { page, store: store_exports, ask, choose, reconnect };
+window.smachpy = { page, store, ask, choose, reconnect };
 Q(/* @__PURE__ */ a4(App, {}), document.getElementById("app"));
 document.querySelector(".boot")?.remove();

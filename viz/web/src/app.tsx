@@ -7,7 +7,8 @@ import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import { DOCKS } from "#core/arrangement.ts";
 import { control } from "#core/commands.ts";
 import { ask, choose, messageOf, reconnect } from "#core/connection.ts";
-import * as store from "#core/store.ts";
+import type { ClockName } from "#core/store/clock.ts";
+import { store } from "#core/store.ts";
 import { Page } from "#drawing/page.ts";
 import { el } from "#drawing/svg.ts";
 import { applyTheme } from "#drawing/theme.ts";
@@ -59,8 +60,8 @@ function StripTools() {
       <select
         aria-label="clock"
         title="how instants are told everywhere (c)"
-        value={store.clock.value}
-        onChange={(e: Event) => store.setClock(fieldValue(e) as store.ClockName)}
+        value={store.clock.chosen.value}
+        onChange={(e: Event) => store.clock.choose(fieldValue(e) as ClockName)}
       >
         <option value="run">run time</option>
         <option value="wall">wall clock</option>
@@ -70,9 +71,9 @@ function StripTools() {
         class="lane-filter"
         aria-label="lanes to show, by their names"
         placeholder="lanes"
-        value={store.laneFilter.value}
+        value={store.view.laneFilter.value}
         onInput={(e: Event) => {
-          store.laneFilter.value = fieldValue(e);
+          store.view.laneFilter.value = fieldValue(e);
         }}
       />
     </div>
@@ -85,7 +86,7 @@ function TimeTools() {
     timeline.fitAll();
     timeline.draw();
   };
-  const addPlot = (id: string) => store.setPlots([...store.plotsShown.value, [id]]);
+  const addPlot = (id: string) => store.panels.setPlots([...store.panels.plotsShown.value, [id]]);
   return (
     <div class="time-tools">
       <button title="show the whole run" onClick={showAll}>
@@ -132,21 +133,21 @@ const panels: Record<PanelName, () => ComponentChildren> = {
 };
 
 function App() {
-  const paused = store.facts.value?.control?.paused && store.cursor.value === null;
+  const paused = store.data.facts.value?.control?.paused && store.playback.cursor.value === null;
   useEffect(() => {
     page.start().catch((error) => {
-      store.failure.value = `The viewer could not start: ${messageOf(error)}`;
+      store.data.failure.value = `The viewer could not start: ${messageOf(error)}`;
     });
   }, []);
   const classes = [
     "app",
     paused && "paused",
-    store.cursor.value !== null && "past",
-    store.treeOpen.value && "with-tree",
-    store.isMissing.value && "without-machine",
-    control() && store.pageShown.value === "machine" && "operated",
-    `part-${store.part.value}`,
-    `on-${store.pageShown.value}`,
+    store.playback.cursor.value !== null && "past",
+    store.view.treeOpen.value && "with-tree",
+    store.data.isMissing.value && "without-machine",
+    control() && store.view.pageShown.value === "machine" && "operated",
+    `part-${store.view.part.value}`,
+    `on-${store.view.pageShown.value}`,
   ];
   return (
     <div class={classes.filter(Boolean).join(" ")}>

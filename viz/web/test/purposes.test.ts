@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { goalText, purposeOf, purposeOfVisit, wordsOf } from "#core/purposes.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { event } from "./fixtures.ts";
 
 const pose = (x: number, y: number) => ({
@@ -21,7 +21,7 @@ test("a goal is for the place that it leads to, or for what its fields name", ()
     event("GoalSent", "/M/DRIVE", { action: "r1/move_base", goal_id: "2", goal: pose(7, 1) }),
     event("Retried", "/M/DRIVE", { attempt: 2, reason: "aborted" }),
   ]);
-  const [, first, second] = store.run.spans;
+  const [, first, second] = store.data.run.spans;
   assert.equal(purposeOfVisit(first), "kitchen");
   assert.equal(purposeOfVisit(second), "(7.0, 1.0)");
   assert.equal(purposeOf("9", { goal: { $msg: "G", fields: { station: "dock" } } }), "dock");
@@ -45,7 +45,7 @@ test("without a purpose a bar has the state's name, and says that it cleans up",
     event("PreemptRequested", "/M/WAIT"),
     event("PreemptServiced", "/M/WAIT"),
   ]);
-  const span = store.run.spans[1];
+  const span = store.data.run.spans[1];
   assert.deepEqual(wordsOf("WAIT", span, span.from + 500), ["WAIT 0.5 s", "WAIT"]);
   assert.equal(wordsOf("WAIT", span, span.from + 5000)[0], "WAIT, cleaning up 5.0 s");
 });
@@ -63,7 +63,7 @@ test("times of waiting have a beginning, an end and a reason", () => {
     event("Left", "/M/B", { outcome: "ok" }),
     event("Paused", "/M/C", { reason: "pause" }),
   ]);
-  const [asks, held, paused] = store.run.waits;
+  const [asks, held, paused] = store.data.run.waits;
   assert.deepEqual([asks.kind, asks.path, (asks.to ?? 0) - asks.from], ["asks", "/M/A", 1000]);
   assert.deepEqual([held.kind, held.text, (held.to ?? 0) - held.from], ["paused", "paused (breakpoint)", 1000]);
   assert.deepEqual([paused.path, paused.text, paused.to], ["/M/C", "paused", null]);

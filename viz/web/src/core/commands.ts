@@ -5,21 +5,21 @@ import { signal } from "@preact/signals";
 import { hasToken, link, post } from "#core/connection.ts";
 import { own } from "#core/fold.ts";
 import { goalText } from "#core/purposes.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 
 const MOST_NAMED = 4; // states or goals in a question
 
 /** Pause and breakpoints of the machine shown; null if it is none that this page commands. */
 export function control() {
-  const facts = store.facts.value;
+  const facts = store.data.facts.value;
   return hasToken() && !facts?.recorded ? (facts?.control ?? null) : null;
 }
 
 /** Whether this page can answer questions of the machine shown; the mission needs no remote control for that. */
 export function canAnswer() {
-  const facts = store.facts.value;
-  return hasToken() && store.connection.value === "live" && facts?.stale == null && !facts?.recorded;
+  const facts = store.data.facts.value;
+  return hasToken() && store.data.connection.value === "live" && facts?.stale == null && !facts?.recorded;
 }
 
 /** `failure` is null while it has no answer */
@@ -40,10 +40,10 @@ export const keyOf = (name: string, path?: unknown) => `${name} ${path ?? ""}`;
 export async function command(
   name: string,
   more: Record<string, unknown> = {},
-  machine: string = store.facts.value?.name ?? "",
+  machine: string = store.data.facts.value?.name ?? "",
 ) {
-  if (store.whyDisarmed.value) {
-    store.notify(store.whyDisarmed.value, "error");
+  if (store.status.whyDisarmed.value) {
+    store.view.notify(store.status.whyDisarmed.value, "error");
     return false;
   }
   const mine: Sent = { key: keyOf(name, more.path), failure: null };
@@ -52,13 +52,13 @@ export async function command(
   const isNewest = sent.value === mine;
   if (result.ok) {
     // Of an answer its card tells, and by whom.
-    if (name !== "answer") store.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
+    if (name !== "answer") store.view.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
     if (isNewest) sent.value = null;
   } else if (result.wants_token) {
     if (isNewest) sent.value = null; // the page asks for the token
   } else {
     const failure = `${name}: ${result.text ?? "refused"}`;
-    store.notify(failure, "error");
+    store.view.notify(failure, "error");
     if (isNewest) {
       const failed = { ...mine, failure };
       sent.value = failed;
@@ -87,8 +87,13 @@ export const confirmation: Signal<Confirmation | null> = signal(null);
 /** What every question is about: this run of this machine, as it is now. */
 export const situationOf = (...more: unknown[]) =>
   JSON.stringify([
-    ...[store.facts.value?.name, store.facts.value?.epoch, store.run.now.started, store.run.now.ended],
-    ...[store.pageShown.value, store.whyDisarmed.value, ...more],
+    ...[
+      store.data.facts.value?.name,
+      store.data.facts.value?.epoch,
+      store.data.run.now.started,
+      store.data.run.now.ended,
+    ],
+    ...[store.view.pageShown.value, store.status.whyDisarmed.value, ...more],
   ]);
 
 /**
@@ -97,10 +102,10 @@ export const situationOf = (...more: unknown[]) =>
  * @param within path of the states that it ends
  */
 export function situationAt(path: string, within: string) {
-  const visits = store.run.now.states;
+  const visits = store.data.run.now.states;
   const running = Object.keys(visits).filter((one) => visits[one].since != null && `${one}/`.startsWith(`${within}/`));
   return situationOf(
-    store.selected.value === path,
+    store.view.selected.value === path,
     running.map((one) => [one, visits[one].since]),
   );
 }
@@ -115,14 +120,14 @@ export function confirmationNow() {
   const asked = confirmation.value;
   if (!asked || asked.situation() === asked.was) return asked;
   confirmation.value = null;
-  store.notify(`\u201c${asked.title}\u201d was closed: what it was about has changed`, "error");
+  store.view.notify(`\u201c${asked.title}\u201d was closed: what it was about has changed`, "error");
   return null;
 }
 
 /** The machine and its robots, for people: "PATROL on carrier". */
 export function targetText() {
-  const name = store.facts.value?.label ?? "";
-  const robots = store.robotNames();
+  const name = store.data.facts.value?.label ?? "";
+  const robots = store.data.robotNames();
   if (!robots.length) return name;
   return robots.length === 1 ? `${name} on ${robots[0]}` : `${name} on ${robots.length} robots`;
 }
@@ -130,12 +135,12 @@ export function targetText() {
 /** What a command ends: the running innermost states, and their goals. @param within path */
 export function endsText(within: string) {
   const inside = (path: string) => `${path}/`.startsWith(`${within}/`);
-  const { states, goals } = store.run.now;
-  const now = store.liveMs();
-  const leaves = store.runningLeaves().filter(inside);
+  const { states, goals } = store.data.run.now;
+  const now = store.data.liveMs();
+  const leaves = store.data.runningLeaves().filter(inside);
   const running = leaves.slice(0, MOST_NAMED).map((path) => {
     const since = own(states, path)?.since;
-    return `${store.nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1000)})`}`;
+    return `${store.data.nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1000)})`}`;
   });
   const sentGoals = Object.entries(goals).filter(([, goal]) => goal.ended == null && inside(goal.path));
   const targets = sentGoals.slice(0, MOST_NAMED).map(([id, goal]) => goalText(id, goal));

@@ -4,7 +4,7 @@ import { batch } from "@preact/signals";
 import type { Message } from "#core/hub.ts";
 import { Hub } from "#core/hub.ts";
 import { pageOf, showPage } from "#core/pages.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type {
   FleetRuns,
   MachineFacts,
@@ -71,20 +71,20 @@ export async function connect(handlers: {
   readToken();
   if (isFile()) {
     const run = JSON.parse(await unpack("run-data"));
-    store.connection.value = "file";
+    store.data.connection.value = "file";
     await takeSnapshot(run.snap, run.model);
     onObserved(run.observed ?? []);
-    store.statistics.value = run.statistics ?? null;
+    store.data.statistics.value = run.statistics ?? null;
     whyOfFile = run.why ?? null;
     return;
   }
   await logIn();
-  store.wanted.value = new URLSearchParams(location.search).get("machine") ?? "";
+  store.data.wanted.value = new URLSearchParams(location.search).get("machine") ?? "";
   showPage(pageOf(location.search), { replace: true });
   addEventListener("popstate", () => {
-    const machine = new URLSearchParams(location.search).get("machine") ?? store.wanted.value;
-    store.pageShown.value = pageOf(location.search);
-    if (machine !== store.wanted.value) follow(machine);
+    const machine = new URLSearchParams(location.search).get("machine") ?? store.data.wanted.value;
+    store.view.pageShown.value = pageOf(location.search);
+    if (machine !== store.data.wanted.value) follow(machine);
   });
   openHub();
   tellHub();
@@ -116,19 +116,19 @@ async function logIn() {
   if (known) await ask("/api/login", { method: "POST", body: JSON.stringify({ token: known }) });
 }
 
-export const hasToken = () => token !== null && store.settings.value.control;
+export const hasToken = () => token !== null && store.data.settings.value.control;
 
 /** Show the machine of that name. */
 export function choose(name: string) {
   showPage("machine", { machine: name });
-  if (name !== store.wanted.value || store.facts.value?.name !== name) follow(name);
+  if (name !== store.data.wanted.value || store.data.facts.value?.name !== name) follow(name);
 }
 
 /** Follow the machine of that name. */
 function follow(name: string) {
-  store.wanted.value = name;
-  store.facts.value = null;
-  store.statistics.value = null;
+  store.data.wanted.value = name;
+  store.data.facts.value = null;
+  store.data.statistics.value = null;
   epoch = "";
   newest = 0;
   seen = -1;
@@ -140,7 +140,7 @@ function follow(name: string) {
 export const encoded = (text: string) => encodeURIComponent(text.replace(/\p{Surrogate}/gu, "\ufffd"));
 
 /** The address of a resource of a machine, by default the one shown. */
-export const link = (what: string, more: string = "", machine = store.facts.value?.name ?? "") =>
+export const link = (what: string, more: string = "", machine = store.data.facts.value?.name ?? "") =>
   `/api/${what}?machine=${encoded(machine)}${more}`;
 
 // -- the stream of events -----------------------------------------------------------------------
@@ -164,7 +164,7 @@ function openHub() {
 function tellHub() {
   streamBegan = performance.now();
   const last = epoch ? `${epoch}:${newest}` : "";
-  hub?.postMessage({ kind: "follow", machine: store.wanted.value, last, seen, hidden: document.hidden });
+  hub?.postMessage({ kind: "follow", machine: store.data.wanted.value, last, seen, hidden: document.hidden });
 }
 
 /** What a page gets of the stream: the hub makes a list of the changes of the list. */
@@ -174,21 +174,26 @@ const TAKERS: { [K in keyof Taken]: (data: Taken[K]) => unknown } = {
   settings(settings) {
     streamBegan = performance.now();
     const asked = new URLSearchParams(location.search);
-    if (settings.home && !store.settings.value.home && !asked.has("machine") && pageOf(location.search) === "machine")
+    if (
+      settings.home &&
+      !store.data.settings.value.home &&
+      !asked.has("machine") &&
+      pageOf(location.search) === "machine"
+    )
       showPage("runs", { replace: true });
-    store.settings.value = settings;
+    store.data.settings.value = settings;
   },
-  beat: (t) => store.viewerLag.measure(t),
+  beat: (t) => store.data.viewerLag.measure(t),
   machines(list) {
-    store.machines.value = list.sort((a, b) => (a.name < b.name ? -1 : 1));
+    store.data.machines.value = list.sort((a, b) => (a.name < b.name ? -1 : 1));
   },
   actions(found) {
-    store.actions.value = found;
+    store.data.actions.value = found;
   },
   facts: takeFacts,
   snap: takeStreamed,
   gap({ missed }) {
-    if (isNew) store.gap.value = missed;
+    if (isNew) store.data.gap.value = missed;
   },
   observed({ records }) {
     const unknown = records.filter(({ n }) => (n ?? 0) > seen);
@@ -201,9 +206,9 @@ const TAKERS: { [K in keyof Taken]: (data: Taken[K]) => unknown } = {
 function takeMessage(message: Message) {
   if ("standing" in message) {
     const { state, problem, wantsToken } = message.standing;
-    store.connection.value = state;
-    store.problem.value = problem;
-    if (wantsToken) store.tokenAsked.value = true;
+    store.data.connection.value = state;
+    store.data.problem.value = problem;
+    if (wantsToken) store.view.tokenAsked.value = true;
   } else (TAKERS as Record<string, (data: unknown) => unknown>)[message.event]?.(JSON.parse(message.text));
 }
 
@@ -212,7 +217,7 @@ function takeNew({ seq, events }: { seq: number; events: RunEvent[] }) {
   newest = Math.max(newest, seq);
   if (!unknown.length) return;
   if (performance.now() - streamBegan > CAUGHT_UP_MS)
-    store.robotLag.measure(unknown[unknown.length - 1].stamp_ns / 1e6);
+    store.data.robotLag.measure(unknown[unknown.length - 1].stamp_ns / 1e6);
   onEvents(unknown);
 }
 
@@ -238,31 +243,30 @@ function takeStreamed(snapshot: Snapshot) {
 export const reconnect = () => hub?.postMessage({ kind: "reconnect" });
 
 async function takeFacts(facts: MachineFacts) {
-  const before = store.facts.value;
-  store.facts.value = facts;
+  const before = store.data.facts.value;
+  store.data.facts.value = facts;
   if (before && before.revision !== facts.revision && before.epoch === facts.epoch) await load(facts);
 }
 
 async function takeSnapshot(snapshot: Snapshot, payload?: MachinePayload) {
-  store.wanted.value ||= snapshot.name;
-  const known = store.facts.value;
+  store.data.wanted.value ||= snapshot.name;
+  const known = store.data.facts.value;
   // Another snapshot of the same program, after a gap: its structure need not be fetched again.
   const same = known?.name === snapshot.name && known.epoch === snapshot.epoch;
   if (!same) {
-    store.robotLag.forget();
-    store.why.value = null;
+    store.data.robotLag.forget();
+    store.data.why.value = null;
   }
   batch(() => {
-    store.facts.value = snapshot;
-    store.problems.value = snapshot.problems;
+    store.data.facts.value = snapshot;
+    store.data.problems.value = snapshot.problems;
     store.startRun(snapshot.base, snapshot.events);
-    store.tick.value += 1;
-    store.slowTick.value += 1;
+    store.playback.renew();
   });
   if (payload) {
-    store.setModel(payload);
+    store.view.setModel(payload);
     onMachine();
-  } else if (same && store.model.value && known.revision === snapshot.revision) onEvents([]);
+  } else if (same && store.data.model.value && known.revision === snapshot.revision) onEvents([]);
   else await load(snapshot);
 }
 
@@ -276,12 +280,12 @@ async function load(facts: MachineFacts) {
     if (!payload) await new Promise((done) => setTimeout(done, pause));
     if (mine !== loads) return;
   }
-  store.setModel(payload);
+  store.view.setModel(payload);
   onMachine();
   const statistics = await ask<Answers["GET /api/statistics"]>(link("statistics"));
   if (mine !== loads) return;
-  if (isFailure(statistics)) store.notify(`Recorded runs: ${statistics.text}`, "error");
-  store.statistics.value = isFailure(statistics) ? null : statistics;
+  if (isFailure(statistics)) store.view.notify(`Recorded runs: ${statistics.text}`, "error");
+  store.data.statistics.value = isFailure(statistics) ? null : statistics;
 }
 
 async function fetchModel(name: string): Promise<MachinePayload | null> {
@@ -334,7 +338,7 @@ export async function post<T extends { ok: true }>(address: string, data: object
   clearTimeout(timer);
   if (limit.signal.aborted)
     return failure(`no answer in ${ANSWER_MS / 1000} s; it may still be carried out: look at the machine.`);
-  if (isFailure(answer) && answer.wants_token) store.tokenAsked.value = true; // a restarted viewer has another token
+  if (isFailure(answer) && answer.wants_token) store.view.tokenAsked.value = true; // a new viewer's is another one
   return answer;
 }
 
@@ -348,9 +352,9 @@ export function takeToken(text: string) {
   } catch {
     // without storage it is lost when the page is loaded again
   }
-  store.tokenAsked.value = false;
+  store.view.tokenAsked.value = false;
   logIn().then(reconnect);
-  store.notify("Try again now");
+  store.view.notify("Try again now");
   return true;
 }
 
@@ -358,13 +362,13 @@ export function takeToken(text: string) {
 export const askAction = (data: object) => post<CheckedGoal | GoalAccepted | Done>("/api/action", data);
 
 /** Show or hide the causes of the run's end. */
-export async function showWhy(open: boolean = store.why.value === null) {
-  const shown = store.facts.value?.epoch;
+export async function showWhy(open: boolean = store.data.why.value === null) {
+  const shown = store.data.facts.value?.epoch;
   const answer = open ? (whyOfFile ?? (await ask<Answers["GET /api/why"]>(link("why")))) : null;
-  if (isFailure(answer)) store.notify(`Why: ${answer.text}`, "error");
-  else if (shown === store.facts.value?.epoch) {
-    store.why.value = answer;
-    if (answer) store.part.value = "log"; // the part in which a phone shows them
+  if (isFailure(answer)) store.view.notify(`Why: ${answer.text}`, "error");
+  else if (shown === store.data.facts.value?.epoch) {
+    store.data.why.value = answer;
+    if (answer) store.view.part.value = "log"; // the part in which a phone shows them
   }
 }
 
@@ -383,9 +387,9 @@ export function refreshRuns() {
       refreshed = performance.now();
       refreshDue = 0;
       batch(() => {
-        store.runsProblem.value = isFailure(answer) ? answer.text : "";
-        if (!isFailure(answer)) store.runs.value = answer;
-        store.runsKnown.value = true;
+        store.data.runsProblem.value = isFailure(answer) ? answer.text : "";
+        if (!isFailure(answer)) store.data.runs.value = answer;
+        store.data.runsKnown.value = true;
       });
     },
     Math.max(0, refreshed + REFRESH_MS - performance.now()),
@@ -408,14 +412,14 @@ export async function askSimulation(data: object) {
 /** Request the batches of simulated runs. */
 export async function refreshSimulations() {
   const answer = await ask<Answers["GET /api/simulations"]>("/api/simulations");
-  if (!isFailure(answer)) store.simulations.value = answer;
+  if (!isFailure(answer)) store.data.simulations.value = answer;
 }
 
 /** Resume or cancel a durable mission. */
 export async function commandMission({ journal, id }: Mission, what: string) {
   const answer = await post<Done>("/api/mission", { journal, id, command: what });
-  if (answer.ok) store.notify(`${id}: ${answer.text}`);
-  else if (!answer.wants_token) store.notify(answer.text, "error");
+  if (answer.ok) store.view.notify(`${id}: ${answer.text}`);
+  else if (!answer.wants_token) store.view.notify(answer.text, "error");
   refreshRuns();
 }
 
@@ -423,7 +427,7 @@ export async function commandMission({ journal, id }: Mission, what: string) {
 export async function openRun(id: string) {
   const answer = await ask<Answers["GET /api/open"]>(`/api/open?run=${encoded(id)}`);
   if (!answer.ok) {
-    store.notify(`Run: ${answer.text}`, "error");
+    store.view.notify(`Run: ${answer.text}`, "error");
     return;
   }
   choose(answer.name);

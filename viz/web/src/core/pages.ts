@@ -1,6 +1,6 @@
 // The pages of the viewer and their addresses: a machine, the list of runs, the live runs together, the actions. The
 // browser's Back goes to the one before.
-import { pageShown } from "#core/store.ts";
+import { store } from "#core/store.ts";
 
 export type PageName = "machine" | "runs" | "fleet" | "actions";
 
@@ -31,7 +31,7 @@ export function addressOf(address: string, name: PageName, machine?: string) {
 /** Show a page; the browser's Back leads to the present one. */
 export function showPage(name: PageName, { machine, replace = false }: { machine?: string; replace?: boolean } = {}) {
   const address = addressOf(location.href, name, machine);
-  pageShown.value = name;
+  store.view.pageShown.value = name;
   if (address === location.href) return;
   if (replace) history.replaceState(null, "", address);
   else history.pushState(null, "", address);

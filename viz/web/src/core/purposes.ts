@@ -1,7 +1,7 @@
 // What a goal or a state is for, in a few words: "kitchen", "(3.2, 1.0)".
 
 import { own } from "#core/fold.ts";
-import { activeLeaves, model, run, scene, shown } from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { GoalRun, Span } from "#core/types.ts";
 import { fieldsOf } from "#core/values.ts";
@@ -10,6 +10,7 @@ const NAMES = ["name", "station", "place", "waypoint", "location", "target", "ob
 
 /** Where a goal leads, or what it is about; "" if neither can be said in a few words. */
 export function purposeOf(id: string, { goal }: Pick<GoalRun, "goal">) {
+  const { scene } = store.data;
   const driven = scene.goalWithId(id);
   if (driven) return scene.placeName(driven) || `(${driven.x.toFixed(1)}, ${driven.y.toFixed(1)})`;
   const fields = fieldsOf(goal) ?? {};
@@ -36,7 +37,7 @@ export function purposeOfVisit(span: Span) {
 
 /** "attempt 2 of 3", where the machine says how many there are at most. */
 export function attemptText(path: string, attempt: number) {
-  const retry = model.value?.get(path)?.details.find(([name]) => name === "retry")?.[1] ?? "";
+  const retry = store.data.model.value?.get(path)?.details.find(([name]) => name === "retry")?.[1] ?? "";
   const most = /^(\d+) attempts/.exec(retry)?.[1];
   return `attempt ${attempt}${most ? ` of ${most}` : ""}`;
 }
@@ -67,16 +68,16 @@ export function wordsOf(name: string, span: Span, now: number) {
 
 /** What a closed branch does, or how it ended, in a few words. */
 export function insideText(path: string) {
-  const leaf = activeLeaves.value.find((one) => one.startsWith(`${path}/`));
+  const leaf = store.status.activeLeaves.value.find((one) => one.startsWith(`${path}/`));
   if (leaf) return `${leaf.slice(leaf.lastIndexOf("/") + 1)} ${purposeOfState(leaf)}`.trim();
-  const state = own(shown().states, path);
+  const state = own(store.playback.shown().states, path);
   if (!state?.visits) return "not begun";
   return state.since != null ? purposeOfState(path) : (state.error ?? state.outcome ?? "");
 }
 
 /** The purpose of a running state as text behind its name; "" without one. */
 export function purposeOfState(path: string) {
-  const span = run.open.get(path);
+  const span = store.data.run.open.get(path);
   const purpose = span ? purposeOfVisit(span) : "";
   return purpose && `\u2192 ${purpose}`;
 }

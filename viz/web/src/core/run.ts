@@ -201,6 +201,11 @@ export class Run {
     return { from: found.from, to, rows, holds };
   }
 
+  /** The newest visit of a state that had begun at an instant; null if there is none. @param t [ms] */
+  visitAt(path: string, t: number = Infinity) {
+    return this.spans.findLast((one) => one.path === path && one.from <= t) ?? null;
+  }
+
   first() {
     return this.begun ?? (this.events.length ? timeOf(this.events[0]) : null);
   }

@@ -3,7 +3,7 @@
 import { makeWorker, messageOf } from "#core/connection.ts";
 import type { Stretch } from "#core/playback.ts";
 import { FILM_FRAME_MS, framesOf } from "#core/playback.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { Page } from "#drawing/page.ts";
 import { isDark } from "#drawing/theme.ts";
 
@@ -14,22 +14,22 @@ const FONTS_MS = 150; // until then the font of the first picture may not be loa
 
 /** Save a film of the selected stretch, otherwise of the last seconds before the instant shown. */
 export async function saveFilm(page: Page) {
-  const { run } = store;
-  store.playing.value = null; // playing would change the instant between two pictures
-  const shown = store.cursor.value;
-  const to = store.nowMs();
-  const stretch = store.stretch.value ?? { from: Math.max(run.first() ?? to, to - LAST_MS), to };
-  if (store.filmed.value !== null || stretch.from >= stretch.to) return;
+  const { run } = store.data;
+  store.playback.playing.value = null; // playing would change the instant between two pictures
+  const shown = store.playback.cursor.value;
+  const to = store.playback.nowMs();
+  const stretch = store.playback.stretch.value ?? { from: Math.max(run.first() ?? to, to - LAST_MS), to };
+  if (store.playback.filmed.value !== null || stretch.from >= stretch.to) return;
   const name = `${page.fileName()}.gif`;
-  store.filmed.value = 0;
+  store.playback.filmed.value = 0;
   try {
-    const film = await draw(page, stretch, () => run === store.run && store.filmed.value !== null);
+    const film = await draw(page, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
     if (film) save(film, name);
   } catch (error) {
-    store.notify(`No film: ${messageOf(error)}`, "error");
+    store.view.notify(`No film: ${messageOf(error)}`, "error");
   } finally {
-    store.filmed.value = null;
-    if (run === store.run) store.seek(shown);
+    store.playback.filmed.value = null;
+    if (run === store.data.run) store.playback.seek(shown);
   }
 }
 
@@ -53,11 +53,11 @@ async function draw(page: Page, stretch: Stretch, isWanted: () => boolean) {
     worker.postMessage({ frameMs: FILM_FRAME_MS });
     for (const [i, t] of instants.entries()) {
       if (!isWanted()) return null;
-      store.seek(t);
+      store.playback.seek(t);
       await paint(page, canvas, style, i === 0);
       const { data, width, height } = g.getImageData(0, 0, canvas.width, canvas.height);
       await ask({ data, width, height }, [data.buffer]);
-      if (isWanted()) store.filmed.value = Math.round((100 * (i + 1)) / instants.length);
+      if (isWanted()) store.playback.filmed.value = Math.round((100 * (i + 1)) / instants.length);
     }
     const film = await ask("end");
     return film && new Blob([film], { type: "image/gif" });
@@ -93,7 +93,7 @@ async function paint(page: Page, canvas: HTMLCanvasElement, style: string, isFir
   g.fillText(page.title(), 12, HEAD / 2);
   g.textAlign = "right";
   g.font = "600 15px 'JetBrains Mono', monospace";
-  g.fillText(store.instantText(store.nowMs()), wide - 12, HEAD / 2);
+  g.fillText(store.clock.instantText(store.playback.nowMs()), wide - 12, HEAD / 2);
   g.textAlign = "left";
   g.drawImage(picture, 0, HEAD, stage.w, stage.h);
   if (floor.clientWidth) g.drawImage(floor, stage.w, HEAD, floor.clientWidth, floor.clientHeight);

@@ -1,7 +1,7 @@
 // Follow mode: opens the running containers, closes the others, and frames the running states as far as they are
 // legible.
 
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { Box } from "#core/types.ts";
 import type { Diagram } from "#drawing/diagram.ts";
 import type { Viewport } from "#drawing/viewport.ts";
@@ -14,13 +14,13 @@ let rearrangedAt = -Infinity; // [ms]
 
 /** Paths of the containers that should be open; null if nothing is to change. @param now [ms] */
 export function containersToOpen(now: number) {
-  const model = store.model.value;
+  const model = store.data.model.value;
   const moment = performance.now();
   if (!model || moment - rearrangedAt < PAUSE_MS) return null;
-  const states = store.shown().states;
+  const states = store.playback.shown().states;
   const open = new Set([model.root.path]);
-  const ended = store.activePaths.value.length === 0; // then the containers in which it ended are open
-  for (const path of ended ? store.lastLeaves.value.flatMap(around) : store.activePaths.value) {
+  const ended = store.status.activePaths.value.length === 0; // then the containers in which it ended are open
+  for (const path of ended ? store.status.lastLeaves.value.flatMap(around) : store.status.activePaths.value) {
     const since = ended ? 0 : states[path]?.since;
     const node = model.get(path);
     if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
@@ -34,7 +34,7 @@ export function containersToOpen(now: number) {
 }
 
 /** The containers around a state. */
-const around = (path: string) => store.model.value?.ancestors(path).map((node) => node.path) ?? [];
+const around = (path: string) => store.data.model.value?.ancestors(path).map((node) => node.path) ?? [];
 
 /** Forget the open containers, so that the next call answers at once. */
 export function restart() {
@@ -44,7 +44,7 @@ export function restart() {
 
 /** The box around all running states; a state in a closed container counts as that container. */
 function boxOfActive(boxes: Map<string, Box>): Box | null {
-  const found = store.lastLeaves.value.flatMap((path) => {
+  const found = store.status.lastLeaves.value.flatMap((path) => {
     let at = path;
     while (at && !boxes.has(at)) at = at.slice(0, Math.max(0, at.lastIndexOf("/")));
     return boxes.get(at) ?? [];
@@ -76,8 +76,8 @@ export function oneLevelLess(open: Set<string>) {
  * @param whole the whole diagram
  */
 export function boxToFrame(diagram: Diagram, view: Viewport, whole: Box) {
-  const leaves = store.lastLeaves.value;
-  const model = store.model.value;
+  const leaves = store.status.lastLeaves.value;
+  const model = store.data.model.value;
   const active = boxOfActive(diagram.boxes);
   if (!active || !model) return whole;
   const shared = model.ancestors(leaves[0]).filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
@@ -87,7 +87,7 @@ export function boxToFrame(diagram: Diagram, view: Viewport, whole: Box) {
   }
   if (view.scaleFor(active) >= READABLE) return atLeast(active, view);
   // Not all are legible at once, even with everything closed: the state that began last is in the middle.
-  const states = store.shown().states;
+  const states = store.playback.shown().states;
   const newest = leaves.reduce((a, b) => ((states[b]?.since ?? 0) > (states[a]?.since ?? 0) ? b : a));
   const at = boxOfOne(diagram, newest) ?? active;
   const [w, h] = [view.width / READABLE, view.height / READABLE];

@@ -5,7 +5,7 @@ import { bytesOf } from "#core/connection.ts";
 import { outcomeClass } from "#core/outcomes.ts";
 import type { Scene } from "#core/scene.ts";
 import { COLOURS, cellAt, countUntil, scanPoints } from "#core/scene.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { DrivenGoal, GridMap, Piece, Point, Robot } from "#core/types.ts";
 import { Colours, fitted } from "#drawing/theme.ts";
 import { grab } from "#drawing/viewport.ts";
@@ -40,7 +40,7 @@ export class MapView {
     this.canvas = canvas;
     this.context = canvas.getContext("2d") as CanvasRenderingContext2D;
     canvas.addEventListener("pointermove", (e) => this.#hover(e));
-    canvas.addEventListener("pointerleave", () => store.hover(null));
+    canvas.addEventListener("pointerleave", () => store.pointer.hover(null));
     grab(canvas, {
       onPan: (dx, dy) => this.#pan(dx, dy),
       onZoom: (factor, px, py) => this.#zoom(factor, px, py),
@@ -105,14 +105,14 @@ export class MapView {
     const size = fitted(g);
     if (!size) return;
     const { width, height, ratio } = size;
-    const { scene, now } = this.given ?? { scene: store.scene, now: store.nowMs() };
+    const { scene, now } = this.given ?? { scene: store.data.scene, now: store.playback.nowMs() };
     this.#frame(scene, now, width, height);
     const map = scene.mapAt(now);
     g.fillStyle = this.#colours.of(map ? "unknown" : "floor");
     g.fillRect(0, 0, width, height);
     if (map) this.#floor(map, ratio);
     else this.#grid(width, height);
-    const until = (this.given ? null : store.cursor.value) ?? Infinity;
+    const until = (this.given ? null : store.playback.cursor.value) ?? Infinity;
     for (const robot of scene.robots.values()) this.#seen(scene, robot, now, until);
     for (const robot of scene.robots.values()) this.#tracks(scene, robot, until);
     this.#labels = [this.#scaleBox(width, height)];
@@ -225,7 +225,7 @@ export class MapView {
 
   #tracks(scene: Scene, robot: Robot, until: number) {
     const g = this.context;
-    const { hovered } = store;
+    const { hovered } = store.pointer;
     const lit = hovered.value;
     const pieces = scene.piecesOf(robot);
     const isLit = (one: Piece) => lit !== null && one.path === lit.path && one.visit === lit.from;
@@ -390,22 +390,22 @@ export class MapView {
   #nearest(e: PointerEvent | MouseEvent) {
     if (this.given) return null;
     const { x, y } = this.#placeAt(e.offsetX, e.offsetY);
-    return store.scene.nearest(x, y, REACH / this.#scale.k, store.cursor.value ?? Infinity);
+    return store.data.scene.nearest(x, y, REACH / this.#scale.k, store.playback.cursor.value ?? Infinity);
   }
 
   #hover(e: PointerEvent) {
     const found = this.#nearest(e);
     this.canvas.style.cursor = found ? "pointer" : "";
     const { path, visit } = found?.piece ?? { path: null, visit: null };
-    store.hover(path === null || visit === null ? null : { path, from: visit });
+    store.pointer.hover(path === null || visit === null ? null : { path, from: visit });
   }
 
   /** Go to the instant at which a robot was at the pointer. */
   #goTo(e: PointerEvent) {
     const found = this.#nearest(e);
     if (!found) return;
-    store.seek(found.t);
-    if (found.piece.path) store.selected.value = found.piece.path;
+    store.playback.seek(found.t);
+    if (found.piece.path) store.view.selected.value = found.piece.path;
   }
 
   #pan(dx: number, dy: number) {

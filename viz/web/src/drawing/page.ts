@@ -8,7 +8,7 @@ import { fragmentOf, viewOf } from "#core/links.ts";
 import { showPage } from "#core/pages.ts";
 import { insideText } from "#core/purposes.ts";
 import { numbersFor } from "#core/statistics.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { Box, Observed, RunEvent, RunState, StateNode, Theme } from "#core/types.ts";
 import { Diagram } from "#drawing/diagram.ts";
 import * as framing from "#drawing/framing.ts";
@@ -111,7 +111,7 @@ export class Page {
     });
     svg.addEventListener("pointermove", (e) => e.buttons || this.#hover(pathOf(e)));
     svg.addEventListener("pointerleave", () => this.#hover(null));
-    svg.addEventListener("dblclick", (e) => this.#toggle(store.model.value?.get(pathOf(e))));
+    svg.addEventListener("dblclick", (e) => this.#toggle(store.data.model.value?.get(pathOf(e))));
     minimap.addEventListener("pointerdown", (e) => this.#jump(e));
     new ResizeObserver(() => {
       if (this.fitted && this.view.is(this.fitted)) {
@@ -123,16 +123,18 @@ export class Page {
       this.diagram.showWindow(this.view);
       this.timeline.draw();
     }).observe(svg);
-    const linked = [store.selected, store.opened, store.instant, store.notes, store.stretch];
     const phone = matchMedia("(max-width: 720px), (max-height: 480px)");
     const look = () => {
-      store.isPhone.value = phone.matches;
+      store.view.isPhone.value = phone.matches;
     };
     phone.addEventListener("change", look);
     look();
     new ResizeObserver(() => this.timeline.draw()).observe(canvas);
-    for (const one of [...linked, store.arrangement, store.plotsChosen]) one.subscribe(() => this.#writeAddress());
-    for (const one of [store.notes, store.clock, store.laneFilter]) one.subscribe(() => this.timeline.draw());
+    const { view, playback, panels, notes } = store;
+    const chosen = [view.selected, view.opened, notes.all, playback.stretch, panels.arrangement, panels.plotsChosen];
+    for (const one of [...chosen, playback.instant]) one.subscribe(() => this.#writeAddress());
+    for (const one of [store.notes.all, store.clock.chosen, store.view.laneFilter])
+      one.subscribe(() => this.timeline.draw());
     addEventListener("hashchange", () => {
       readToken();
       this.linked = viewOf(location.hash);
@@ -140,24 +142,24 @@ export class Page {
       this.relayout({ frame: true });
     });
     systemIsDark.addEventListener("change", () => this.#restyle());
-    store.instant.subscribe(() => {
+    store.playback.instant.subscribe(() => {
       this.paintAll();
       this.timeline.draw();
       this.map.draw();
     });
-    store.playing.subscribe((playing) => {
+    store.playback.playing.subscribe((playing) => {
       if (playing && !this.playFrame) this.playFrame = requestAnimationFrame((moment) => this.#play(moment));
     });
-    store.hovered.subscribe((visit) => {
+    store.pointer.hovered.subscribe((visit) => {
       this.diagram.mark(visit ? [visit.path] : [], "linked");
       this.timeline.draw();
       this.map.draw();
     });
-    store.pointed.subscribe(() => this.timeline.draw());
-    store.stretch.subscribe(() => this.timeline.draw());
-    store.serversSeen.subscribe(() => this.paintAll());
-    store.facts.subscribe(() => this.paintAll());
-    store.wayShown.subscribe(() => this.#showWay());
+    store.pointer.pointed.subscribe(() => this.timeline.draw());
+    store.playback.stretch.subscribe(() => this.timeline.draw());
+    store.data.serversSeen.subscribe(() => this.paintAll());
+    store.data.facts.subscribe(() => this.paintAll());
+    store.data.wayShown.subscribe(() => this.#showWay());
   }
 
   /** Begin; the elements must be in the document, so that the browser loads their fonts. */
@@ -177,16 +179,16 @@ export class Page {
   /** Show the machine in the store. */
   showMachine() {
     this.openedAt = performance.now();
-    store.selected.value = null;
+    store.view.selected.value = null;
     framing.restart();
     this.layout?.clear();
     this.timeline.reset();
-    store.loadNotes();
-    store.loadPlots();
+    store.notes.load();
+    store.panels.loadPlots();
     this.map.reset();
-    if (isFile() || store.facts.value?.recorded || store.run.now.ended != null) this.timeline.fitAll();
-    if (store.settings.value.follow && !this.followIsSet) {
-      store.follow.value = true;
+    if (isFile() || store.data.facts.value?.recorded || store.data.run.now.ended != null) this.timeline.fitAll();
+    if (store.data.settings.value.follow && !this.followIsSet) {
+      store.view.follow.value = true;
       this.followIsSet = true;
     }
     this.#showLinked();
@@ -198,7 +200,7 @@ export class Page {
   /** The address of the view. */
   address() {
     const address = new URL(location.href);
-    const name = store.facts.value?.name;
+    const name = store.data.facts.value?.name;
     if (name && !isFile()) address.searchParams.set("machine", name);
     address.hash = this.#fragment();
     return String(address);
@@ -206,24 +208,25 @@ export class Page {
 
   /** The title of the view, for a picture. */
   title() {
-    return store.facts.value?.label ?? "";
+    return store.data.facts.value?.label ?? "";
   }
 
   /** A file name for the view, without an extension. */
   fileName() {
-    return `${this.title()} ${store.instantText(store.nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
+    return `${this.title()} ${store.clock.instantText(store.playback.nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
   }
 
   #fragment() {
-    const { cursor, selected, opened, notes, stretch, arrangement, plotsChosen } = store;
+    const { view, playback, panels, notes } = store;
+    const stretch = playback.stretch.value;
     return fragmentOf({
-      at: cursor.value,
-      selected: selected.value,
-      opened: [...opened.value],
-      notes: notes.value,
-      stretch: stretch.value && [stretch.value.from, stretch.value.to],
-      panels: arrangement.value,
-      plots: plotsChosen.value,
+      at: playback.cursor.value,
+      selected: view.selected.value,
+      opened: [...view.opened.value],
+      notes: notes.all.value,
+      stretch: stretch && [stretch.from, stretch.to],
+      panels: panels.arrangement.value,
+      plots: panels.plotsChosen.value,
     });
   }
 
@@ -231,38 +234,39 @@ export class Page {
   #writeAddress() {
     clearTimeout(this.addressDue);
     this.addressDue = setTimeout(() => {
-      if (store.model.value && !this.linked && store.pageShown.value === "machine")
+      if (store.data.model.value && !this.linked && store.view.pageShown.value === "machine")
         history.replaceState(null, "", `#${this.#fragment()}`);
     }, ADDRESS_MS);
   }
 
   /** Show the view of the address, as far as it exists. */
   #showLinked() {
-    const model = store.model.value;
+    const model = store.data.model.value;
     const view = this.linked;
     this.linked = null;
     if (!view || !model) return;
     const known = view.opened?.filter((path) => model.get(path)?.children.length);
-    if (known?.length) store.keepOpened(new Set(known));
-    if (view.notes.length) store.addNotes(view.notes);
-    if (view.panels) store.arrangement.value = view.panels;
-    if (view.stretch) store.selectStretch(...view.stretch);
-    if (view.plots) store.plotsChosen.value = view.plots;
-    const first = store.run.first();
-    const isKept = first !== null && view.at !== null && view.at >= first && view.at <= (store.run.last() ?? first) + 1;
+    if (known?.length) store.view.keepOpened(new Set(known));
+    if (view.notes.length) store.notes.add(view.notes);
+    if (view.panels) store.panels.arrangement.value = view.panels;
+    if (view.stretch) store.playback.selectStretch(...view.stretch);
+    if (view.plots) store.panels.plotsChosen.value = view.plots;
+    const first = store.data.run.first();
+    const isKept =
+      first !== null && view.at !== null && view.at >= first && view.at <= (store.data.run.last() ?? first) + 1;
     if (isKept) {
       this.timeline.fitAll();
-      store.seek(view.at);
-    } else if (view.at !== null) store.notify("The instant of this link is not in this run", "error");
+      store.playback.seek(view.at);
+    } else if (view.at !== null) store.view.notify("The instant of this link is not in this run", "error");
     if (view.selected === null) return;
     if (model.get(view.selected)) {
-      store.selected.value = view.selected;
-      store.reveal(view.selected);
-    } else store.notify("The state of this link is not in this machine", "error");
+      store.view.selected.value = view.selected;
+      store.view.reveal(view.selected);
+    } else store.view.notify("The state of this link is not in this machine", "error");
   }
 
   takeEvents(events: RunEvent[]) {
-    const live = store.cursor.value === null && !document.hidden; // a hidden page draws no frames
+    const live = store.playback.cursor.value === null && !document.hidden; // a hidden page draws no frames
     for (const e of events) {
       this.changed.add(e.path);
       if (live && ["Left", "Failed", "Fired"].includes(e.kind)) this.flashes.push(e);
@@ -274,7 +278,7 @@ export class Page {
   }
 
   takeObserved(records: Observed[]) {
-    store.addObserved(records);
+    store.data.addObserved(records);
     this.#schedule();
   }
 
@@ -296,9 +300,9 @@ export class Page {
     // Changes from before a look back must not be painted after the return to live.
     const flashes = this.flashes.splice(0);
     const arrived = this.arrived.splice(0);
-    if (store.cursor.value === null) {
-      const now = store.nowMs();
-      for (const path of this.changed) this.#paint(path, store.run.now, now);
+    if (store.playback.cursor.value === null) {
+      const now = store.playback.nowMs();
+      for (const path of this.changed) this.#paint(path, store.data.run.now, now);
       this.changed.clear();
       for (const e of flashes)
         if (e.kind === "Fired") this.diagram.flashFired(e.path, e.transition, moment);
@@ -316,11 +320,11 @@ export class Page {
 
   #play(moment: number) {
     this.playFrame = 0;
-    if (!store.playing.value) return;
+    if (!store.playback.playing.value) return;
     this.playFrame = requestAnimationFrame((next) => this.#play(next));
     if (moment - this.playedAt < PLAY_MS) return;
     this.playedAt = moment;
-    store.playOn(performance.now());
+    store.playback.playOn(performance.now());
   }
 
   #measureLatency() {
@@ -333,12 +337,12 @@ export class Page {
     clearTimeout(this.panelsDue);
     this.panelsDue = 0;
     this.panelsAt = moment;
-    store.tick.value += 1;
-    store.hasMap.value = !store.scene.isEmpty;
+    store.playback.tick.value += 1;
+    store.panels.hasMap.value = !store.data.scene.isEmpty;
     if (moment - this.textAt > TEXT_MS) {
       this.textAt = moment;
-      store.slowTick.value += 1;
-      const newest = store.run.events.at(-1)?.seq ?? 0;
+      store.playback.slowTick.value += 1;
+      const newest = store.data.run.events.at(-1)?.seq ?? 0;
       const isBusy = newest - this.newestSeq > 3 * BUSY * (TEXT_MS / 1000);
       this.newestSeq = newest;
       this.diagram.svg.classList.toggle("busy", isBusy);
@@ -357,15 +361,15 @@ export class Page {
 
   /** Update what changes without events: clocks, the stale badge, closed containers. */
   #beat() {
-    const data = store.shown();
-    const now = store.nowMs();
-    if (store.cursor.value === null)
-      for (const path of store.activePaths.value) {
+    const data = store.playback.shown();
+    const now = store.playback.nowMs();
+    if (store.playback.cursor.value === null)
+      for (const path of store.status.activePaths.value) {
         const state = data.states[path];
         if (state) this.diagram.updateBadge(path, state, now);
       }
-    if (store.cursor.value === null) this.diagram.paintCards(insideText);
-    if (store.numbers.value !== "none") this.#showNumbers();
+    if (store.playback.cursor.value === null) this.diagram.paintCards(insideText);
+    if (store.view.numbers.value !== "none") this.#showNumbers();
     this.#panels(performance.now());
   }
 
@@ -373,8 +377,11 @@ export class Page {
   #announce(moment: number) {
     const region = document.getElementById("announced");
     if (!region || moment - this.announcedAt < ANNOUNCE_MS) return;
-    const names = store.activeLeaves.value.slice(0, 6).map(store.nameOf).join(", ");
-    const text = [store.runStatus.value.word, names].filter(Boolean).join(": ");
+    const names = store.status.activeLeaves.value
+      .slice(0, 6)
+      .map((path) => store.data.nameOf(path))
+      .join(", ");
+    const text = [store.status.runStatus.value.word, names].filter(Boolean).join(": ");
     if (region.textContent === text) return;
     region.textContent = text;
     this.announcedAt = moment;
@@ -386,41 +393,46 @@ export class Page {
     this.diagram.paintNet(path, data.states[path]);
     if (!this.diagram.states.has(path)) return;
     const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
-    this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
+    this.diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
   }
 
   paintAll() {
     if (!this.diagram.size) return;
-    const data = store.shown();
-    const now = store.nowMs();
+    const data = store.playback.shown();
+    const now = store.playback.nowMs();
     const running = Object.values(data.goals).filter((goal) => goal.ended == null);
     const goals = new Map(running.map((goal) => [goal.path, goal]));
     for (const path of this.diagram.boxes.keys()) {
       const goal = goals.get(path);
-      this.diagram.paint(path, data.states[path], now, goal, store.hasNoServer(goal));
+      this.diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
     }
     for (const path of this.diagram.joins.keys()) this.diagram.paintJoins(path, data.states);
     this.diagram.paintCards(insideText);
     for (const path of this.diagram.boxes.keys()) this.diagram.paintNet(path, data.states[path]);
-    const stops = store.facts.value?.control?.breakpoints ?? [];
+    const stops = store.data.facts.value?.control?.breakpoints ?? [];
     const pathsOf = (some: typeof stops) => some.map(([path]) => path);
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
-    this.diagram.mark(store.selected.value ? [store.selected.value] : [], "selected");
-    this.diagram.showWay(store.wayShown.value);
+    this.diagram.mark(store.view.selected.value ? [store.view.selected.value] : [], "selected");
+    this.diagram.showWay(store.data.wayShown.value);
     this.#showNumbers();
   }
 
   /** Open the containers on the way to the end of the run, and highlight that way. */
   #showWay() {
-    const closed = store.wayShown.value.map(({ path }) => store.reveal(path)).some(Boolean);
+    const closed = store.data.wayShown.value.map(({ path }) => store.view.reveal(path)).some(Boolean);
     if (closed) this.relayout({ frame: true });
-    else if (this.diagram.size) this.diagram.showWay(store.wayShown.value);
+    else if (this.diagram.size) this.diagram.showWay(store.data.wayShown.value);
   }
 
   #showNumbers() {
-    const { numbers, statistics, model } = store;
-    const { countOf, heatOf } = numbersFor(numbers.value, store.shown().states, statistics.value, model.value);
+    const { statistics, model } = store.data;
+    const { countOf, heatOf } = numbersFor(
+      store.view.numbers.value,
+      store.playback.shown().states,
+      statistics.value,
+      model.value,
+    );
     this.diagram.showNumbers(countOf, heatOf);
   }
 
@@ -451,12 +463,12 @@ export class Page {
       else if (frame) this.fit({ animate: false });
       const { dataset } = document.documentElement;
       dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
-      store.failure.value = null;
+      store.data.failure.value = null;
     } catch (error) {
       const text = `This machine could not be laid out: ${messageOf(error)}`;
       if (this.diagram.size)
-        store.notify(text, "error"); // the old drawing stays
-      else store.failure.value = text;
+        store.view.notify(text, "error"); // the old drawing stays
+      else store.data.failure.value = text;
       console.error(error);
     } finally {
       this.drawing = null;
@@ -464,34 +476,34 @@ export class Page {
   }
 
   async #layoutOnce() {
-    const model = store.model.value;
+    const model = store.data.model.value;
     if (!model || !this.layout) return;
     const begun = performance.now();
     if (this.afterLayout.frame) this.layout.choose(this.view.width / this.view.height);
     const progress = (done: number, all: number) => {
-      if (performance.now() - begun > SLOW_MS) store.laidOut.value = { done, all };
+      if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
-    let open = new Set(store.opened.value).add(model.root.path);
+    let open = new Set(store.view.opened.value).add(model.root.path);
     let result = await this.layout.run(model.root, open, progress);
     if (this.afterLayout.frame === "follow")
       while (result && !framing.isLegible(boxesOf(result), this.view)) {
         const less = framing.oneLevelLess(open);
         if (!less) break;
         open = less;
-        store.opened.value = less;
+        store.view.opened.value = less;
         result = await this.layout.run(model.root, less, progress);
       }
-    store.laidOut.value = null;
-    store.overview.value = Boolean(result?.isOverview);
+    store.view.laidOut.value = null;
+    store.view.overview.value = Boolean(result?.isOverview);
     this.layoutMs = performance.now() - begun;
-    if (!result || model !== store.model.value) return;
+    if (!result || model !== store.data.model.value) return;
     const anchor = this.#anchor();
-    this.diagram.draw(result, model, store.problems.value);
+    this.diagram.draw(result, model, store.data.problems.value);
     this.#hold(anchor);
     this.paintAll();
     const size = this.diagram.size;
     const tooSmall = size !== null && this.view.scaleFor(size) < READABLE;
-    if (this.afterLayout.frame === true && tooSmall && store.openOneLevelLess()) this.drawAgain = true;
+    if (this.afterLayout.frame === true && tooSmall && store.view.openOneLevelLess()) this.drawAgain = true;
   }
 
   /** Keep the state in the middle of the view at its place while a layout moves the others. */
@@ -520,10 +532,10 @@ export class Page {
   }
 
   #follow() {
-    if (!store.follow.value || this.drawing) return;
-    const open = framing.containersToOpen(store.nowMs());
+    if (!store.view.follow.value || this.drawing) return;
+    const open = framing.containersToOpen(store.playback.nowMs());
     if (!open) return;
-    store.opened.value = open;
+    store.view.opened.value = open;
     this.relayout({ frame: "follow" });
   }
 
@@ -546,12 +558,12 @@ export class Page {
 
   /** Set the state of the diagram that the pointer is on: its visit is highlighted everywhere. */
   #hover(path: string | null) {
-    if (path !== this.hovered) store.hoverAt(path);
+    if (path !== this.hovered) store.pointer.hoverAt(path);
     this.hovered = path;
   }
 
   select(path: string | null) {
-    store.selected.value = path;
+    store.view.selected.value = path;
     this.diagram.mark(path ? [path] : [], "selected");
     this.timeline.draw();
   }
@@ -560,20 +572,20 @@ export class Page {
   goTo(path: string) {
     showPage("machine");
     this.select(path);
-    store.part.value = "machine";
-    if (store.reveal(path)) this.relayout({ focus: path });
+    store.view.part.value = "machine";
+    if (store.view.reveal(path)) this.relayout({ focus: path });
     else this.#focus(path);
   }
 
   /** Select the neighbour of the selected state in a direction. */
   selectNeighbour(dx: number, dy: number) {
-    const from = this.diagram.boxOf(store.selected.value);
+    const from = this.diagram.boxOf(store.view.selected.value);
     if (!from) return;
     const centre = (b: Box) => ({ x: b.x + b.w / 2, y: b.y + Math.min(b.h, 30) / 2 });
     const here = centre(from);
     let best: { path: string; far: number } | null = null;
     for (const [path, box] of this.diagram.boxes) {
-      if (path === store.selected.value) continue;
+      if (path === store.view.selected.value) continue;
       const there = centre(box);
       const along = (there.x - here.x) * dx + (there.y - here.y) * dy;
       const aside = Math.abs((there.x - here.x) * dy) + Math.abs((there.y - here.y) * dx);
@@ -584,50 +596,50 @@ export class Page {
   }
 
   toggleSelected() {
-    this.#toggle(store.model.value?.get(store.selected.value));
+    this.#toggle(store.data.model.value?.get(store.view.selected.value));
   }
 
   /** Open or close a container, unless it is the root. */
   #toggle(node: StateNode | undefined) {
-    if (store.overview.value && node) {
-      store.openAround(node);
+    if (store.view.overview.value && node) {
+      store.view.openAround(node);
       this.relayout({ focus: node.path });
       return;
     }
     if (!node?.children.length || !node.parent) return;
     this.toggled = node.path;
-    store.toggle(node.path);
+    store.view.toggle(node.path);
     this.relayout();
   }
 
   setFollow(on: boolean) {
-    store.follow.value = on;
+    store.view.follow.value = on;
     framing.restart();
     if (on) this.#follow();
   }
 
   setDepth(levels: number) {
-    const model = store.model.value;
+    const model = store.data.model.value;
     if (!model) return;
-    store.follow.value = false;
-    store.setOpened(model.toDepth(levels));
+    store.view.follow.value = false;
+    store.view.setOpened(model.toDepth(levels));
     this.relayout({ frame: true });
   }
 
   setImplicit(on: boolean) {
-    store.setImplicit(on);
+    store.view.setImplicit(on);
     this.layout?.clear();
     this.relayout();
   }
 
   /** @param mode a key of statistics.MODES */
   setNumbers(mode: string) {
-    store.numbers.value = mode;
+    store.view.numbers.value = mode;
     this.#showNumbers();
   }
 
   setTheme(name: Theme) {
-    store.theme.value = name;
+    store.view.theme.value = name;
     applyTheme();
     this.#restyle();
   }

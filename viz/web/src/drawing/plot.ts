@@ -1,7 +1,7 @@
 // A plot beside the timeline, on its axis of instants: uPlot draws the lines and their scale.
 import uPlot from "uplot";
 import { aligned, Samples } from "#core/series.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { Colours } from "#drawing/theme.ts";
 import { drag } from "#drawing/viewport.ts";
 
@@ -61,10 +61,10 @@ export class Plot {
     );
     element.addEventListener("pointerdown", (e) => this.#down(e));
     element.addEventListener("pointermove", (e) => {
-      store.pointed.value = this.#timeAt(e);
+      store.pointer.pointed.value = this.#timeAt(e);
     });
     element.addEventListener("pointerleave", () => {
-      store.pointed.value = null;
+      store.pointer.pointed.value = null;
     });
   }
 
@@ -81,10 +81,10 @@ export class Plot {
     const [width, height] = [element.clientWidth, element.clientHeight];
     if (!width || !height) return;
     this.range = range;
-    for (const one of this.samples) one.update(store.run, store.scene.series);
+    for (const one of this.samples) one.update(store.data.run, store.data.scene.series);
     if (chart.width !== width || chart.height !== height) chart.setSize({ width, height });
     chart.batch(() => {
-      chart.setData(aligned(this.samples, range.from, range.to, store.nowMs()), false);
+      chart.setData(aligned(this.samples, range.from, range.to, store.playback.nowMs()), false);
       chart.setScale("x", { min: range.from, max: range.to });
     });
   }
@@ -101,15 +101,16 @@ export class Plot {
     };
     const ratio = devicePixelRatio || 1;
     g.save();
-    const span = store.hoveredSpan();
-    if (span) band(at(span.from), at(span.to ?? store.nowMs()), "halo", 0.22);
-    const stretch = store.stretch.value;
+    const span = store.pointer.hoveredSpan();
+    if (span) band(at(span.from), at(span.to ?? store.playback.nowMs()), "halo", 0.22);
+    const stretch = store.playback.stretch.value;
     if (stretch) band(at(stretch.from), at(stretch.to), "ink", 0.1);
-    if (store.cursor.value !== null) {
-      band(at(store.cursor.value), bbox.left + bbox.width, "background", 0.55);
-      band(at(store.cursor.value) - ratio, at(store.cursor.value) + ratio, "active");
+    if (store.playback.cursor.value !== null) {
+      band(at(store.playback.cursor.value), bbox.left + bbox.width, "background", 0.55);
+      band(at(store.playback.cursor.value) - ratio, at(store.playback.cursor.value) + ratio, "active");
     }
-    if (store.pointed.value !== null) band(at(store.pointed.value), at(store.pointed.value) + ratio, "muted");
+    if (store.pointer.pointed.value !== null)
+      band(at(store.pointer.pointed.value), at(store.pointer.pointed.value) + ratio, "muted");
     g.restore();
   }
 
@@ -121,7 +122,7 @@ export class Plot {
 
   #down(e: PointerEvent) {
     if (e.button !== 0) return;
-    const seek = (m: PointerEvent) => store.seek(this.#timeAt(m));
+    const seek = (m: PointerEvent) => store.playback.seek(this.#timeAt(m));
     seek(e);
     drag(seek);
   }

@@ -2,7 +2,7 @@
 // dragged and stretched.
 
 import { asksIn, type Density, densityOf } from "#core/density.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { Colours, fitted } from "#drawing/theme.ts";
 import { drag } from "#drawing/viewport.ts";
 
@@ -39,9 +39,9 @@ export class Strip {
 
   /** The time of the whole run [ms]; null before it begins. */
   #whole(): Range | null {
-    const from = store.run.first();
+    const from = store.data.run.first();
     if (from === null) return null;
-    return { from, to: Math.max(store.liveMs(), from + 1000) };
+    return { from, to: Math.max(store.data.liveMs(), from + 1000) };
   }
 
   draw() {
@@ -54,13 +54,13 @@ export class Strip {
     if (wide < 40) return;
     const x = (t: number) => this.left + ((t - whole.from) / (whole.to - whole.from)) * wide;
     const columns = Math.floor(wide / COLUMN);
-    const { events } = store.run;
+    const { events } = store.data.run;
     // A density of many events is computed anew only when its picture would change.
     const step = (whole.to - whole.from) / columns;
     const end = Math.floor(whole.to / Math.max(step, 250));
-    const key = [store.model.value?.root.path, events[0]?.seq, events.length, columns, end].join(" ");
+    const key = [store.data.model.value?.root.path, events[0]?.seq, events.length, columns, end].join(" ");
     if (key !== this.#key || !this.#density) {
-      this.#density = densityOf(events, whole, columns, store.model.value);
+      this.#density = densityOf(events, whole, columns, store.data.model.value);
       this.#key = key;
     }
     const { counts, failures, preempts, starts } = this.#density;
@@ -72,9 +72,9 @@ export class Strip {
       if (count) g.fillRect(this.left + i * COLUMN, height - 3 - tall, COLUMN - 0.5, tall);
     }
     g.fillStyle = this.#colours.of("waiting-fill");
-    for (const [from, to] of asksIn(store.run.waits, whole.to))
+    for (const [from, to] of asksIn(store.data.run.waits, whole.to))
       g.fillRect(x(from), 3, Math.max(2, x(to) - x(from)), height - 6);
-    for (const [from, to] of store.run.now.outages ?? []) {
+    for (const [from, to] of store.data.run.now.outages ?? []) {
       g.fillStyle = this.#colours.of("background");
       g.fillRect(x(from / 1e6), 0, Math.max(2, x(to / 1e6) - x(from / 1e6)), height);
     }
@@ -86,7 +86,7 @@ export class Strip {
     ticks("ink", starts, 1.5, 0);
     ticks("failure", failures, FAILURE, 0);
     this.#window(x, height, width);
-    const at = store.cursor.value;
+    const at = store.playback.cursor.value;
     if (at !== null) ticks("active", [at], 2, 0);
   }
 

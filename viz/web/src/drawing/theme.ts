@@ -1,14 +1,16 @@
 // Light or dark, by the system's setting or the user's choice.
-import * as store from "#core/store.ts";
+import { save } from "#core/storage.ts";
+import { store } from "#core/store.ts";
 
 export const systemIsDark = matchMedia("(prefers-color-scheme: dark)");
 
-export const isDark = () => (store.theme.value === "system" ? systemIsDark.matches : store.theme.value === "dark");
+export const isDark = () =>
+  store.view.theme.value === "system" ? systemIsDark.matches : store.view.theme.value === "dark";
 
 export function applyTheme() {
-  if (store.theme.value === "system") delete document.documentElement.dataset.theme;
-  else document.documentElement.dataset.theme = store.theme.value;
-  store.save("theme", store.theme.value);
+  if (store.view.theme.value === "system") delete document.documentElement.dataset.theme;
+  else document.documentElement.dataset.theme = store.view.theme.value;
+  save("theme", store.view.theme.value);
 }
 
 /** The page's present colours by name; read once, as getComputedStyle is slow. */

@@ -6,7 +6,7 @@ import type { Model } from "#core/model.ts";
 import { endClass } from "#core/outcomes.ts";
 import { purposeOfVisit, wordsOf } from "#core/purposes.ts";
 import { COLOURS } from "#core/scene.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { askerText, duration } from "#core/text.ts";
 import type { Span, StateNode } from "#core/types.ts";
 import { Colours, fitted } from "#drawing/theme.ts";
@@ -67,17 +67,17 @@ export class Timeline {
     canvas.addEventListener("pointermove", (e) => {
       const span = this.#spanAt(e);
       canvas.title = span ? describe(span) : "";
-      store.hover(span ? { path: span.path, from: span.from } : null);
+      store.pointer.hover(span ? { path: span.path, from: span.from } : null);
       this.#hover(e.offsetX);
     });
     canvas.addEventListener("pointerleave", () => {
       this.#hover(null);
-      store.hover(null);
+      store.pointer.hover(null);
     });
     canvas.addEventListener("keydown", (e) => this.#key(e));
     canvas.addEventListener("dblclick", (e) => {
       const span = this.#spanAt(e);
-      if (span) this.#show(span.from, span.to ?? store.nowMs());
+      if (span) this.#show(span.from, span.to ?? store.playback.nowMs());
     });
   }
 
@@ -95,8 +95,8 @@ export class Timeline {
 
   /** Show the whole run. */
   fitAll() {
-    const first = store.run.first();
-    const last = store.nowMs();
+    const first = store.data.run.first();
+    const last = store.playback.nowMs();
     if (first == null) return;
     this.length = Math.max(500, (last - first) * 1.04);
     this.end = last + this.length * 0.02;
@@ -112,7 +112,7 @@ export class Timeline {
 
   /** Show a range [ms]; one that reaches the present of a running machine moves on with it. */
   showRange({ from, to }: { from: number; to: number }) {
-    const isLive = store.cursor.value === null && store.goes.value && to >= store.liveMs();
+    const isLive = store.playback.cursor.value === null && store.playback.goes.value && to >= store.data.liveMs();
     this.length = Math.max(SHORTEST_MS, to - from);
     this.end = isLive ? null : to;
     this.draw();
@@ -121,24 +121,24 @@ export class Timeline {
   /** Follow the present. */
   live() {
     this.end = null;
-    store.seek(null);
+    store.playback.seek(null);
   }
 
   /** The range shown [ms]. */
   #range(): [number, number] {
-    const now = store.nowMs();
+    const now = store.playback.nowMs();
     let end = this.end ?? now + this.length * 0.01;
-    if (this.end === null && store.cursor.value !== null) end = now + this.length / 2;
-    const first = store.run.first(); // a run shorter than the range begins at the left
-    if (this.end === null && store.cursor.value === null && first != null)
+    if (this.end === null && store.playback.cursor.value !== null) end = now + this.length / 2;
+    const first = store.data.run.first(); // a run shorter than the range begins at the left
+    if (this.end === null && store.playback.cursor.value === null && first != null)
       end = Math.max(end, first + this.length * 0.98);
     return [end - this.length, end];
   }
 
   /** Keep the played instant in view. */
   #keepInView() {
-    const at = store.cursor.value;
-    if (this.end === null || at === null || !store.playing.value) return;
+    const at = store.playback.cursor.value;
+    if (this.end === null || at === null || !store.playback.playing.value) return;
     if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
     else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
   }
@@ -172,17 +172,17 @@ export class Timeline {
 
   /** Tell screen readers the instant shown, as the value of a slider [s]. */
   tellInstant() {
-    const began = store.began() ?? 0;
+    const began = store.playback.began() ?? 0;
     const seconds = (t: number) => String(Math.max(0, Math.round((t - began) / 1000)));
     this.canvas.setAttribute("aria-valuemin", "0");
-    this.canvas.setAttribute("aria-valuemax", seconds(store.liveMs()));
-    this.canvas.setAttribute("aria-valuenow", seconds(store.nowMs()));
-    this.canvas.setAttribute("aria-valuetext", store.instantText(store.nowMs()));
+    this.canvas.setAttribute("aria-valuemax", seconds(store.data.liveMs()));
+    this.canvas.setAttribute("aria-valuenow", seconds(store.playback.nowMs()));
+    this.canvas.setAttribute("aria-valuetext", store.clock.instantText(store.playback.nowMs()));
   }
 
   draw() {
     const g = this.context;
-    const model = store.model.value;
+    const model = store.data.model.value;
     const size = fitted(g);
     if (!size || !model) return;
     const { width, height } = size;
@@ -190,7 +190,7 @@ export class Timeline {
     g.clearRect(0, 0, width, height);
     g.font = "11px Inter, Arial, sans-serif";
     g.textBaseline = "middle";
-    this.#makeLanes(model, store.run.spans);
+    this.#makeLanes(model, store.data.run.spans);
     this.#keepInView();
     const [from, to] = this.#range();
     const x = (t: number) => this.names + ((t - from) / (to - from)) * (width - this.names - RIGHT);
@@ -224,7 +224,7 @@ export class Timeline {
 
   /** Draw the selected stretch. */
   #stretch(x: (t: number) => number, height: number) {
-    const found = store.stretch.value;
+    const found = store.playback.stretch.value;
     if (!found) return;
     const g = this.context;
     const [left, right] = [found.from, found.to].map((t) => Math.max(this.names, x(t)));
@@ -233,14 +233,14 @@ export class Timeline {
     g.fillRect(left, 0, right - left, height - FOOT);
     g.globalAlpha = 1;
     for (const px of [left, right]) g.fillRect(px - 0.75, 0, 1.5, height - FOOT);
-    g.fillRect(left, height - FOOT, right - left, store.looping.value ? 4 : 2);
+    g.fillRect(left, height - FOOT, right - left, store.playback.looping.value ? 4 : 2);
   }
 
   /** Draw the outages. */
   #outages({ from, to, x }: Scale, width: number, height: number) {
     const g = this.context;
     this.gaps = [];
-    for (const [begin, end] of store.run.now.outages ?? []) {
+    for (const [begin, end] of store.data.run.now.outages ?? []) {
       if (end / 1e6 < from || begin / 1e6 > to) continue;
       const left = Math.max(this.names, x(begin / 1e6));
       const right = Math.min(width - RIGHT, Math.max(x(end / 1e6), left + 3));
@@ -269,7 +269,7 @@ export class Timeline {
   /** Draw a pin at each note, with its text. */
   #notes(x: (t: number) => number, width: number, height: number) {
     const g = this.context;
-    for (const { at, text } of store.notes.value) {
+    for (const { at, text } of store.notes.all.value) {
       const px = x(at);
       if (px < this.names || px > width - RIGHT) continue;
       g.fillStyle = this.#colours.of("ink");
@@ -298,7 +298,7 @@ export class Timeline {
 
   /** The lanes of the names that are looked for; all if there is room, otherwise those with spans in the range. */
   #lanesToShow({ from, to }: Scale, room: number) {
-    const wanted = store.laneFilter.value
+    const wanted = store.view.laneFilter.value
       .toLowerCase()
       .split(/[\s,]+/)
       .filter(Boolean);
@@ -316,7 +316,7 @@ export class Timeline {
 
   #grid({ from, to, x }: Scale, width: number, height: number) {
     const g = this.context;
-    const begun = ms(store.shown().started) ?? store.run.first() ?? from;
+    const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
     const widthOf = (s: number) => ((s * 1000) / (to - from)) * (width - this.names);
     const step = 1000 * (STEPS_S.find((s) => widthOf(s) > 74) ?? 86_400 * Math.ceil((to - from) / 86_400_000 / 8));
     g.fillStyle = this.#colours.of("muted");
@@ -329,7 +329,7 @@ export class Timeline {
       g.moveTo(px, 0);
       g.lineTo(px, height - FOOT);
       g.stroke();
-      const text = store.instantText(t, step < 1000 ? 1 : 0);
+      const text = store.clock.instantText(t, step < 1000 ? 1 : 0);
       if (px + 3 + g.measureText(text).width < width) g.fillText(text, px + 3, height - FOOT / 2);
     }
   }
@@ -342,7 +342,7 @@ export class Timeline {
     this.#clipped(0, y, this.names - 8, h, () => g.fillText(lane.name, indent, y + h / 2));
     const rows = lane.kind === "concurrence" ? lane.children.length : 1;
     const spans = this.spansOf.get(lane.path) ?? [];
-    const now = store.nowMs();
+    const now = store.playback.nowMs();
     let lastPx = -10;
     const failures: (() => void)[] = []; // drawn last, over all others
     for (let i = firstAfter(spans, from); i < spans.length; i++) {
@@ -350,7 +350,7 @@ export class Timeline {
       if (span.from > to) break;
       const later = span.from > now; // after the instant shown
       const ended = span.to !== null && (later || span.to <= now);
-      const until = span.to ?? Math.max(now, store.run.last() ?? now);
+      const until = span.to ?? Math.max(now, store.data.run.last() ?? now);
       const node = this.model?.get(span.path);
       if (until < from || !node) continue;
       const left = Math.max(this.names, x(span.from));
@@ -381,8 +381,8 @@ export class Timeline {
   /** Draw the times in which the lane's states were paused before they began, or asked. */
   #waits(lane: StateNode, y: number, h: number, rows: number, { from, to, x }: Scale, width: number) {
     const g = this.context;
-    const now = store.nowMs();
-    for (const wait of store.run.waits) {
+    const now = store.playback.nowMs();
+    for (const wait of store.data.run.waits) {
       const until = Math.min(wait.to ?? now, now);
       if (until < from || wait.from > Math.min(to, now)) continue;
       const node = this.model?.get(wait.path);
@@ -480,21 +480,21 @@ export class Timeline {
       g.restore();
     }
     g.stroke();
-    if (store.selected.value === span.path) {
+    if (store.view.selected.value === span.path) {
       g.strokeStyle = this.#colours.of("ink"); // as in the diagram, and different from a running state
       g.lineWidth = 2;
       g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
     }
-    const driver = store.scene.colourOf(span.path);
+    const driver = store.data.scene.colourOf(span.path);
     if (driver >= 0) {
       g.fillStyle = this.#colours.of(`s${1 + (driver % COLOURS)}`); // of its track on the map
       g.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
     }
-    const lit = store.hovered.value;
+    const lit = store.pointer.hovered.value;
     if (lit?.path === span.path && lit.from === span.from) this.#halo({ left, right, top, bottom });
     this.#mark(span.serviced, "preempted", x, now, { right, top, tall });
     this.#mark(span.abandoned, "failure", x, now, { right, top, tall });
-    const words = wordsOf(node.name, span, now === Infinity ? (span.to ?? store.nowMs()) : now);
+    const words = wordsOf(node.name, span, now === Infinity ? (span.to ?? store.playback.nowMs()) : now);
     this.#text(words, `${kind}-text`, left, top, wide, tall);
   }
 
@@ -534,13 +534,13 @@ export class Timeline {
   }
 
   #hover(px: number | null) {
-    store.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
+    store.pointer.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
   }
 
   /** Draw the instants at the pointer and shown. */
   #cursor(x: (t: number) => number, height: number) {
-    const at = store.cursor.value;
-    const pointed = store.pointed.value;
+    const at = store.playback.cursor.value;
+    const pointed = store.pointer.pointed.value;
     if (pointed !== null && x(pointed) >= this.names) this.#flag(x(pointed), pointed, height, "muted", 1);
     if (at === null) return;
     const last = this.canvas.clientWidth - RIGHT;
@@ -551,7 +551,7 @@ export class Timeline {
   /** Draw a line through the lanes, with its instant at the axis. */
   #flag(px: number, t: number, height: number, colour: string, wide: number) {
     const g = this.context;
-    const text = store.instantText(t);
+    const text = store.clock.instantText(t);
     g.font = "600 11px 'JetBrains Mono', ui-monospace, monospace";
     const half = g.measureText(text).width / 2 + 5;
     const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
@@ -583,10 +583,11 @@ export class Timeline {
     let dragged = false;
     const [, stop] = this.#range();
     this.end ??= stop;
-    const seek = (m: PointerEvent) => store.seek(Math.min(this.#timeAt(m.clientX - left), store.run.last() ?? stop));
+    const seek = (m: PointerEvent) =>
+      store.playback.seek(Math.min(this.#timeAt(m.clientX - left), store.data.run.last() ?? stop));
     const move = (m: PointerEvent) => {
       if (Math.abs(m.clientX - left - from) > 3) dragged = true;
-      if (dragged && selects) store.selectStretch(begin, this.#timeAt(m.clientX - left));
+      if (dragged && selects) store.playback.selectStretch(begin, this.#timeAt(m.clientX - left));
       else if (dragged || (!span && !selects)) seek(m);
     };
     drag(move, (m) => {
@@ -611,17 +612,17 @@ export class Timeline {
     }
     const at = this.#timeAt(e.offsetX);
     const length = Math.max(SHORTEST_MS, Math.min(this.length * Math.exp(e.deltaY * 0.0016), LONGEST_MS));
-    if (this.end !== null || store.cursor.value !== null) this.end = at + ((to - at) * length) / this.length;
+    if (this.end !== null || store.playback.cursor.value !== null) this.end = at + ((to - at) * length) / this.length;
     this.length = length;
   }
 
   #key(e: KeyboardEvent) {
     const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20 }[e.key];
     if (step !== undefined) {
-      store.seekEvent(step);
+      store.playback.seekEvent(step);
       e.stopPropagation();
     } else if (e.key === "End") this.live();
-    else if (e.key === "Home") store.seek(store.run.first());
+    else if (e.key === "Home") store.playback.seek(store.data.run.first());
     else return;
     e.preventDefault();
   }

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { askFirst } from "#core/commands.ts";
 import { ask, askAction, encoded, hasToken, isFailure, isFile } from "#core/connection.ts";
 import { outcomeClass } from "#core/outcomes.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { ActionServer, SentGoal, ServerGoal } from "#core/types.ts";
 import type { Answers } from "#core/wire.ts";
@@ -20,8 +20,8 @@ const CANCELLING: Record<string, string> = {
 const GOALS_MS = 2000; // time between two lists of the goals of others
 export function ActionsButton({ id }: { id?: string }) {
   if (isFile()) return null;
-  const open = store.pageShown.value === "actions";
-  const running = (store.actions.value?.goals ?? []).filter((goal) => goal.ended == null).length;
+  const open = store.view.pageShown.value === "actions";
+  const running = (store.data.actions.value?.goals ?? []).filter((goal) => goal.ended == null).length;
   return (
     <button
       id={id}
@@ -35,11 +35,11 @@ export function ActionsButton({ id }: { id?: string }) {
   );
 }
 
-export const ActionsPage = () => (store.pageShown.value === "actions" ? <OpenPage /> : null);
+export const ActionsPage = () => (store.view.pageShown.value === "actions" ? <OpenPage /> : null);
 
 function OpenPage() {
-  const actions = store.actions.value?.actions ?? [];
-  const chosen = store.chosenAction.value ?? actions[0]?.name ?? null;
+  const actions = store.data.actions.value?.actions ?? [];
+  const chosen = store.view.chosenAction.value ?? actions[0]?.name ?? null;
   const heading = useRef<HTMLHeadingElement | null>(null);
   useEffect(() => heading.current?.focus(), []);
   // The chosen action stays in the list while its server is away.
@@ -76,7 +76,7 @@ function Choice({ one, on }: { one: Partial<ActionServer>; on: boolean }) {
   const more = (one.servers ?? 1) - 1;
   const rivals = more > 0 ? ` and ${more} more: several servers have this name` : "";
   const onClick = () => {
-    store.chosenAction.value = one.name ?? null;
+    store.view.chosenAction.value = one.name ?? null;
   };
   return (
     <button class={`action ${on ? "on" : ""}`} aria-current={on} onClick={onClick}>
@@ -96,7 +96,7 @@ function Choice({ one, on }: { one: Partial<ActionServer>; on: boolean }) {
 function ServerGoals({ name }: { name: string }) {
   const [goals, setGoals] = useState<ServerGoal[]>([]);
   const [problem, setProblem] = useState("");
-  const own = new Set(store.actions.value?.goals.map((goal) => goal.id));
+  const own = new Set(store.data.actions.value?.goals.map((goal) => goal.id));
   useEffect(() => {
     let open = true;
     const read = async () => {
@@ -121,10 +121,10 @@ function ServerGoals({ name }: { name: string }) {
         goal.mission ? "Its mission goes on with the transition for a cancelled goal." : "",
         goal.gone ? "Its program is gone: nobody else can cancel it." : "Its program is told, and may send another.",
       ],
-      situation: () => JSON.stringify([store.pageShown.value, store.connection.value]),
+      situation: () => JSON.stringify([store.view.pageShown.value, store.data.connection.value]),
       give: async () => {
         const answer = await askAction({ command: "cancel", name, goal: goal.id });
-        store.notify(
+        store.view.notify(
           answer.ok ? `goal ${goal.id}: asked to cancel` : (answer.text ?? "refused"),
           answer.ok ? "info" : "error",
         );
@@ -168,8 +168,8 @@ const senderText = (goal: ServerGoal) =>
   shorten(goal.mission || (goal.sender ? `node /${goal.sender}` : "an unknown client"), 80);
 
 function SentGoals() {
-  const goals = store.actions.value?.goals ?? [];
-  store.tick.value;
+  const goals = store.data.actions.value?.goals ?? [];
+  store.playback.tick.value;
   return (
     <section aria-label="goals sent from here">
       <h2>
@@ -202,7 +202,7 @@ function Goal({ goal }: { goal: SentGoal }) {
   const distance = goal.distance != null && !ended ? `${goal.distance.toFixed(2)} m left` : "";
   const cancel = async () => {
     const answer = await askAction({ command: "cancel", goal: goal.id });
-    if (!answer.ok) store.notify(answer.text ?? "refused", "error");
+    if (!answer.ok) store.view.notify(answer.text ?? "refused", "error");
   };
   return (
     <article class={`goal sent ${kind}`} aria-label={`goal to /${goal.action}, ${text}`}>

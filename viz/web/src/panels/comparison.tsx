@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import { ask, encoded, isFailure, isFile, link } from "#core/connection.ts";
 import { CHANGE_SIGNS } from "#core/model.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Comparison, MachinePayload } from "#core/types.ts";
 import type { Answers } from "#core/wire.ts";
@@ -15,38 +15,38 @@ const MOST = 60; // differences that are listed at first
 /** Compare the machine shown with another one; "" ends the comparison. */
 async function compare(page: Page, name: string) {
   if (!name) {
-    if (!store.comparison.value) return;
-    const { alone } = store.comparison.value;
-    store.comparison.value = null;
+    if (!store.data.comparison.value) return;
+    const { alone } = store.data.comparison.value;
+    store.data.comparison.value = null;
     show(page, alone);
     return;
   }
-  const asked = store.facts.value?.name;
+  const asked = store.data.facts.value?.name;
   const found = await ask<Answers["GET /api/compare"]>(link("compare", `&with=${encoded(name)}`));
-  const model = store.model.value;
-  if (!model || asked !== store.facts.value?.name) return; // another machine was chosen meanwhile
+  const model = store.data.model.value;
+  if (!model || asked !== store.data.facts.value?.name) return; // another machine was chosen meanwhile
   if (isFailure(found)) {
-    store.notify(found.text, "error");
+    store.view.notify(found.text, "error");
     return;
   }
-  const alone = store.comparison.value?.alone ?? model.payload;
+  const alone = store.data.comparison.value?.alone ?? model.payload;
   const compared = { ...found, model: found.model as unknown as MachinePayload };
-  store.comparison.value = { ...compared, alone };
+  store.data.comparison.value = { ...compared, alone };
   show(page, compared.model);
 }
 
 function show(page: Page, payload: MachinePayload) {
-  const opened = store.opened.value;
-  store.setModel(payload);
-  store.keepOpened(new Set([...opened].filter((path) => store.model.value?.get(path)?.children.length)));
+  const opened = store.view.opened.value;
+  store.view.setModel(payload);
+  store.view.keepOpened(new Set([...opened].filter((path) => store.data.model.value?.get(path)?.children.length)));
   page.select(null);
   page.layout?.forget();
   page.relayout({ frame: true });
 }
 
 export function CompareLine({ page, onDone }: { page: Page; onDone: () => void }) {
-  const others = store.machines.value.filter((machine) => machine.name !== store.facts.value?.name);
-  if (isFile() || !store.model.value) return null;
+  const others = store.data.machines.value.filter((machine) => machine.name !== store.data.facts.value?.name);
+  if (isFile() || !store.data.model.value) return null;
   const title = others.length ? "" : "no other machine or recording here; try: smachpy view old.jsonl new.jsonl";
   const choose = (e: Event) => {
     compare(page, fieldValue(e));
@@ -57,7 +57,7 @@ export function CompareLine({ page, onDone }: { page: Page; onDone: () => void }
       <span>Compare with</span>
       <select
         id="compare"
-        value={store.comparison.value?.with ?? ""}
+        value={store.data.comparison.value?.with ?? ""}
         disabled={!others.length}
         title={title}
         onChange={choose}
@@ -72,7 +72,7 @@ export function CompareLine({ page, onDone }: { page: Page; onDone: () => void }
 }
 
 export function CompareChip({ page }: { page: Page }) {
-  const found = store.comparison.value;
+  const found = store.data.comparison.value;
   if (!found) return null;
   return (
     <button class="chip compare-chip" title="show it alone again" onClick={() => compare(page, "")}>
@@ -82,7 +82,7 @@ export function CompareChip({ page }: { page: Page }) {
 }
 
 export function Differences({ page }: { page: Page }) {
-  const found = store.comparison.value;
+  const found = store.data.comparison.value;
   const [all, setAll] = useState(false);
   if (!found) return null;
   const shown = all ? found.listed : found.listed.slice(0, MOST);

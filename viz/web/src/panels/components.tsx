@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import { nameOf } from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Page } from "#drawing/page.ts";
 
@@ -26,7 +26,7 @@ export const Section = ({
 /** The name of a state as a link to it. */
 export const StateLink = ({ path, page, tabindex }: { path: string; page: Page; tabindex?: number }) => (
   <button class="link" tabindex={tabindex} title={shorten(path, 400)} onClick={() => page.goTo(path)}>
-    {nameOf(path)}
+    {store.data.nameOf(path)}
   </button>
 );
 

@@ -16,7 +16,7 @@ import {
   targetText,
 } from "#core/commands.ts";
 import { isPartOfNet } from "#core/model.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { StateNode, StateRun } from "#core/types.ts";
 import { fieldValue } from "#panels/components.tsx";
@@ -44,10 +44,10 @@ function Command({
   "aria-label"?: string;
   "aria-pressed"?: boolean;
 }) {
-  const reason = store.whyDisarmed.value ?? why;
+  const reason = store.status.whyDisarmed.value ?? why;
   const mine = sent.value?.key === does ? sent.value : null;
   const state = mine && (mine.failure === null ? "sent" : "failed");
-  const refuse = () => store.notify(reason ?? "", "error");
+  const refuse = () => store.view.notify(reason ?? "", "error");
   return (
     <button
       {...more}
@@ -64,11 +64,11 @@ function Command({
 
 /** The commands to the machine on view, always at the same place. */
 export function OperatorBar() {
-  store.tick.value;
+  store.playback.tick.value;
   const facts = control();
-  if (!facts || store.pageShown.value !== "machine") return null;
+  if (!facts || store.view.pageShown.value !== "machine") return null;
   const { paused } = facts;
-  if (store.run.now.ended != null && !paused) return null;
+  if (store.data.run.now.ended != null && !paused) return null;
   const target = targetText();
   return (
     <div class="operator" role="toolbar" aria-label={`commands to ${target}`}>
@@ -101,7 +101,7 @@ export function OperatorBar() {
       <Command
         id="preempt"
         class="warn"
-        does={keyOf("preempt", store.model.value?.root.path)}
+        does={keyOf("preempt", store.data.model.value?.root.path)}
         title={`Preempt ${target}`}
         onClick={() => askForPreempt(target)}
       >
@@ -112,8 +112,8 @@ export function OperatorBar() {
 }
 
 function askForPause(target: string) {
-  const path = store.model.value?.root.path ?? "";
-  const machine = store.facts.value?.name;
+  const path = store.data.model.value?.root.path ?? "";
+  const machine = store.data.facts.value?.name;
   askFirst({
     title: `Pause ${target} now?`,
     yes: "Pause now",
@@ -124,8 +124,8 @@ function askForPause(target: string) {
 }
 
 function askForPreempt(target: string) {
-  const path = store.model.value?.root.path ?? "";
-  const machine = store.facts.value?.name;
+  const path = store.data.model.value?.root.path ?? "";
+  const machine = store.data.facts.value?.name;
   askFirst({
     title: `Preempt ${target}?`,
     yes: "Preempt",
@@ -137,7 +137,7 @@ function askForPreempt(target: string) {
 
 /** The question before a command that cannot be undone. It is withdrawn when what it is about changes. */
 export function ConfirmationSheet() {
-  store.tick.value;
+  store.playback.tick.value;
   const box = useRef<HTMLElement | null>(null);
   const before = useRef<Element | null>(null);
   const given = confirmation.value;
@@ -209,7 +209,7 @@ export function StateControls({ node, state }: { node: StateNode; state: StateRu
   const breakpoints = control()?.breakpoints;
   if (!breakpoints) return null;
   const { path, parent } = node;
-  const [machine, target] = [store.facts.value?.name, targetText()];
+  const [machine, target] = [store.data.facts.value?.name, targetText()];
   const ask: (name: string, title: string, yes: string, within: string, end: string, more?: object) => void = (
     name,
     title,
@@ -301,6 +301,6 @@ export function StateControls({ node, state }: { node: StateNode; state: StateRu
 
 /** Where the mission goes on after an outcome. */
 function goesTo(node: StateNode, outcome: string) {
-  const target = store.model.value?.linkOf(node, outcome)?.target;
+  const target = store.data.model.value?.linkOf(node, outcome)?.target;
   return target ? `The mission goes on with ${shorten(target)}.` : "Its container decides how the mission goes on.";
 }

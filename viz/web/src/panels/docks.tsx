@@ -6,7 +6,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import type { DockName, PanelName } from "#core/arrangement.ts";
 import { DOCKS, dropAt, moved, placeOf, resized, widened } from "#core/arrangement.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { drag } from "#drawing/viewport.ts";
 import { fieldValue } from "#panels/components.tsx";
 
@@ -30,8 +30,8 @@ const dropped: Signal<{ dock: DockName; index: number } | null> = signal(null);
 
 /** @param props what draws each panel */
 export function Dock({ name, panels }: { name: DockName; panels: Record<PanelName, () => ComponentChildren> }) {
-  const all = store.arrangementShown.value;
-  const docked = all[name].filter((one) => store.panelsThere.value.has(one.name));
+  const all = store.panels.arrangementShown.value;
+  const docked = all[name].filter((one) => store.panels.panelsThere.value.has(one.name));
   const at = dropped.value?.dock === name ? dropped.value.index : null;
   const width = name === "bottom" ? {} : { "--width": `${all.widths[name]}px` };
   const isEmpty = !docked.length && at === null;
@@ -61,7 +61,7 @@ export function Dock({ name, panels }: { name: DockName; panels: Record<PanelNam
 /** The handle that moves a panel, by dragging or arrow keys. */
 function Grip({ name }: { name: PanelName }) {
   const put = (dock: DockName | null, index: number = Infinity) =>
-    store.arrange(moved(store.arrangementShown.value, name, dock, index));
+    store.panels.arrange(moved(store.panels.arrangementShown.value, name, dock, index));
   const onPointerDown = (e: PointerEvent) => {
     if (e.button !== 0) return;
     e.preventDefault();
@@ -74,12 +74,12 @@ function Grip({ name }: { name: PanelName }) {
       dropped.value = null;
       if (!place || m.type === "pointercancel") return;
       const behind = docked(place.dock)[place.index];
-      const index = behind ? placeOf(store.arrangementShown.value, behind)?.index : undefined;
+      const index = behind ? placeOf(store.panels.arrangementShown.value, behind)?.index : undefined;
       put(place.dock, index);
     });
   };
   const onKeyDown = (e: KeyboardEvent) => {
-    const all = store.arrangementShown.value;
+    const all = store.panels.arrangementShown.value;
     const place = placeOf(all, name);
     if (e.key === "ArrowUp" && place) put(place.dock, Math.max(0, place.index - 1));
     else if (e.key === "ArrowDown" && place && place.index < all[place.dock].length - 1)
@@ -103,7 +103,9 @@ const gripOf = (name: PanelName): HTMLElement | null => document.querySelector(`
 
 /** Names of the visible panels in a dock. */
 const docked = (name: DockName) =>
-  store.arrangementShown.value[name].map((one) => one.name).filter((one) => store.panelsThere.value.has(one));
+  store.panels.arrangementShown.value[name]
+    .map((one) => one.name)
+    .filter((one) => store.panels.panelsThere.value.has(one));
 
 function boxesOfDocks() {
   const boxOf = (element: Element) => {
@@ -170,8 +172,8 @@ const WidthHandle = ({ dock }: { dock: "left" | "right" }) => (
     label={`width of the ${dock} side`}
     vertical={true}
     sign={dock === "left" ? 1 : -1}
-    size={() => store.arrangementShown.value.widths[dock]}
-    resize={(width: number) => store.arrange(widened(store.arrangementShown.value, dock, width))}
+    size={() => store.panels.arrangementShown.value.widths[dock]}
+    resize={(width: number) => store.panels.arrange(widened(store.panels.arrangementShown.value, dock, width))}
   />
 );
 
@@ -181,16 +183,16 @@ const HeightHandle = ({ dock, name }: { dock: DockName; name: PanelName }) => (
     vertical={false}
     sign={dock === "bottom" ? -1 : 1}
     size={() => document.querySelector(`[data-panel=${name}]`)?.clientHeight ?? 0}
-    resize={(size: number) => store.arrange(resized(store.arrangementShown.value, name, size))}
+    resize={(size: number) => store.panels.arrange(resized(store.panels.arrangementShown.value, name, size))}
   />
 );
 
 /** The choice of a dock for each panel. */
 export function PanelLines() {
-  const all = store.arrangementShown.value;
+  const all = store.panels.arrangementShown.value;
   const choose = (name: PanelName) => (e: Event) => {
     const dock = DOCKS.find((one) => one === fieldValue(e)) ?? null;
-    store.arrange(moved(all, name, dock));
+    store.panels.arrange(moved(all, name, dock));
   };
   const select = ([name, title]: [string, string]) => {
     const panel = name as PanelName;
@@ -211,7 +213,7 @@ export function PanelLines() {
       {Object.entries(TITLES).map(select)}
       <div class="line">
         <span>As they were</span>
-        <button onClick={() => store.arrange(null)}>reset</button>
+        <button onClick={() => store.panels.arrange(null)}>reset</button>
       </div>
     </details>
   );
@@ -220,9 +222,9 @@ export function PanelLines() {
 /** The choice of the part that is shown on a phone. */
 export function Parts() {
   const part = ([name, title, path]: [string, string, string]) => {
-    const isShown = store.part.value === name;
+    const isShown = store.view.part.value === name;
     const onClick = () => {
-      store.part.value = name;
+      store.view.part.value = name;
     };
     return (
       <button class={isShown ? "on" : ""} aria-current={isShown ? "page" : undefined} onClick={onClick}>
@@ -235,7 +237,7 @@ export function Parts() {
   };
   return (
     <nav class="parts" aria-label="parts of the page">
-      {PARTS.filter(([name]) => name !== "map" || store.hasMap.value).map(part)}
+      {PARTS.filter(([name]) => name !== "map" || store.panels.hasMap.value).map(part)}
     </nav>
   );
 }

@@ -5,7 +5,7 @@ import { askFleet, openRun } from "#core/connection.ts";
 import { lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
 import { showPage } from "#core/pages.ts";
 import type { Scene } from "#core/scene.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { FleetRuns } from "#core/types.ts";
 import { MapView } from "#drawing/map.ts";
@@ -14,7 +14,7 @@ import { isDark } from "#drawing/theme.ts";
 const REFRESH_MS = 1000;
 const MOST_ROWS = 32; // as the viewer sends them
 
-export const FleetPage = () => (store.pageShown.value === "fleet" ? <OpenFleet /> : null);
+export const FleetPage = () => (store.view.pageShown.value === "fleet" ? <OpenFleet /> : null);
 
 function OpenFleet() {
   const [skip, setSkip] = useState(0);

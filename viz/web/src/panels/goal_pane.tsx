@@ -3,7 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { ask, askAction, encoded, hasToken, isFailure } from "#core/connection.ts";
 import { type FormState, problemsWithoutField, toState, toYaml } from "#core/goal_values.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { ActionServer, FieldProblem } from "#core/types.ts";
 import type { GoalForm as Definition, Failure } from "#core/wire.ts";
 import { fieldValue } from "#panels/components.tsx";
@@ -108,7 +108,7 @@ export function GoalForm({ name, server }: { name: string; server: ActionServer 
     if (!answer.ok) refuse(answer);
     else {
       setProblems([]);
-      store.notify(`goal sent to /${name}`);
+      store.view.notify(`goal sent to /${name}`);
     }
   };
   const onKeyDown = (e: KeyboardEvent) => {
@@ -223,7 +223,7 @@ function YamlText({
 
 /** Why this page may not send goals, or null. */
 export function refusal() {
-  if (!store.settings.value.control)
+  if (!store.data.settings.value.control)
     return (
       <>
         This viewer sends no commands. To send goals, start it with <code>smachpy view --control</code> and open the
@@ -236,5 +236,5 @@ export function refusal() {
         The address of this page has no token. To send goals, open the address that <code>smachpy</code> printed.
       </>
     );
-  return store.connection.value !== "live" ? "The viewer's server does not answer; nothing can be sent." : null;
+  return store.data.connection.value !== "live" ? "The viewer's server does not answer; nothing can be sent." : null;
 }

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { outcomeClass } from "#core/outcomes.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 import type { GoalRun, Progress, RunState } from "#core/types.ts";
 import { pretty } from "#core/values.ts";
@@ -74,7 +74,7 @@ function EndedGoal({ id, goal, page }: { id: string; goal: GoalRun; page: Page }
 }
 
 function Goal({ id, goal, now, page }: { id: string; goal: GoalRun; now: number; page: Page }) {
-  const waits = store.hasNoServer(goal);
+  const waits = store.status.hasNoServer(goal);
   const kind = waits ? "waiting" : "active";
   const part = goal.progress?.fraction ?? null;
   const took = duration((now - goal.since / 1e6) / 1000);
@@ -100,8 +100,8 @@ function Goal({ id, goal, now, page }: { id: string; goal: GoalRun; now: number;
 
 /** Attributes of a row that is highlighted with the visit that sent its goal. */
 const linked = (goal: GoalRun, kind: string) => ({
-  ...store.hoverHandlers(goal.path, goal.since / 1e6),
-  class: `${kind} ${store.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`,
+  ...store.pointer.hoverHandlers(goal.path, goal.since / 1e6),
+  class: `${kind} ${store.pointer.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`,
 });
 
 const progressText = (progress: Progress | undefined) => {

@@ -18,7 +18,7 @@ import {
   standing,
   tally,
 } from "#core/run_list.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { Mission, RunRow } from "#core/types.ts";
 import { fieldValue, More } from "#panels/components.tsx";
@@ -40,10 +40,10 @@ const REFRESH_MS = 5000; // changes in journals are found only by asking again
 /** The others have the names of their colours. */
 const KINDS: Record<string, string> = { live: "active", cut: "waiting", interrupted: "waiting", queued: "waiting" };
 
-export const HomePage = () => (store.pageShown.value === "runs" ? <OpenHome /> : null);
+export const HomePage = () => (store.view.pageShown.value === "runs" ? <OpenHome /> : null);
 
 const openSimulations = () => {
-  store.simulateOpen.value = true;
+  store.view.simulateOpen.value = true;
 };
 
 const lastWord = (path: string) => path.split("/").at(-1) || path;
@@ -54,19 +54,19 @@ function OpenHome() {
   const [filter, setFilter] = useState(ALL);
   const [most, setMost] = useState(MOST_ROWS);
   const heading = useRef<HTMLHeadingElement | null>(null);
-  const { machines } = store;
+  const { machines } = store.data;
   useEffect(() => heading.current?.focus(), []);
   useEffect(() => {
     refreshRuns();
   }, [machines.value]);
-  const { runs, folders, journals } = store.runs.value;
+  const { runs, folders, journals } = store.data.runs.value;
   useEffect(() => {
     if (!journals.length) return;
     const timer = setInterval(refreshRuns, REFRESH_MS);
     return () => clearInterval(timer);
   }, [journals.length > 0]);
-  store.slowTick.value;
-  const pins = store.pins.value;
+  store.playback.slowTick.value;
+  const pins = store.view.pins.value;
   const rows = chosen(runs, filter, pins);
   const change = (some: Partial<Filter>) => {
     setFilter({ ...filter, ...some });
@@ -92,7 +92,7 @@ function OpenHome() {
           ))}
           <span class="spread" />
           <span class="hint" role="status">
-            {store.runsKnown.value
+            {store.data.runsKnown.value
               ? `${rows.length.toLocaleString("en")} run${rows.length === 1 ? "" : "s"}${failedText}`
               : "reading the runs\u2026"}
           </span>
@@ -104,10 +104,10 @@ function OpenHome() {
           />
           {runs.filter((row) => row.live).length > 1 && <button onClick={() => showPage("fleet")}>Fleet</button>}
           <button onClick={openSimulations}>Simulate</button>
-          {store.model.value && <button onClick={() => showPage("machine")}>Close</button>}
+          {store.data.model.value && <button onClick={() => showPage("machine")}>Close</button>}
         </header>
-        {store.runsProblem.value && <p class="error">{store.runsProblem.value}</p>}
-        {!runs.length && store.runsKnown.value && <NoRuns />}
+        {store.data.runsProblem.value && <p class="error">{store.data.runsProblem.value}</p>}
+        {!runs.length && store.data.runsKnown.value && <NoRuns />}
         {runs.length > 0 && !rows.length && (
           <div class="empty-list">
             <p>No run is {filterText(filter)}.</p>
@@ -130,7 +130,7 @@ const JournalChip = ({ name, problem }: { name: string; problem: string }) => (
 
 function NoRuns() {
   const text = "smachpy run patrol --start-robot --view";
-  const copy = () => navigator.clipboard?.writeText(text).then(() => store.notify("copied"));
+  const copy = () => navigator.clipboard?.writeText(text).then(() => store.view.notify("copied"));
   return (
     <div class="empty-list">
       <p>No runs yet. Make one:</p>
@@ -241,7 +241,7 @@ function Row({ row, pinned, today }: { row: RunRow; pinned: boolean; today: Date
   };
   const pin = (e: Event) => {
     e.stopPropagation();
-    store.togglePin(pinOf(row));
+    store.view.togglePin(pinOf(row));
   };
   const outage = outageText(row);
   const classes = `${row.problem ? "bad" : ""}${opens ? "" : " closed"}`;
@@ -281,7 +281,7 @@ function askForMission(row: RunRow, mission: Mission, what: string) {
   const robots = row.robots.length ? ` on ${row.robots.join(", ")}` : "";
   const where = mission.active.length ? ` in ${mission.active.map(lastWord).join(", ")}` : "";
   const resumes = what === "resume";
-  const now = () => store.runs.value.runs.find((one) => one.mission?.id === mission.id)?.mission;
+  const now = () => store.data.runs.value.runs.find((one) => one.mission?.id === mission.id)?.mission;
   askFirst({
     title: `${resumes ? "Resume" : "Cancel"} ${row.machine}${robots}?`,
     yes: resumes ? "Resume" : "Cancel the mission",
@@ -291,7 +291,7 @@ function askForMission(row: RunRow, mission: Mission, what: string) {
         ? "A process on the viewer's computer goes on with it at once, and moves its robots."
         : "It is preempted, now or when it is resumed, and ends.",
     ],
-    situation: () => JSON.stringify([store.pageShown.value, now()?.status, now()?.can]),
+    situation: () => JSON.stringify([store.view.pageShown.value, now()?.status, now()?.can]),
     give: () => commandMission(mission, what),
   });
 }

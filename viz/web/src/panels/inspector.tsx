@@ -1,6 +1,6 @@
 // The panel beside the diagram: questions, the selected state, preempts, goals, userdata, numbers, problems, the log.
 
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { countOfEvents, shorten } from "#core/text.ts";
 import type { Problem } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -18,10 +18,10 @@ import { WhyPanel } from "#panels/why.tsx";
 const MOST_PROBLEMS = 30;
 
 export function Inspector({ page }: { page: Page }) {
-  store.slowTick.value; // read, so that this component is drawn again when the signal changes
-  const model = store.model.value;
+  store.playback.slowTick.value; // read, so that this component is drawn again when the signal changes
+  const model = store.data.model.value;
   if (!model) return <aside class="inspector" />;
-  const shared = { page, data: store.shown(), now: store.nowMs() };
+  const shared = { page, data: store.playback.shown(), now: store.playback.nowMs() };
   return (
     <aside class="inspector" aria-label="details">
       <MissingEvents dropped={shared.data.dropped ?? 0} />
@@ -41,7 +41,7 @@ export function Inspector({ page }: { page: Page }) {
 }
 
 function MissingEvents({ dropped }: { dropped: number }) {
-  const gap = store.gap.value;
+  const gap = store.data.gap.value;
   return (
     <>
       {gap !== null && (
@@ -59,7 +59,7 @@ function MissingEvents({ dropped }: { dropped: number }) {
 }
 
 function Problems({ page }: { page: Page }) {
-  const found = store.problems.value;
+  const found = store.data.problems.value;
   if (!found.length) return null;
   const text = (one: Problem) =>
     shorten(one.text.startsWith(`${one.path}: `) ? one.text.slice(one.path.length + 2) : one.text, 600);

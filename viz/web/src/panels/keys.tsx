@@ -4,7 +4,8 @@ import { command, confirmation, control } from "#core/commands.ts";
 import { isFile, showWhy } from "#core/connection.ts";
 import type { PageName } from "#core/pages.ts";
 import { showPage } from "#core/pages.ts";
-import * as store from "#core/store.ts";
+import { CLOCKS } from "#core/store/clock.ts";
+import { store } from "#core/store.ts";
 import type { Page } from "#drawing/page.ts";
 import { isDark } from "#drawing/theme.ts";
 
@@ -20,72 +21,72 @@ const ARROWS: Record<string, [number, number]> = {
 
 /** Go to a change of the chosen userdata key. */
 function jumpToChange(step: number) {
-  const key = store.followedKey.value ?? [...store.marks.keys].sort()[0];
-  if (key !== undefined) store.jump(`key ${key}`, step);
+  const key = store.playback.followedKey.value ?? [...store.data.marks.keys].sort()[0];
+  if (key !== undefined) store.playback.jump(`key ${key}`, step);
 }
 
 /** Show a page, or leave it for the machine; the list of runs stays while there is none. */
 export function togglePage(name: PageName) {
-  if (store.pageShown.value !== name) showPage(name);
-  else if (store.model.value || name !== "runs") showPage("machine");
+  if (store.view.pageShown.value !== name) showPage(name);
+  else if (store.data.model.value || name !== "runs") showPage("machine");
 }
 
 export function listenToKeys(page: Page) {
   const actions: Record<string, () => unknown> = {
     "/": () => document.getElementById("search")?.focus(),
     0: () => page.refit(),
-    f: () => store.jump("kind failure", 1),
-    F: () => store.jump("kind failure", -1),
-    p: () => store.jump("kind preempt", 1),
-    P: () => store.jump("kind preempt", -1),
-    g: () => store.jump("kind goal", 1),
-    G: () => store.jump("kind goal", -1),
+    f: () => store.playback.jump("kind failure", 1),
+    F: () => store.playback.jump("kind failure", -1),
+    p: () => store.playback.jump("kind preempt", 1),
+    P: () => store.playback.jump("kind preempt", -1),
+    g: () => store.playback.jump("kind goal", 1),
+    G: () => store.playback.jump("kind goal", -1),
     k: () => jumpToChange(1),
     K: () => jumpToChange(-1),
-    Home: () => store.seek(store.run.first()),
+    Home: () => store.playback.seek(store.data.run.first()),
     End: () => page.timeline.live(),
     m: () => {
-      store.part.value = "map";
+      store.view.part.value = "map";
       page.map.canvas.focus();
     },
-    r: () => store.toggleLoop(),
-    "[": () => store.moveStretch("from"),
-    "]": () => store.moveStretch("to"),
-    c: () => store.setClock(store.CLOCKS[(store.CLOCKS.indexOf(store.clock.value) + 1) % store.CLOCKS.length]),
+    r: () => store.playback.toggleLoop(),
+    "[": () => store.playback.moveStretch("from"),
+    "]": () => store.playback.moveStretch("to"),
+    c: () => store.clock.choose(CLOCKS[(CLOCKS.indexOf(store.clock.chosen.value) + 1) % CLOCKS.length]),
     w: () => showWhy(),
-    n: () => store.askForNote(),
+    n: () => store.notes.begin(),
     t: () => {
-      store.treeOpen.value = !store.treeOpen.value;
+      store.view.treeOpen.value = !store.view.treeOpen.value;
     },
-    o: () => page.setFollow(!store.follow.value),
+    o: () => page.setFollow(!store.view.follow.value),
     "+": () => page.view.zoom(1.25),
     "=": () => page.view.zoom(1.25),
     "-": () => page.view.zoom(0.8),
-    ",": () => store.seekEvent(-1),
-    ".": () => store.seekEvent(1),
+    ",": () => store.playback.seekEvent(-1),
+    ".": () => store.playback.seekEvent(1),
     l: () => page.timeline.live(),
-    i: () => page.setImplicit(!store.implicit.value),
+    i: () => page.setImplicit(!store.view.implicit.value),
     h: () => isFile() || togglePage("runs"),
     a: () => isFile() || togglePage("actions"),
     d: () => page.setTheme(isDark() ? "light" : "dark"),
     "?": () => {
-      store.help.value = !store.help.value;
+      store.view.help.value = !store.view.help.value;
     },
     Enter: () => page.toggleSelected(),
     Escape: () => {
       if (confirmation.value) confirmation.value = null;
-      else if (store.help.value) store.help.value = false;
-      else if (store.simulateOpen.value) store.simulateOpen.value = false;
-      else if (store.noteAt.value !== null) store.noteAt.value = null;
-      else if (store.tokenAsked.value) store.tokenAsked.value = false;
-      else if (store.pageShown.value !== "machine") togglePage(store.pageShown.value);
-      else if (store.treeOpen.value) store.treeOpen.value = false;
-      else if (store.stretch.value) store.selectStretch(0);
+      else if (store.view.help.value) store.view.help.value = false;
+      else if (store.view.simulateOpen.value) store.view.simulateOpen.value = false;
+      else if (store.notes.writtenAt.value !== null) store.notes.writtenAt.value = null;
+      else if (store.view.tokenAsked.value) store.view.tokenAsked.value = false;
+      else if (store.view.pageShown.value !== "machine") togglePage(store.view.pageShown.value);
+      else if (store.view.treeOpen.value) store.view.treeOpen.value = false;
+      else if (store.playback.stretch.value) store.playback.selectStretch(0);
       else page.select(null);
     },
     " ": () => {
       const paused = control()?.paused;
-      if (paused === undefined || store.cursor.value !== null) store.togglePlaying();
+      if (paused === undefined || store.playback.cursor.value !== null) store.playback.togglePlaying();
       else command(paused ? "resume" : "pause");
     },
     s: () => control() && command("step"),
@@ -99,22 +100,22 @@ export function listenToKeys(page: Page) {
   document.addEventListener("keydown", (e) => {
     const target = e.target as HTMLElement;
     if ((e.ctrlKey || e.metaKey) && e.key.toLowerCase() === "k" && !document.querySelector("dialog[open]")) {
-      store.paletteOpen.value = true;
+      store.view.paletteOpen.value = true;
       e.preventDefault();
       return;
     }
-    if (e.ctrlKey || e.metaKey || e.altKey || store.paletteOpen.value) return;
+    if (e.ctrlKey || e.metaKey || e.altKey || store.view.paletteOpen.value) return;
     if (["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName)) {
       if (e.key === "Escape") target.blur();
       return;
     }
     if ((e.key === "Enter" || e.key === " ") && target.closest(PRESSED)) return;
     if (document.querySelector("dialog[open]") && e.key !== "Escape" && e.key !== "?") return;
-    if (!store.shortcuts.value && e.key !== "Escape") return;
-    if (store.pageShown.value !== "machine" && !ON_OTHERS.includes(e.key)) return;
+    if (!store.view.shortcuts.value && e.key !== "Escape") return;
+    if (store.view.pageShown.value !== "machine" && !ON_OTHERS.includes(e.key)) return;
     if (e.key in ARROWS) {
       const [dx, dy] = ARROWS[e.key];
-      if (store.selected.value && !e.shiftKey) page.selectNeighbour(dx, dy);
+      if (store.view.selected.value && !e.shiftKey) page.selectNeighbour(dx, dy);
       else page.view.pan(-dx * STEP, -dy * STEP);
     } else if (/^[1-9]$/.test(e.key)) page.setDepth(Number(e.key));
     else if (Object.hasOwn(actions, e.key)) actions[e.key]();

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { KINDS_OF, lineOf } from "#core/log_lines.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { countOfEvents, shorten } from "#core/text.ts";
 import type { RunEvent } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -13,19 +13,19 @@ const LOOKED_AT = 6000; // events that are searched for these lines
 const LONGEST = 200; // characters
 
 export function Log({ page }: { page: Page }) {
-  store.slowTick.value;
+  store.playback.slowTick.value;
   const [text, setText] = useState("");
   const [pages, setPages] = useState(1);
-  const end = store.eventsShown();
+  const end = store.playback.eventsShown();
   const first = Math.max(0, end - pages * LOOKED_AT);
   const most = pages * LINES;
   const wanted = text.toLowerCase();
-  const kinds = KINDS_OF[store.logFilter.value];
+  const kinds = KINDS_OF[store.view.logFilter.value];
   const lines = [];
   let i = end - 1;
   for (; i >= first && lines.length < most; i--) {
-    const e = store.run.events[i];
-    const missing = i + 1 < end ? (store.run.events[i + 1].dropped ?? 0) : 0;
+    const e = store.data.run.events[i];
+    const missing = i + 1 < end ? (store.data.run.events[i + 1].dropped ?? 0) : 0;
     if (missing)
       lines.push(
         <li key={-e.seq} class="hint">
@@ -33,16 +33,21 @@ export function Log({ page }: { page: Page }) {
         </li>,
       );
     if (!kinds.has(e.kind)) continue;
-    const line = lineOf(e, store.model.value?.get(e.path));
+    const line = lineOf(e, store.data.model.value?.get(e.path));
     if (wanted && !`${e.path} ${line.text}`.toLowerCase().includes(wanted)) continue;
     const count = i + 1;
     const onClick = () => {
-      if (store.cursor.value !== null) store.seekTo(count);
+      if (store.playback.cursor.value !== null) store.playback.seekTo(count);
     };
     const t = e.stamp_ns / 1e6;
     lines.push(
-      <li key={e.seq} class={store.isLit(e.path, t) ? "lit" : ""} onClick={onClick} {...store.hoverHandlers(e.path, t)}>
-        <time>{store.instantText(t, 2)}</time>
+      <li
+        key={e.seq}
+        class={store.pointer.isLit(e.path, t) ? "lit" : ""}
+        onClick={onClick}
+        {...store.pointer.hoverHandlers(e.path, t)}
+      >
+        <time>{store.clock.instantText(t, 2)}</time>
         <StateLink path={e.path} page={page} tabindex={lines.length ? -1 : 0} />{" "}
         <span class={`word ${line.kind}`}>{shorten(line.text, LONGEST)}</span>
         {targetOf(e)}
@@ -54,7 +59,7 @@ export function Log({ page }: { page: Page }) {
   return (
     <Section title="Log">
       <div class="filter">
-        <select aria-label="kinds" value={store.logFilter.value} onChange={chooseKinds}>
+        <select aria-label="kinds" value={store.view.logFilter.value} onChange={chooseKinds}>
           {Object.keys(KINDS_OF).map((name) => (
             <option value={name}>{name}</option>
           ))}
@@ -90,13 +95,13 @@ function moveFocus(e: KeyboardEvent) {
 }
 
 const chooseKinds = (e: Event) => {
-  store.logFilter.value = fieldValue(e);
+  store.view.logFilter.value = fieldValue(e);
 };
 
 /** The target of a transition, unless its outcome has the same name. */
 function targetOf(e: RunEvent) {
   if (e.kind !== "Left") return "";
-  const node = store.model.value?.get(e.path);
-  const link = node && store.model.value?.linkOf(node, e.outcome);
+  const node = store.data.model.value?.get(e.path);
+  const link = node && store.data.model.value?.linkOf(node, e.outcome);
   return link && link.target !== e.outcome ? ` \u2192 ${shorten(link.target)}` : "";
 }

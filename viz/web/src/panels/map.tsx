@@ -1,7 +1,7 @@
 // The map beside the diagram, shown if the pose of any robot is known, with the facts of the visit at the pointer.
 
 import type { ComponentChildren } from "preact";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Page } from "#drawing/page.ts";
 
@@ -9,13 +9,13 @@ const NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the to
 const MOST_ROBOTS = 5; // robots with a button of their own
 
 export function MapPanel({ page, children }: { page: Page; children?: ComponentChildren }) {
-  store.tick.value;
+  store.playback.tick.value;
   const { map } = page;
-  const names = [...store.scene.robots]
+  const names = [...store.data.scene.robots]
     .filter(([, robot]) => robot.poses.length)
     .map(([name]) => name)
     .sort();
-  const noMap = !store.scene.maps.length;
+  const noMap = !store.data.scene.maps.length;
   return (
     <section class="map-panel" aria-label="map">
       <header>
@@ -55,15 +55,15 @@ export function MapPanel({ page, children }: { page: Page; children?: ComponentC
 
 /** The visit that the pointer is on: state, place, outcome and times. */
 function Tip() {
-  const visit = store.hovered.value;
+  const visit = store.pointer.hovered.value;
   if (!visit) return null;
-  const goal = store.scene.goalOf(visit.path, visit.from);
-  const span = store.run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
+  const goal = store.data.scene.goalOf(visit.path, visit.from);
+  const span = store.data.run.spans.findLast((one) => one.path === visit.path && one.from === visit.from);
   const to = span?.to ?? null;
-  const place = goal ? store.scene.placeName(goal) : "";
-  const times = [visit.from, to].map((t) => (t === null ? "now" : store.instantText(t))).join(" \u2013 ");
-  const took = ((to ?? store.nowMs()) - visit.from) / 1000;
-  const title = store.nameOf(visit.path) + (place && ` \u2192 ${shorten(place, 30)}`);
+  const place = goal ? store.data.scene.placeName(goal) : "";
+  const times = [visit.from, to].map((t) => (t === null ? "now" : store.clock.instantText(t))).join(" \u2013 ");
+  const took = ((to ?? store.playback.nowMs()) - visit.from) / 1000;
+  const title = store.data.nameOf(visit.path) + (place && ` \u2192 ${shorten(place, 30)}`);
   return (
     <div class="tip" role="status">
       <b>{title}</b>

@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import { choose, isFile, takeToken } from "#core/connection.ts";
 import { CHANGE_SIGNS } from "#core/model.ts";
 import { heatScale } from "#core/statistics.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { askerText, duration, holdText, shorten } from "#core/text.ts";
 import type { MachineSummary } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -48,40 +48,40 @@ const KEYS: [string, string][] = [
 ];
 
 export function Overlay({ page }: { page: Page }) {
-  const stale = store.facts.value?.stale;
-  if (store.failure.value)
+  const stale = store.data.facts.value?.stale;
+  if (store.data.failure.value)
     return (
       <div class="empty">
-        <p class="error">{store.failure.value}</p>
+        <p class="error">{store.data.failure.value}</p>
       </div>
     );
-  if (!store.model.value) return <Empty />;
-  if (store.runStatus.value.word === "stale" && stale != null)
+  if (!store.data.model.value) return <Empty />;
+  if (store.status.runStatus.value.word === "stale" && stale != null)
     return (
       <div class="banner waiting">
         Stale: no message from this machine since {new Date(stale / 1e6).toLocaleTimeString("en-GB")}. You see its last
         known state.
       </div>
     );
-  if (store.connection.value === "lost")
+  if (store.data.connection.value === "lost")
     return (
       <div class="banner waiting">
-        {store.problem.value || "The viewer's server does not answer."} You see the last known state; this page keeps
-        trying.
+        {store.data.problem.value || "The viewer's server does not answer."} You see the last known state; this page
+        keeps trying.
       </div>
     );
-  if (store.cursor.value !== null) {
-    const isOver = store.facts.value?.recorded || isFile();
-    const ago = ((store.run.last() ?? store.cursor.value) - store.cursor.value) / 1000;
+  if (store.playback.cursor.value !== null) {
+    const isOver = store.data.facts.value?.recorded || isFile();
+    const ago = ((store.data.run.last() ?? store.playback.cursor.value) - store.playback.cursor.value) / 1000;
     const when = isOver ? "before the end" : "ago";
     return (
       <div class="banner past">
-        Viewing <b>{store.instantText(store.cursor.value)}</b>, {duration(ago)} {when}
+        Viewing <b>{store.clock.instantText(store.playback.cursor.value)}</b>, {duration(ago)} {when}
         <button onClick={() => page.timeline.live()}>Back to {isOver ? "the end" : "live"}</button>
       </div>
     );
   }
-  const after = store.facts.value?.after;
+  const after = store.data.facts.value?.after;
   if (after)
     return (
       <div class="banner other">
@@ -94,7 +94,7 @@ export function Overlay({ page }: { page: Page }) {
 /** A notice that the program was started again, with a link to its previous run. */
 function RestartBanner({ before }: { before: string }) {
   const dismiss = () => {
-    store.dismissed.value = before;
+    store.view.dismissed.value = before;
   };
   return (
     <div class="banner other restarted" role="status">
@@ -108,12 +108,12 @@ function RestartBanner({ before }: { before: string }) {
 
 /** The banner of a running preempt: its origin, and the states for which it waits. */
 function PreemptBanner({ page }: { page: Page }) {
-  store.tick.value;
-  const now = store.nowMs();
-  const found = store.run.now.ended == null ? store.run.preemptAt(now) : null;
-  const before = store.facts.value?.before;
+  store.playback.tick.value;
+  const now = store.playback.nowMs();
+  const found = store.data.run.now.ended == null ? store.data.run.preemptAt(now) : null;
+  const before = store.data.facts.value?.before;
   if (!found || found.to !== null)
-    return before && store.dismissed.value !== before ? <RestartBanner before={before} /> : null;
+    return before && store.view.dismissed.value !== before ? <RestartBanner before={before} /> : null;
   const by = askerText(found.rows[0].asked);
   const more = found.holds.length - MOST_HOLDS;
   return (
@@ -143,15 +143,15 @@ function PreemptBanner({ page }: { page: Page }) {
 }
 
 function Empty() {
-  const name = store.wanted.value;
-  const list = store.machines.value;
-  if (store.connection.value === "lost")
+  const name = store.data.wanted.value;
+  const list = store.data.machines.value;
+  if (store.data.connection.value === "lost")
     return (
       <div class="empty">
-        <p>{store.problem.value || "The viewer's server does not answer."} This page keeps trying.</p>
+        <p>{store.data.problem.value || "The viewer's server does not answer."} This page keeps trying.</p>
       </div>
     );
-  if (!store.isMissing.value) return null; // the machine is being loaded
+  if (!store.data.isMissing.value) return null; // the machine is being loaded
   const text = name ? `No machine is called \u201c${shorten(name, 80)}\u201d.` : "No machine on the network yet.";
   const others = list.slice(0, MOST_NAMES);
   const more = list.length - others.length;
@@ -176,7 +176,7 @@ function Empty() {
 
 /** The progress of a long layout. */
 export function Laying() {
-  const laid = store.laidOut.value;
+  const laid = store.view.laidOut.value;
   if (!laid) return null;
   const { done, all } = laid;
   const text = `${done.toLocaleString("en")} of ${all.toLocaleString("en")} states`;
@@ -189,7 +189,7 @@ export function Laying() {
 }
 
 export function Legend() {
-  if (store.comparison.value) {
+  if (store.data.comparison.value) {
     const changes = ["added", "removed", "changed"] as const;
     return (
       <div class="legend" aria-hidden="true">
@@ -202,8 +202,8 @@ export function Legend() {
       </div>
     );
   }
-  store.slowTick.value;
-  const scale = heatScale(store.numbers.value, store.shown().states, store.model.value);
+  store.playback.slowTick.value;
+  const scale = heatScale(store.view.numbers.value, store.playback.shown().states, store.data.model.value);
   return (
     <div class="legend" aria-hidden="true">
       {scale && (
@@ -219,13 +219,13 @@ export function Legend() {
           {text}
         </span>
       ))}
-      {store.overview.value && <span class="hint">double-click opens one</span>}
+      {store.view.overview.value && <span class="hint">double-click opens one</span>}
     </div>
   );
 }
 
 export function Notice() {
-  const notice = store.notice.value;
+  const notice = store.view.notice.value;
   return (
     <div class="notices" aria-live="assertive">
       {notice && <div class={`notice ${notice.kind}`}>{notice.text}</div>}
@@ -234,9 +234,9 @@ export function Notice() {
 }
 
 export function Help() {
-  if (!store.help.value) return null;
+  if (!store.view.help.value) return null;
   const close = () => {
-    store.help.value = false;
+    store.view.help.value = false;
   };
   return (
     <Dialog label="keys" class="keys" onClose={close}>
@@ -262,9 +262,9 @@ export function Help() {
 export function TokenDialog() {
   const [text, setText] = useState("");
   const [wrong, setWrong] = useState(false);
-  if (!store.tokenAsked.value) return null;
+  if (!store.view.tokenAsked.value) return null;
   const close = () => {
-    store.tokenAsked.value = false;
+    store.view.tokenAsked.value = false;
   };
   const onSubmit = (e: Event) => {
     e.preventDefault();

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { isFile } from "#core/connection.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { saveFilm } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";
 import { Dialog, fieldValue, Section } from "#panels/components.tsx";
@@ -12,14 +12,14 @@ export function ShareButtons({ page }: { page: Page }) {
     const address = page.address();
     try {
       await navigator.clipboard.writeText(address);
-      store.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
+      store.view.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
     } catch {
-      store.notify("This browser lets no page copy here: the address bar shows the link", "error");
+      store.view.notify("This browser lets no page copy here: the address bar shows the link", "error");
     }
   };
-  const done = store.filmed.value;
+  const done = store.playback.filmed.value;
   const stop = () => {
-    store.filmed.value = null;
+    store.playback.filmed.value = null;
   };
   return (
     <span class="share">
@@ -35,7 +35,7 @@ export function ShareButtons({ page }: { page: Page }) {
           GIF {done} % ✕
         </button>
       )}
-      <button title="note at the instant shown (n)" onClick={() => store.askForNote()}>
+      <button title="note at the instant shown (n)" onClick={() => store.notes.begin()}>
         Note
       </button>
       <button title="copy the address of this view: instant, selection, open containers, notes" onClick={copy}>
@@ -47,21 +47,21 @@ export function ShareButtons({ page }: { page: Page }) {
 
 export function NoteDialog() {
   const [text, setText] = useState("");
-  const at = store.noteAt.value;
+  const at = store.notes.writtenAt.value;
   if (at === null) return null;
   const close = () => {
-    store.noteAt.value = null;
+    store.notes.writtenAt.value = null;
     setText("");
   };
   const onSubmit = (e: Event) => {
     e.preventDefault();
-    store.addNotes([{ at, text }]);
+    store.notes.add([{ at, text }]);
     close();
   };
   return (
     <Dialog label="note" class="note-form" onClose={close}>
       <form onSubmit={onSubmit}>
-        <h2>Note at {store.instantText(at)}</h2>
+        <h2>Note at {store.clock.instantText(at)}</h2>
         <input
           aria-label="note"
           maxlength={300}
@@ -85,18 +85,18 @@ export function NoteDialog() {
 
 /** The notes of the run; a click on one goes to its instant. */
 export function Notes() {
-  const notes = store.notes.value;
+  const notes = store.notes.all.value;
   if (!notes.length) return null;
   return (
     <Section title="Notes" count={notes.length}>
       <ul class="notes">
         {notes.map((note) => (
           <li key={`${note.at} ${note.text}`}>
-            <button class="link" onClick={() => store.seek(note.at)}>
-              <time>{store.instantText(note.at)}</time>
+            <button class="link" onClick={() => store.playback.seek(note.at)}>
+              <time>{store.clock.instantText(note.at)}</time>
             </button>
             <span>{note.text}</span>
-            <button class="small" aria-label={`remove the note ${note.text}`} onClick={() => store.removeNote(note)}>
+            <button class="small" aria-label={`remove the note ${note.text}`} onClick={() => store.notes.remove(note)}>
               ✕
             </button>
           </li>

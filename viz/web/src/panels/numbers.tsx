@@ -1,15 +1,15 @@
 // The totals of the numbers in the diagram.
 import { outcomeClass } from "#core/outcomes.ts";
 import { coverage } from "#core/statistics.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 import { Pill, Section } from "#panels/components.tsx";
 
 export function Numbers() {
-  store.slowTick.value;
-  if (store.numbers.value === "none") return null;
-  const { taken, all } = coverage(store.model.value, store.shown().states);
-  const recorded = store.statistics.value;
+  store.playback.slowTick.value;
+  if (store.view.numbers.value === "none") return null;
+  const { taken, all } = coverage(store.data.model.value, store.playback.shown().states);
+  const recorded = store.data.statistics.value;
   return (
     <Section title="Numbers">
       <dl class="facts">

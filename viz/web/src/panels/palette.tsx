@@ -7,7 +7,7 @@ import { KIND_NAMES } from "#core/model.ts";
 import { showPage } from "#core/pages.ts";
 import { asked, type Item, ranked, SIGNS } from "#core/palette.ts";
 import { parseInstant } from "#core/playback.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import { brief } from "#core/values.ts";
 import type { Page } from "#drawing/page.ts";
@@ -23,10 +23,10 @@ function itemsNow(page: Page, text: string): Item[] {
 
 function instants(text: string): Item[] {
   const seconds = parseInstant(asked(text).words);
-  const began = store.began();
+  const began = store.playback.began();
   if (seconds === null || began === null) return [];
   const at = began + 1000 * seconds;
-  return [{ kind: "instant", name: store.runText(at), more: "go there", pick: () => store.seek(at) }];
+  return [{ kind: "instant", name: store.clock.runText(at), more: "go there", pick: () => store.playback.seek(at) }];
 }
 
 function commands(page: Page): Item[] {
@@ -43,33 +43,38 @@ function commands(page: Page): Item[] {
   found.push(
     item(isDark() ? "Light colours" : "Dark colours", "d", () => page.setTheme(isDark() ? "light" : "dark")),
     item("All keys", "?", () => {
-      store.help.value = true;
+      store.view.help.value = true;
     }),
   );
-  if (!store.model.value) return found;
+  if (!store.data.model.value) return found;
   const facts = control();
-  if (facts && hasToken() && store.whyDisarmed.value === null) {
+  if (facts && hasToken() && store.status.whyDisarmed.value === null) {
     const [name, what] = facts.paused ? ["resume", "Resume"] : ["pause", "Pause"];
     found.push(item(`${what} ${targetText()}`, "Space", () => command(name)));
     if (facts.paused) found.push(item(`Step ${targetText()}`, "s", () => command("step")));
   }
   found.push(
-    item(store.follow.value ? "Do not follow" : "Follow", "o", () => page.setFollow(!store.follow.value), "what runs"),
+    item(
+      store.view.follow.value ? "Do not follow" : "Follow",
+      "o",
+      () => page.setFollow(!store.view.follow.value),
+      "what runs",
+    ),
     item("Live", "l", () => page.timeline.live(), "the present, or the end"),
     item("Show everything", "0", () => page.refit()),
     item("Whole run", "", () => page.timeline.fitAll(), "in the timeline"),
-    item("Next failure", "f", () => store.jump("kind failure", 1)),
-    item("Next preempt", "p", () => store.jump("kind preempt", 1)),
-    item("Next goal", "g", () => store.jump("kind goal", 1)),
+    item("Next failure", "f", () => store.playback.jump("kind failure", 1)),
+    item("Next preempt", "p", () => store.playback.jump("kind preempt", 1)),
+    item("Next goal", "g", () => store.playback.jump("kind goal", 1)),
     item("Why?", "w", () => showWhy(), "from the first cause to the outcome"),
-    item("Note", "n", () => store.askForNote(), "at the instant shown"),
-    item("Implicit transitions", "i", () => page.setImplicit(!store.implicit.value), "show or hide"),
+    item("Note", "n", () => store.notes.begin(), "at the instant shown"),
+    item("Implicit transitions", "i", () => page.setImplicit(!store.view.implicit.value), "show or hide"),
   );
   return found;
 }
 
 const states = (page: Page): Item[] =>
-  (store.model.value?.order ?? []).map((node) => ({
+  (store.data.model.value?.order ?? []).map((node) => ({
     kind: "state",
     name: node.name,
     more: node.parent ? node.parent.path : KIND_NAMES[node.kind],
@@ -77,19 +82,19 @@ const states = (page: Page): Item[] =>
   }));
 
 const keys = (page: Page): Item[] =>
-  Object.values(store.shown().userdata).map(({ key, value, writer, at }) => ({
+  Object.values(store.playback.shown().userdata).map(({ key, value, writer, at }) => ({
     kind: "key",
     name: key,
-    more: `${brief(value).slice(0, 60)} by ${store.nameOf(writer)}`,
+    more: `${brief(value).slice(0, 60)} by ${store.data.nameOf(writer)}`,
     pick: () => {
-      store.followedKey.value = key;
+      store.playback.followedKey.value = key;
       page.goTo(writer);
-      if (store.cursor.value !== null || !store.goes.value) store.seek(at / 1e6);
+      if (store.playback.cursor.value !== null || !store.playback.goes.value) store.playback.seek(at / 1e6);
     },
   }));
 
 function runs(): Item[] {
-  const machines = store.machines.value.map(
+  const machines = store.data.machines.value.map(
     ({ name, label, recorded }): Item => ({
       kind: "run",
       name: label,
@@ -97,7 +102,7 @@ function runs(): Item[] {
       pick: () => choose(name),
     }),
   );
-  const others = store.runs.value.runs.filter(({ name }) => name === null).slice(0, MOST_RUNS);
+  const others = store.data.runs.value.runs.filter(({ name }) => name === null).slice(0, MOST_RUNS);
   const past = others.map(
     ({ id, machine, outcome, file }): Item => ({
       kind: "run",
@@ -112,11 +117,11 @@ function runs(): Item[] {
 const SIGN_OF = Object.fromEntries(Object.entries(SIGNS).map(([sign, kind]) => [kind, sign]));
 
 export function Palette({ page }: { page: Page }) {
-  return store.paletteOpen.value ? <Open page={page} /> : null;
+  return store.view.paletteOpen.value ? <Open page={page} /> : null;
 }
 
 const close = () => {
-  store.paletteOpen.value = false;
+  store.view.paletteOpen.value = false;
 };
 
 function Open({ page }: { page: Page }) {

@@ -4,7 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { isFile } from "#core/connection.ts";
 import { parseInstant, RATES } from "#core/playback.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Page } from "#drawing/page.ts";
 import { fieldValue } from "#panels/components.tsx";
@@ -47,30 +47,34 @@ const IconButton = ({
 );
 
 export function PlayBar({ page }: { page: Page }) {
-  store.tick.value;
-  const first = store.run.first();
+  store.playback.tick.value;
+  const first = store.data.run.first();
   if (first === null) return null;
-  const goes = store.goes.value;
-  const live = store.cursor.value === null;
-  const end = isFile() || store.facts.value?.recorded ? "End" : "Live";
+  const goes = store.playback.goes.value;
+  const live = store.playback.cursor.value === null;
+  const end = isFile() || store.data.facts.value?.recorded ? "End" : "Live";
   return (
     <div class="play" role="region" aria-label="play bar">
       <span class="group">
-        <IconButton name="begin" title="to the beginning (Home)" onClick={() => store.seek(first)} />
-        <IconButton name="back" title="one event back (,)" onClick={() => store.seekEvent(-1)} />
+        <IconButton name="begin" title="to the beginning (Home)" onClick={() => store.playback.seek(first)} />
+        <IconButton name="back" title="one event back (,)" onClick={() => store.playback.seekEvent(-1)} />
         <IconButton
           name={goes ? "pause" : "play"}
           title={goes ? "hold the picture" : "play"}
           id="play"
-          onClick={() => store.togglePlaying()}
+          onClick={() => store.playback.togglePlaying()}
         />
-        <IconButton name="forward" title="one event forward (.)" onClick={() => store.seekEvent(1)} />
+        <IconButton name="forward" title="one event forward (.)" onClick={() => store.playback.seekEvent(1)} />
         <IconButton name="end" title="to the end (End)" onClick={() => page.timeline.live()} />
       </span>
       <Clock />
       <label class="rate">
         <span class="hidden">speed</span>
-        <select value={store.rate.value} title="speed" onChange={(e: Event) => store.setRate(Number(fieldValue(e)))}>
+        <select
+          value={store.playback.rate.value}
+          title="speed"
+          onChange={(e: Event) => store.playback.setRate(Number(fieldValue(e)))}
+        >
           {RATES.map((rate) => (
             <option value={rate}>{rate} ×</option>
           ))}
@@ -92,9 +96,9 @@ export function PlayBar({ page }: { page: Page }) {
 }
 
 function LoopButton() {
-  const [on, found] = [store.looping.value, store.stretch.value];
+  const [on, found] = [store.playback.looping.value, store.playback.stretch.value];
   const what = found
-    ? `from ${store.instantText(found.from)} to ${store.instantText(found.to)}`
+    ? `from ${store.clock.instantText(found.from)} to ${store.clock.instantText(found.to)}`
     : "over the selected state's visit; drag in the timeline to select a stretch";
   return (
     <IconButton
@@ -103,28 +107,29 @@ function LoopButton() {
       aria-pressed={on}
       id="loop"
       title={`loop ${what} (r)`}
-      onClick={() => store.toggleLoop()}
+      onClick={() => store.playback.toggleLoop()}
     />
   );
 }
 
 /** The instant shown, as a text field. */
 function Clock() {
-  store.tick.value; // read, so that this component without properties is drawn again when the signal changes
-  const last = store.run.last() ?? 0;
+  store.playback.tick.value; // read, so that this component without properties is drawn again when the signal changes
+  const last = store.data.run.last() ?? 0;
   // The run must not overwrite what is being typed.
   const [typed, setTyped] = useState<string | null>(null);
   const onChange = (e: Event) => {
     const seconds = parseInstant(fieldValue(e));
-    if (seconds === null) store.notify(`Instant: got ${shorten(fieldValue(e), 30)}; expected such as 01:32.5`, "error");
-    else store.seek((store.began() ?? 0) + seconds * 1000);
+    if (seconds === null)
+      store.view.notify(`Instant: got ${shorten(fieldValue(e), 30)}; expected such as 01:32.5`, "error");
+    else store.playback.seek((store.playback.began() ?? 0) + seconds * 1000);
     (e.target as HTMLInputElement).blur();
   };
   const onFocus = (e: Event) => {
     setTyped(fieldValue(e));
     (e.target as HTMLInputElement).select();
   };
-  const text = typed ?? store.runText(store.nowMs());
+  const text = typed ?? store.clock.runText(store.playback.nowMs());
   return (
     <span class="clock">
       <input
@@ -138,17 +143,17 @@ function Clock() {
         onFocus={onFocus}
         onBlur={() => setTyped(null)}
       />
-      <small>/ {store.runText(Math.max(last, store.nowMs()))}</small>
+      <small>/ {store.clock.runText(Math.max(last, store.playback.nowMs()))}</small>
     </span>
   );
 }
 
 function Jumps() {
-  store.slowTick.value;
-  const keys = [...store.marks.keys].sort();
-  const key = store.followedKey.value ?? keys[0];
+  store.playback.slowTick.value;
+  const keys = [...store.data.marks.keys].sort();
+  const key = store.playback.followedKey.value ?? keys[0];
   const choose = (e: Event) => {
-    store.followedKey.value = fieldValue(e);
+    store.playback.followedKey.value = fieldValue(e);
   };
   return (
     <span class="jumps" role="group" aria-label="go to the next">
@@ -175,14 +180,14 @@ function Jumps() {
 }
 
 function Jump({ name, letter, children }: { name: string; letter: string; children?: ComponentChildren }) {
-  const ahead = store.jumpOf(name, 1) !== null;
+  const ahead = store.playback.jumpOf(name, 1) !== null;
   const title = `${ahead ? "go there" : "none ahead"} (${letter.toLowerCase()}); before it: Shift+${letter}`;
   return (
     <button
       class={ahead ? "" : "none"}
       aria-disabled={!ahead}
       title={title}
-      onClick={(e: MouseEvent) => store.jump(name, e.shiftKey ? -1 : 1)}
+      onClick={(e: MouseEvent) => store.playback.jump(name, e.shiftKey ? -1 : 1)}
     >
       {children}
       <kbd>{letter}</kbd>

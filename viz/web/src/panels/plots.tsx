@@ -3,7 +3,7 @@
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { Origin } from "#core/series.ts";
 import { idOf, labelOf, numberText, originOf, originsIn, ownerOf, Samples, unitOf, valueAt } from "#core/series.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Page } from "#drawing/page.ts";
 import { Plot } from "#drawing/plot.ts";
@@ -17,10 +17,10 @@ const GROUPS: [string, string][] = [
 ];
 
 const unitFor = (origin: Origin) =>
-  origin.source === "topic" ? (store.scene.series.get(origin.owner)?.unit ?? "") : unitOf(origin);
+  origin.source === "topic" ? (store.data.scene.series.get(origin.owner)?.unit ?? "") : unitOf(origin);
 
 export function PlotsPanel({ page }: { page: Page }) {
-  const plots = store.plotsShown.value;
+  const plots = store.panels.plotsShown.value;
   return (
     <section class={`plots ${plots.length ? "" : "none"}`} aria-label="plots">
       {plots.map((ids, i) => (
@@ -49,11 +49,11 @@ function PlotRow({ page, ids, number }: { page: Page; ids: string[]; number: num
             origin={origin}
             label={namesOf(origins)[i]}
             colour={i}
-            onRemove={() => store.removeLine(number, ids[i])}
+            onRemove={() => store.panels.removeLine(number, ids[i])}
           />
         ))}
         <li>
-          <AddLine label="add a line to this plot" text="+" onPick={(id: string) => store.addLine(number, id)} />
+          <AddLine label="add a line to this plot" text="+" onPick={(id: string) => store.panels.addLine(number, id)} />
         </li>
       </ul>
       <div class="plot-area" ref={place} />
@@ -79,11 +79,11 @@ function Line({
   colour: number;
   onRemove: () => void;
 }) {
-  store.tick.value;
+  store.playback.tick.value;
   const samples = useRef<Samples | null>(null);
   samples.current ??= new Samples(idOf(origin));
-  const list = samples.current.update(store.run, store.scene.series);
-  const value = valueAt(list, store.pointed.value ?? store.nowMs());
+  const list = samples.current.update(store.data.run, store.data.scene.series);
+  const value = valueAt(list, store.pointer.pointed.value ?? store.playback.nowMs());
   const nothing = list.length ? "\u2013" : "no values yet";
   const text = value === null ? nothing : `${numberText(value)} ${unitFor(origin)}`.trim();
   const title = [labelOf(origin), ownerOf(origin)].filter(Boolean).join(", ");
@@ -106,8 +106,8 @@ function Line({
 export function AddLine({ label, text, onPick }: { label: string; text: string; onPick: (id: string) => void }) {
   const [found, setFound] = useState<Origin[]>([]);
   const look = () => {
-    const shown = new Set(store.plotsShown.value.flat());
-    const all = originsIn(store.shown(), store.scene.series.keys());
+    const shown = new Set(store.panels.plotsShown.value.flat());
+    const all = originsIn(store.playback.shown(), store.data.scene.series.keys());
     setFound(all.filter((one) => !shown.has(idOf(one))));
   };
   const onChange = (e: Event) => {

@@ -2,7 +2,7 @@
 
 import { ms } from "#core/fold.ts";
 import { innermost } from "#core/lists.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { askerText, duration, holdText } from "#core/text.ts";
 import type { Preempt, PreemptedSpan, RunState, Span } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -19,7 +19,7 @@ const isOrdinary = ({ from, to, rows }: Preempt) =>
   rows.every((row) => row.asked?.source === "concurrence" && row.abandoned === null);
 
 export function Preempts({ page, data, now }: { page: Page; data: RunState; now: number }) {
-  const found = store.run.preemptAt(now);
+  const found = store.data.run.preemptAt(now);
   if (!found || found.from < (ms(data.started) ?? 0)) return null;
   if (found.to !== null && data.ended == null && now - found.to > RECENT_MS) return null;
   if (isOrdinary(found)) return null;

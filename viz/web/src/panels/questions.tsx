@@ -5,7 +5,7 @@ import { canAnswer, command, control } from "#core/commands.ts";
 import { choose, encoded, isFile, link } from "#core/connection.ts";
 import type { ShownQuestion } from "#core/questions.ts";
 import { answerText, buttonsOf, heldStates, isUrgent, questionsOf, titleOf } from "#core/questions.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten, shortenLines } from "#core/text.ts";
 import type { MachineSummary } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -23,17 +23,20 @@ const sounded = new Set();
 
 /** The questions to show; those of a live machine are the present ones, independent of the instant shown. */
 function questionsShown() {
-  const isOver = isFile() || store.facts.value?.recorded;
-  if (isOver) return questionsOf(store.shown(), store.cursor.value ?? store.nowMs()).filter((one) => one.isOpen);
-  return questionsOf(store.run.now, store.liveMs());
+  const isOver = isFile() || store.data.facts.value?.recorded;
+  if (isOver)
+    return questionsOf(store.playback.shown(), store.playback.cursor.value ?? store.playback.nowMs()).filter(
+      (one) => one.isOpen,
+    );
+  return questionsOf(store.data.run.now, store.data.liveMs());
 }
 
 export function Questions({ page }: { page: Page }) {
-  store.tick.value;
-  const shown = store.model.value ? questionsShown() : [];
-  const held = control() && store.cursor.value === null ? heldStates(store.run.now) : [];
-  const facts = store.facts.value;
-  const others = store.machines.value.filter((one) => one.name !== facts?.name && one.stale == null);
+  store.playback.tick.value;
+  const shown = store.data.model.value ? questionsShown() : [];
+  const held = control() && store.playback.cursor.value === null ? heldStates(store.data.run.now) : [];
+  const facts = store.data.facts.value;
+  const others = store.data.machines.value.filter((one) => one.name !== facts?.name && one.stale == null);
   const asking = isFile() ? [] : others.filter((one) => one.questions);
   const elsewhere = asking.reduce((sum, one) => sum + (one.questions ?? 0), 0);
   const title = titleOf(facts ? `${facts.label} \u2013 smachpy` : "smachpy", shown, elsewhere);
@@ -44,7 +47,7 @@ export function Questions({ page }: { page: Page }) {
     if (isFile() || facts?.recorded) return;
     const unsounded = shown.filter((one) => one.isOpen && !sounded.has(one.asked));
     for (const one of unsounded) sounded.add(one.asked);
-    if (unsounded.length && store.sound.value) chime();
+    if (unsounded.length && store.view.sound.value) chime();
   });
   if (!shown.length && !held.length && !asking.length) return null;
   return (
@@ -80,7 +83,7 @@ function Card({ one, page }: { one: ShownQuestion; page: Page }) {
   }, []);
   const give = async (answer: string) => {
     setSent(true);
-    const by = store.operator.value.trim() || undefined;
+    const by = store.view.operator.value.trim() || undefined;
     if (!(await command("answer", { path: one.path, answer, by }))) setSent(false);
   };
   const id = `question-${encoded(one.path)}`; // without spaces, which separate ids in aria-labelledby
@@ -121,8 +124,8 @@ function Buttons({
   give: (answer: string) => void;
   page: Page;
 }) {
-  if (isFile() || store.facts.value?.recorded) return null;
-  if (store.cursor.value !== null)
+  if (isFile() || store.data.facts.value?.recorded) return null;
+  if (store.playback.cursor.value !== null)
     return (
       <div class="answers">
         <button class="answer primary" onClick={() => page.timeline.live()}>

@@ -4,14 +4,14 @@ import { own } from "#core/fold.ts";
 import type { Model } from "#core/model.ts";
 import { KIND_NAMES } from "#core/model.ts";
 import { endClass } from "#core/outcomes.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { MachinePayload, RunState, StateNode, StateRun, StateStatistics } from "#core/types.ts";
 import { Pill, Section } from "#panels/components.tsx";
 import { OutcomeBreakpoint, StateControls } from "#panels/controls.tsx";
 
 export function SelectedState({ data, now, model }: { data: RunState; now: number; model: Model }) {
-  const node = model.get(store.selected.value);
+  const node = model.get(store.view.selected.value);
   if (!node) return null;
   const state = own(data.states, node.path);
   return (
@@ -39,7 +39,7 @@ export function SelectedState({ data, now, model }: { data: RunState; now: numbe
 
 function factsOf(node: StateNode, state: StateRun | undefined, now: number): [string, string | number][] {
   const running = state?.since != null ? (now - state.since / 1e6) / 1000 : null;
-  const recorded = own(store.statistics.value?.states, node.path);
+  const recorded = own(store.data.statistics.value?.states, node.path);
   const facts: [string, string | number][] = [
     ["kind", `${KIND_NAMES[node.kind] ?? node.kind} (${node.type_name})`],
     ...node.details,

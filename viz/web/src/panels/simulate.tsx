@@ -6,7 +6,7 @@ import { outcomeClass } from "#core/outcomes.ts";
 import { beganText } from "#core/run_list.ts";
 import type { Form } from "#core/simulations.ts";
 import { doneOf, startOf } from "#core/simulations.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Batch } from "#core/types.ts";
 import { Dialog, fieldValue, Pill } from "#panels/components.tsx";
@@ -14,12 +14,12 @@ import { Dialog, fieldValue, Pill } from "#panels/components.tsx";
 const REFRESH_MS = 1000;
 const FORM: Form = { mission: "", runs: "20", vary: "", seed: "1", limit: "4h", compare: "" };
 
-export const SimulateDialog = () => (store.simulateOpen.value ? <OpenDialog /> : null);
+export const SimulateDialog = () => (store.view.simulateOpen.value ? <OpenDialog /> : null);
 
 function OpenDialog() {
   const [form, setForm] = useState(FORM);
   const [problems, setProblems] = useState("");
-  const { missions, batches } = store.simulations.value;
+  const { missions, batches } = store.data.simulations.value;
   const names = Object.keys(missions);
   const mission = form.mission || names[0] || "";
   useEffect(() => {
@@ -28,7 +28,7 @@ function OpenDialog() {
     return () => clearInterval(timer);
   }, []);
   const close = () => {
-    store.simulateOpen.value = false;
+    store.view.simulateOpen.value = false;
   };
   const onSubmit = async (e: Event) => {
     e.preventDefault();

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { choose, isFile, showWhy } from "#core/connection.ts";
 import { KIND_NAMES } from "#core/model.ts";
 import { showPage } from "#core/pages.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { MachineSummary, StateNode } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -16,13 +16,13 @@ import { FollowButton, toggleTree, ViewMenu } from "#panels/view_menu.tsx";
 
 const MOST_FOUND = 12;
 export function TopBar({ page }: { page: Page }) {
-  if (store.pageShown.value !== "machine")
+  if (store.view.pageShown.value !== "machine")
     return (
       <header class="top">
         <RunsButton />
-        {store.model.value && (
+        {store.data.model.value && (
           <button class="back" title="back to this machine (Esc)" onClick={() => showPage("machine")}>
-            ← {shorten(store.facts.value?.label ?? "", 40)}
+            ← {shorten(store.data.facts.value?.label ?? "", 40)}
           </button>
         )}
         <span class="spread" />
@@ -30,13 +30,13 @@ export function TopBar({ page }: { page: Page }) {
         <ActionsButton id="actions" />
       </header>
     );
-  const status = store.runStatus.value;
-  const problems = store.problems.value.length;
+  const status = store.status.runStatus.value;
+  const problems = store.data.problems.value.length;
   return (
     <header class="top">
       <button
         class="states-button"
-        aria-expanded={store.treeOpen.value}
+        aria-expanded={store.view.treeOpen.value}
         title="the states as a tree (t)"
         onClick={toggleTree}
       >
@@ -49,8 +49,8 @@ export function TopBar({ page }: { page: Page }) {
       </span>
       {canAskWhy() && (
         <button
-          class={`why-button ${store.why.value ? "on" : ""}`}
-          aria-pressed={store.why.value !== null}
+          class={`why-button ${store.data.why.value ? "on" : ""}`}
+          aria-pressed={store.data.why.value !== null}
           title="from the first cause to the outcome (w)"
           onClick={() => showWhy()}
         >
@@ -79,7 +79,7 @@ export function TopBar({ page }: { page: Page }) {
 
 function RunsButton() {
   if (isFile()) return null;
-  const open = store.pageShown.value === "runs";
+  const open = store.view.pageShown.value === "runs";
   return (
     <button
       id="runs"
@@ -95,15 +95,15 @@ function RunsButton() {
 
 /** Whether the run is over: it has ended, or its program is gone. */
 function canAskWhy() {
-  store.tick.value;
-  const { now } = store.run;
-  const about = store.facts.value;
+  store.playback.tick.value;
+  const { now } = store.data.run;
+  const about = store.data.facts.value;
   return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
 }
 
 function Chooser() {
-  const facts = store.facts.value;
-  const list = store.machines.value;
+  const facts = store.data.facts.value;
+  const list = store.data.machines.value;
   const name = facts ? shorten(facts.label, 60) : "no machine yet";
   const others = list.some((machine) => machine.name !== facts?.name);
   if (isFile() || !others) return <h1 title={facts?.name}>{name}</h1>;
@@ -121,7 +121,7 @@ function Chooser() {
       <select value={facts?.name ?? ""} onChange={(e: Event) => choose(fieldValue(e))}>
         {!facts && (
           <option value="" disabled>
-            {shorten(store.wanted.value || "choose a machine", 60)}
+            {shorten(store.data.wanted.value || "choose a machine", 60)}
           </option>
         )}
         {list.map(choice)}
@@ -139,9 +139,9 @@ function statusOf({ recorded, stale, ended, outcome, questions }: MachineSummary
 
 /** The breadcrumb of the selected state, otherwise of the running one. */
 function Crumbs({ page }: { page: Page }) {
-  const model = store.model.value;
-  const selected = store.selected.value;
-  const leaves = store.activeLeaves.value;
+  const model = store.data.model.value;
+  const selected = store.view.selected.value;
+  const leaves = store.status.activeLeaves.value;
   const node = model?.get(selected ?? leaves[0]);
   if (!model || !node) return null;
   const more = selected ? 0 : leaves.length - 1;
@@ -165,19 +165,19 @@ function Crumbs({ page }: { page: Page }) {
 
 function Search({ page }: { page: Page }) {
   const [at, setAt] = useState(0);
-  const text = store.query.value;
-  const found = text ? (store.model.value?.search(text) ?? []) : [];
+  const text = store.view.query.value;
+  const found = text ? (store.data.model.value?.search(text) ?? []) : [];
   const shown = found.slice(0, MOST_FOUND);
   const pick = (node: StateNode | undefined) => {
     if (!node) return;
     page.goTo(node.path);
-    store.query.value = "";
+    store.view.query.value = "";
     if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
   };
   const onKeyDown = (e: KeyboardEvent) => {
     if (e.key === "Enter") pick(shown[Math.min(at, shown.length - 1)]);
     else if (e.key === "Escape") {
-      store.query.value = "";
+      store.view.query.value = "";
       (e.target as HTMLElement).blur();
     } else if (e.key === "ArrowDown" || e.key === "ArrowUp") {
       const to = e.key === "ArrowDown" ? Math.min(at + 1, shown.length - 1) : at - 1;
@@ -187,7 +187,7 @@ function Search({ page }: { page: Page }) {
     e.stopPropagation();
   };
   const onInput = (e: Event) => {
-    store.query.value = fieldValue(e);
+    store.view.query.value = fieldValue(e);
     setAt(0);
   };
   useEffect(() => page.markHits(found.map((node) => node.path)), [text]);

@@ -4,7 +4,7 @@ import { useRef, useState } from "preact/hooks";
 import { own } from "#core/fold.ts";
 import { endClass } from "#core/outcomes.ts";
 import { purposeOfState } from "#core/purposes.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { StateNode, StateRun } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
 
@@ -30,25 +30,25 @@ export function Tree({ page }: { page: Page }) {
   const [folded, setFolded] = useState(() => new Map() as Map<string, boolean>); // by the user
   const [chosen, setChosen] = useState<string | null>(null);
   const box = useRef<HTMLDivElement | null>(null);
-  store.tick.value; // read, so that this component is drawn again when the signal changes
-  const model = store.model.value;
+  store.playback.tick.value; // read, so that this component is drawn again when the signal changes
+  const model = store.data.model.value;
   if (!model) return <aside class="tree" />;
-  const states = store.shown().states;
+  const states = store.playback.shown().states;
   const isOpen = (node: StateNode) =>
-    folded.get(node.path) ?? (own(states, node.path)?.since != null || store.opened.value.has(node.path));
+    folded.get(node.path) ?? (own(states, node.path)?.since != null || store.view.opened.value.has(node.path));
   const rows = visibleRows(model.root, isOpen);
   const height = box.current?.clientHeight ?? 800;
   const first = Math.max(0, Math.floor(top / ROW) - SPARE);
   const inView = rows.slice(first, first + Math.ceil(height / ROW) + 2 * SPARE);
   const at = Math.max(
     0,
-    rows.findIndex((node) => node.path === (chosen ?? store.selected.value)),
+    rows.findIndex((node) => node.path === (chosen ?? store.view.selected.value)),
   );
   const fold = (node: StateNode) => setFolded(new Map(folded).set(node.path, !isOpen(node)));
   const goTo = (node: StateNode) => {
     setChosen(node.path);
     page.goTo(node.path);
-    store.treeOpen.value = false;
+    store.view.treeOpen.value = false;
   };
   const choose = (row: number) => {
     const to = Math.max(0, Math.min(row, rows.length - 1));
@@ -132,7 +132,7 @@ function Row({
   onFold: () => void;
 }) {
   const active = state?.since != null;
-  const selected = store.selected.value === node.path;
+  const selected = store.view.selected.value === node.path;
   const isContainer = node.children.length > 0;
   const kind = state?.outcome != null ? endClass(node, state.outcome) : null;
   const visits = state?.visits ?? 0;

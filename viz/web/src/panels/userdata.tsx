@@ -6,7 +6,7 @@ import type { VNode } from "preact";
 import { useState } from "preact/hooks";
 import { ask, encoded, isFile, link } from "#core/connection.ts";
 import { containerOf, own } from "#core/fold.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { RunState, UserdataEntry } from "#core/types.ts";
 import { branchOf, brief, wasShortened } from "#core/values.ts";
@@ -102,7 +102,7 @@ function Row({
         <code>{open ? <Whole value={entry.value} /> : short}</code>
         {open && wasShortened(entry.value) && <WholeValue entry={entry} />}
         <small>
-          by <StateLink path={entry.writer} page={page} /> at {store.instantText(entry.at / 1e6, 2)}
+          by <StateLink path={entry.writer} page={page} /> at {store.clock.instantText(entry.at / 1e6, 2)}
         </small>
       </td>
     </tr>
@@ -140,10 +140,10 @@ const wholeValues: Signal<Record<string, { ok?: boolean; text: string }>> = sign
 /** Fetches a complete value from the mission: events contain only the beginning of a long one. */
 function WholeValue({ entry }: { entry: UserdataEntry }) {
   // Labels can contain slashes, so the container cannot be found in the path.
-  const container = store.model.value?.get(entry.writer)?.parent?.path ?? entry.container;
-  const id = `${store.facts.value?.epoch} ${container} ${entry.key}`;
+  const container = store.data.model.value?.get(entry.writer)?.parent?.path ?? entry.container;
+  const id = `${store.data.facts.value?.epoch} ${container} ${entry.key}`;
   const found = wholeValues.value[id];
-  if (isFile() || store.facts.value?.recorded) return <small>shortened when it was recorded</small>;
+  if (isFile() || store.data.facts.value?.recorded) return <small>shortened when it was recorded</small>;
   const put = (answer: { ok?: boolean; text: string }) => {
     wholeValues.value = { ...wholeValues.value, [id]: answer };
   };
@@ -183,8 +183,8 @@ function WholeValue({ entry }: { entry: UserdataEntry }) {
 /** The changes by the transition at the instant shown. */
 export function Changes({ page }: { page: Page }) {
   const [whole, setWhole] = useState(false);
-  if (store.cursor.value === null) return null;
-  const { before, writes } = store.run.lastTransition(store.eventsShown());
+  if (store.playback.cursor.value === null) return null;
+  const { before, writes } = store.data.run.lastTransition(store.playback.eventsShown());
   const shown = whole ? writes : writes.slice(-MOST_CHANGES);
   return (
     <Section title="Changed by this transition">

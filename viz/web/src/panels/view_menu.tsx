@@ -4,7 +4,8 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { encoded, isFile, link } from "#core/connection.ts";
 import { ALL_LEVELS } from "#core/model.ts";
 import { MODES, OF_RECORDED_RUNS } from "#core/statistics.ts";
-import * as store from "#core/store.ts";
+import { save } from "#core/storage.ts";
+import { store } from "#core/store.ts";
 import type { Theme } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
 import { isDark } from "#drawing/theme.ts";
@@ -18,17 +19,17 @@ const MOST_ACTIVE = 200; // active states in the address of a picture
 
 export const FollowButton = ({ page }: { page: Page }) => (
   <button
-    class={store.follow.value ? "on" : ""}
-    aria-pressed={store.follow.value}
+    class={store.view.follow.value ? "on" : ""}
+    aria-pressed={store.view.follow.value}
     title="follow the running states (o)"
-    onClick={() => page.setFollow(!store.follow.value)}
+    onClick={() => page.setFollow(!store.view.follow.value)}
   >
     Follow
   </button>
 );
 
 export const toggleTree = () => {
-  store.treeOpen.value = !store.treeOpen.value;
+  store.view.treeOpen.value = !store.view.treeOpen.value;
 };
 
 export function ViewMenu({ page }: { page: Page }) {
@@ -57,18 +58,18 @@ export function ViewMenu({ page }: { page: Page }) {
     if (e.relatedTarget && !box.current?.contains(e.relatedTarget as Node)) setOpen(false);
   };
   const showKeys = () => {
-    store.help.value = true;
+    store.view.help.value = true;
     setOpen(false);
   };
   const onShortcuts = (e: Event) => {
-    store.shortcuts.value = (e.target as HTMLInputElement).checked;
-    store.save("shortcuts", store.shortcuts.value);
+    store.view.shortcuts.value = (e.target as HTMLInputElement).checked;
+    save("shortcuts", store.view.shortcuts.value);
   };
   const find = () => {
-    store.paletteOpen.value = true;
+    store.view.paletteOpen.value = true;
     setOpen(false);
   };
-  const onMachine = store.pageShown.value === "machine";
+  const onMachine = store.view.pageShown.value === "machine";
   const onImplicit = (e: Event) => page.setImplicit((e.target as HTMLInputElement).checked);
   const onTheme = (e: Event) => page.setTheme(fieldValue(e) as Theme);
   return (
@@ -93,7 +94,7 @@ export function ViewMenu({ page }: { page: Page }) {
               <Levels page={page} />
               <label class="line">
                 <span>Implicit transitions</span>
-                <input type="checkbox" checked={store.implicit.value} onChange={onImplicit} />
+                <input type="checkbox" checked={store.view.implicit.value} onChange={onImplicit} />
               </label>
               <NumbersLine page={page} />
               <CompareLine page={page} onDone={() => setOpen(false)} />
@@ -101,13 +102,13 @@ export function ViewMenu({ page }: { page: Page }) {
           )}
           <label class="line">
             <span>Colours</span>
-            <select value={store.theme.value} onChange={onTheme}>
+            <select value={store.view.theme.value} onChange={onTheme}>
               <option value="system">as the system</option>
               <option value="light">light</option>
               <option value="dark">dark</option>
             </select>
           </label>
-          {onMachine && !store.isPhone.value && <PanelLines />}
+          {onMachine && !store.view.isPhone.value && <PanelLines />}
           {!isFile() && <AboutQuestions />}
           {onMachine && !isFile() && <Downloads />}
           <div class="line">
@@ -116,7 +117,7 @@ export function ViewMenu({ page }: { page: Page }) {
           </div>
           <label class="line">
             <span>Single keys are shortcuts</span>
-            <input type="checkbox" checked={store.shortcuts.value} onChange={onShortcuts} />
+            <input type="checkbox" checked={store.view.shortcuts.value} onChange={onShortcuts} />
           </label>
         </div>
       )}
@@ -127,29 +128,29 @@ export function ViewMenu({ page }: { page: Page }) {
 /** Settings for questions: sound, and the name under which they are answered. */
 function AboutQuestions() {
   const onSound = (e: Event) => {
-    store.sound.value = (e.target as HTMLInputElement).checked;
-    store.save("sound", store.sound.value);
+    store.view.sound.value = (e.target as HTMLInputElement).checked;
+    save("sound", store.view.sound.value);
   };
   const onName = (e: Event) => {
-    store.operator.value = fieldValue(e);
-    store.save("operator", store.operator.value);
+    store.view.operator.value = fieldValue(e);
+    save("operator", store.view.operator.value);
   };
   return (
     <>
       <label class="line">
         <span>Sound for questions</span>
-        <input type="checkbox" checked={store.sound.value} onChange={onSound} />
+        <input type="checkbox" checked={store.view.sound.value} onChange={onSound} />
       </label>
       <label class="line">
         <span>You answer as</span>
-        <input maxlength={60} placeholder="your name" value={store.operator.value} onInput={onName} />
+        <input maxlength={60} placeholder="your name" value={store.view.operator.value} onInput={onName} />
       </label>
     </>
   );
 }
 
 function Levels({ page }: { page: Page }) {
-  const depths = store.model.value?.order.map((node) => node.depth) ?? [];
+  const depths = store.data.model.value?.order.map((node) => node.depth) ?? [];
   const deepest = depths.reduce((most, depth) => Math.max(most, depth), 1);
   const levels = Array.from({ length: Math.min(deepest, MOST_LEVELS) }, (_, i) => i + 1);
   return (
@@ -166,11 +167,11 @@ function Levels({ page }: { page: Page }) {
 }
 
 function NumbersLine({ page }: { page: Page }) {
-  const isMissing = (mode: string) => OF_RECORDED_RUNS.includes(mode) && !store.statistics.value;
+  const isMissing = (mode: string) => OF_RECORDED_RUNS.includes(mode) && !store.data.statistics.value;
   return (
     <label class="line">
       <span>Numbers</span>
-      <select value={store.numbers.value} onChange={(e: Event) => page.setNumbers(fieldValue(e))}>
+      <select value={store.view.numbers.value} onChange={(e: Event) => page.setNumbers(fieldValue(e))}>
         {MODES.map(([mode, text]) => (
           <option value={mode} disabled={isMissing(mode)}>
             {text}
@@ -183,7 +184,7 @@ function NumbersLine({ page }: { page: Page }) {
 
 /** Downloads: pictures of the whole machine with the states active at the instant shown, and the run. */
 function Downloads() {
-  const active = store.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded(path)}`);
+  const active = store.status.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded(path)}`);
   const looks = `&theme=${isDark() ? "dark" : "light"}${active.join("")}`;
   const picture = (format: string) => (
     <a class="button" href={link("picture", `&format=${format}${looks}`)} download>

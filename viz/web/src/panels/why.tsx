@@ -1,20 +1,20 @@
 // The causes of the run's end, from the first one to the outcome; a click on a step goes to its instant.
 
 import { showWhy } from "#core/connection.ts";
-import * as store from "#core/store.ts";
+import { store } from "#core/store.ts";
 import type { Cause } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
 import { Section } from "#panels/components.tsx";
 
 export function WhyPanel({ page }: { page: Page }) {
-  const why = store.why.value;
+  const why = store.data.why.value;
   if (!why) return null;
   const copy = async () => {
     try {
       await navigator.clipboard.writeText(why.text);
-      store.notify("Copied");
+      store.view.notify("Copied");
     } catch {
-      store.notify("This browser lets no page copy here: mark the text and copy it", "error");
+      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
     }
   };
   const title = why.outcome === null ? "Why has it no end?" : "Why did it end so?";
@@ -42,14 +42,14 @@ export function WhyPanel({ page }: { page: Page }) {
 
 function Step({ step, first, page }: { step: Cause; first: boolean; page: Page }) {
   const goThere = () => {
-    store.seek(step.stamp_ns / 1e6);
+    store.playback.seek(step.stamp_ns / 1e6);
     page.goTo(step.path);
   };
   return (
     <li class={`${step.kind} ${first ? "first" : ""}`}>
       <button class="step" title={step.path} onClick={goThere}>
-        <b>{store.nameOf(step.path)}</b> <span class={`word ${step.kind}`}>{step.what}</span>{" "}
-        <time>{store.instantText(step.stamp_ns / 1e6, 2)}</time>
+        <b>{store.data.nameOf(step.path)}</b> <span class={`word ${step.kind}`}>{step.what}</span>{" "}
+        <time>{store.clock.instantText(step.stamp_ns / 1e6, 2)}</time>
       </button>
       {step.reason && <p>{step.reason}</p>}
       {step.detail && <pre>{step.detail}</pre>}
