@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from smachpy.states.serving import Serve as Serve
     from smachpy.states.serving import serve_during as serve_during
     from smachpy.states.serving import serving_machine as serving_machine
+    from smachpy.states.topics import LookUpTransform as LookUpTransform
+    from smachpy.states.topics import Publish as Publish
     from smachpy.states.waiting import AwaitMessage as AwaitMessage
     from smachpy.states.waiting import Wait as Wait
     from smachpy.states.waypoints import PlaceFile as PlaceFile
@@ -51,11 +53,13 @@ __all__ = [
     "AskOperator",
     "AwaitMessage",
     "InputFileError",
+    "LookUpTransform",
     "MissionError",
     "NavigationError",
     "PlaceFile",
     "Pose2D",
     "Progress",
+    "Publish",
     "Question",
     "RestoreParameters",
     "Route",
@@ -84,11 +88,13 @@ _HOMES = {
     "AwaitMessage": "smachpy.states.waiting",
     "DRIVE_TIMEOUT": "smachpy.states.driving",
     "InputFileError": "smachpy.places.exceptions",
+    "LookUpTransform": "smachpy.states.topics",
     "MissionError": "smachpy.exceptions",
     "NavigationError": "smachpy.places.exceptions",
     "PlaceFile": "smachpy.states.waypoints",
     "Pose2D": "smachpy.places.pose",
     "Progress": "smachpy.states.progress",
+    "Publish": "smachpy.states.topics",
     "Question": "smachpy.states.questions",
     "RestoreParameters": "smachpy.states.ros2_nodes",
     "Route": "smachpy.states.waypoints",

@@ -6,6 +6,7 @@ that returns a state, with `Args:` in its docstring.
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.exceptions import InvalidStateError
@@ -172,11 +173,11 @@ def action(
         exec_timeout: Longest time for the goal [s].
         server_wait_timeout: Longest wait for the server [s].
     """
-    from actionlib_core.interfaces import get_action
+    from actionlib_core.wire.action_types import ActionTypes
     from smachpy.actions.simple_action_state import SimpleActionState
 
-    spec: Any = get_action(type)
-    made = None if goal is None else _class_of(spec().action_goal.goal).from_dict(goal)
+    spec = _interface("action", type)
+    made = None if goal is None else ActionTypes.of(spec).goal.from_dict(goal)
     return SimpleActionState(
         name,
         spec,
@@ -207,10 +208,9 @@ def service(
         timeout: Longest time for the call [s].
     """
     from actionlib_core.inputs.expression import Expression
-    from actionlib_core.interfaces import get_service
     from smachpy.actions.service_state import ServiceState
 
-    spec: Any = get_service(type)
+    spec = _interface("service", type)
     made = spec._request_class.from_dict(request or {})
     holds = Expression(succeeded_if) if succeeded_if else None
 
@@ -232,7 +232,6 @@ def monitor(topic: str, type: str, valid_while: str, timeout: float | None = Non
         timeout: Longest wait [s].
     """
     from actionlib_core.inputs.expression import Expression
-    from actionlib_core.interfaces import get_message
     from smachpy.actions.monitor_state import MonitorState
 
     holds = Expression(valid_while)
@@ -240,26 +239,84 @@ def monitor(topic: str, type: str, valid_while: str, timeout: float | None = Non
     def check(_userdata: UserData, message: Any) -> bool:
         return bool(holds(message))
 
-    return MonitorState(topic, get_message(type), check, timeout=timeout)
+    return MonitorState(topic, _interface("message", type), check, timeout=timeout)
 
 
-def await_message(topic: str, type: str, until: str = "True", timeout: float = 60.0) -> State:  # noqa: A002
+def await_message(
+    topic: str,
+    type: str,  # noqa: A002  its name in files
+    until: str = "",
+    key: str | None = None,
+    timeout: float | None = 60.0,
+) -> State:
     """Wait for a message. Outcomes: 'came', 'timeout', 'preempted'.
 
     Args:
         topic: Name of the topic.
         type: Its type.
-        until: An expression over the message that must hold.
-        timeout: Longest wait [s].
+        until: An expression over the message that must hold; "" for any message.
+        key: The userdata key that gets the message.
+        timeout: Longest wait [s]; none: no limit.
     """
     from actionlib_core.inputs.expression import Expression
-    from actionlib_core.interfaces import get_message
     from smachpy.states.waiting import AwaitMessage
 
-    holds = Expression(until)
-    return AwaitMessage(
-        topic, get_message(type), lambda message: bool(holds(message)), timeout=timeout
+    holds = Expression(until) if until else None
+
+    def wanted(message: Any) -> bool:
+        return holds is None or bool(holds(message))
+
+    return AwaitMessage(topic, _interface("message", type), wanted, key=key, timeout=timeout)
+
+
+def publish(
+    topic: str,
+    type: str,  # noqa: A002  its name in files
+    message: Mapping[str, Any] | None = None,
+    key: str | None = None,
+    subscribers: int = 1,
+    latch: bool = False,
+    timeout: float | None = 5.0,
+) -> State:
+    """Publish a message once somebody listens. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        topic: Name of the topic.
+        type: Its type, such as `std_msgs/Bool`.
+        message: The fields of the message; a header may be `auto`.
+        key: The userdata key of the message or its fields, instead.
+        subscribers: How many subscribers to wait for; 0: none.
+        latch: Keep the message for later subscribers, and wait for none.
+        timeout: Longest wait [s]; none: no limit.
+    """
+    from smachpy.states.topics import Publish
+
+    return Publish(
+        topic,
+        _interface("message", type),
+        message,
+        key=key,
+        subscribers=subscribers,
+        latch=latch,
+        timeout=timeout,
     )
+
+
+def look_up_transform(
+    key: str, frame: str, into: str = "map", tf: str = "tf", timeout: float | None = 5.0
+) -> State:
+    """Write the pose of a frame to a key. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        key: The userdata key that gets it, a `geometry_msgs/PoseStamped`.
+        frame: The frame to look for, such as `base_link`.
+        into: The frame of the result.
+        tf: The topic of the transforms; `/tf` is always read, too.
+        timeout: Longest wait [s]; none: no limit.
+    """
+    from smachpy.states.topics import LookUpTransform
+
+    return LookUpTransform(key, frame, into, tf=tf, timeout=timeout)
 
 
 def nav2_active(manager: str = "lifecycle_manager_navigation", timeout: float = 60.0) -> State:
@@ -318,8 +375,22 @@ def set_lifecycle(node: str, state: str = "active", timeout: float | None = 60.0
     return SetLifecycle(node, state, timeout=timeout)
 
 
-def _class_of(message: Any) -> Any:
-    return message.__class__
+def _interface(kind: str, name: str) -> Any:
+    """Return a class of messages, services or actions: of ROS 1 or, if it has none, of ROS 2.
+
+    A name as ROS 2 writes it, `std_srvs/srv/Trigger`, is ROS 2's first.
+    """
+    from actionlib_core import interfaces
+    from actionlib_core.exceptions import InterfaceError
+    from actionlib_core.interfaces import ros2
+
+    first, second = (ros2, interfaces) if name.count("/") > 1 else (interfaces, ros2)
+    try:
+        return getattr(first, f"get_{kind}")(name)
+    except InterfaceError:
+        with contextlib.suppress(InterfaceError):
+            return getattr(second, f"get_{kind}")(name)
+        raise
 
 
 BY_NAME: Final[dict[str, Callable[..., State]]] = {
@@ -329,8 +400,10 @@ BY_NAME: Final[dict[str, Callable[..., State]]] = {
     "compute": compute,
     "drive_to": drive_to,
     "locate": locate,
+    "look_up_transform": look_up_transform,
     "monitor": monitor,
     "nav2_active": nav2_active,
+    "publish": publish,
     "restore_parameters": restore_parameters,
     "service": service,
     "set": set_keys,

@@ -52,6 +52,44 @@ def add_transform(frames: Frames, stamped: TransformStamped, *, static: bool) ->
     frames.add(parent, child, stamped.header.stamp.to_nsec(), transform, static=static)
 
 
+class Transforms:
+    """Follows the transforms on a topic, on the one with `_static` behind its name, and on `/tf`.
+
+    A robot has its own topics, or its transforms are on the one topic for all robots.
+
+    Args:
+        topic: The topic of `tf2_msgs/TFMessage`.
+        node: The node in the robot's namespace.
+        changed: Called after each message, on the network's thread: it must not block.
+
+    Attributes:
+        frames: What is known; only what has come since this was made.
+    """
+
+    def __init__(self, topic: str, node: Node, changed: Callable[[], object]) -> None:
+        self.frames = Frames()
+        self._changed = changed
+        self._ends: list[Subscriber[Any]] = []
+        own = f"/{node.resolve(topic, 'topic name')}"
+        for name in dict.fromkeys(("/tf", own)):
+            for full, static in ((name, False), (f"{name}_static", True)):
+                take = partial(self._take, static=static)
+                self._ends.append(NotingSubscriber(full, TFMessage, take, node=node))
+
+    def close(self) -> None:
+        """Stop following them."""
+        for end in self._ends:
+            end.unregister()
+
+    def _take(self, message: TFMessage, *, static: bool) -> None:
+        for stamped in message.transforms:
+            try:
+                add_transform(self.frames, stamped, static=static)
+            except FrameError:
+                continue  # the transforms that are good still say where the robot is
+        self._changed()
+
+
 class Localiser:
     """Follows the robot's pose in the map frame.
 
@@ -72,24 +110,16 @@ class Localiser:
         changed: Callable[[], object] = lambda: None,
     ) -> None:
         node = get_node() if node is None else node
-        self._frames = Frames()
         self._odometry: Odometry | None = None
         self._changed = changed
-        self._ends: list[Subscriber[Any]] = [
-            NotingSubscriber(topic, Odometry, self._take, node=node)
-        ]
-        # A robot has its transforms beside its odometry, or on the one topic for all robots.
+        self._subscriber = NotingSubscriber(topic, Odometry, self._take, node=node)
         beside = node.resolve(topic, "topic name").rpartition("/")[0]
-        for space in dict.fromkeys(("", beside)):
-            for name, static in (("tf", False), ("tf_static", True)):
-                full = f"/{space}/{name}" if space else f"/{name}"
-                take = partial(self._take_frames, static=static)
-                self._ends.append(NotingSubscriber(full, TFMessage, take, node=node))
+        self._transforms = Transforms(f"/{beside}/tf" if beside else "/tf", node, changed)
 
     def close(self) -> None:
         """Stop following it."""
-        for end in self._ends:
-            end.unregister()
+        self._subscriber.unregister()
+        self._transforms.close()
 
     @property
     def heard(self) -> bool:
@@ -108,7 +138,7 @@ class Localiser:
         if frame in {"", MAP_FRAME}:
             return pose_of(message), ""
         try:
-            there, _ = self._frames.look_up(MAP_FRAME, frame, 0)
+            there, _ = self._transforms.frames.look_up(MAP_FRAME, frame, 0)
         except FrameError:
             return None, (
                 f"the odometry is in frame {frame!r}, and no transform from {MAP_FRAME!r} to it is "
@@ -119,12 +149,4 @@ class Localiser:
 
     def _take(self, message: Odometry) -> None:
         self._odometry = message
-        self._changed()
-
-    def _take_frames(self, message: TFMessage, *, static: bool) -> None:
-        for stamped in message.transforms:
-            try:
-                add_transform(self._frames, stamped, static=static)
-            except FrameError:
-                continue  # the transforms that are good still say where the robot is
         self._changed()

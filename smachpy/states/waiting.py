@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from smachpy.base import log
+from smachpy.base.context import current_path
 from smachpy.base.problems import Problems
 from smachpy.engine.frame import clock_of_run
 from smachpy.engine.preempt import on_preempt
@@ -19,45 +21,67 @@ if TYPE_CHECKING:
 class AwaitMessage(State):
     """Waits for a message that fulfils a condition. Outcomes: 'came', 'timeout', 'preempted'.
 
+    After a timeout the log says how many messages came, and from how many publishers.
+
     Args:
         topic: Name of the topic.
         msg_type: Class of its messages.
         wanted: Called with each message, in the subscriber's thread; a true value ends the wait.
-        timeout: Longest wait [s].
+            What it raises, the state raises. None: any message is wanted.
+        key: The userdata key that gets the message; None: none does.
+        timeout: Longest wait [s]; None: no limit, 0: it looks once.
 
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
     """
 
     def __init__(
-        self, topic: str, msg_type: Any, wanted: Callable[[Any], bool], *, timeout: float
+        self,
+        topic: str,
+        msg_type: Any,
+        wanted: Callable[[Any], bool] | None = None,
+        *,
+        key: str | None = None,
+        timeout: float | None,
     ) -> None:
         problems = Problems(f"AwaitMessage {topic!r}")
         problems.network_name("topic", topic)
         problems.kind_of("msg_type", msg_type, "_slot_types", "a class of messages")
-        problems.function("wanted", wanted, "wanted(message)", 1, optional=False)
-        longest = problems.seconds("timeout", timeout, optional=False)
+        problems.function("wanted", wanted, "wanted(message)", 1)
+        longest = problems.seconds("timeout", timeout)
+        keys = [] if key is None else [problems.word("key", key)]
         problems.raise_all()
-        super().__init__(outcomes=["came", "timeout", "preempted"])
+        super().__init__(outcomes=["came", "timeout", "preempted"], output_keys=keys)
         self.__topic = topic
         self.__msg_type = msg_type
         self.__wanted = wanted
+        self.__key = key
         self.__longest = longest
 
     def execute(self, userdata: UserData) -> str:
         """Wait for the message.
 
+        Raises:
+            TypeMismatchError: no message came, and all publishers have another type.
+
         Blocks: until the message, `timeout` or a preempt.
         """
-        del userdata
-        came: list[bool] = []
         from actionlib_core.pubsub.topic import Subscriber
 
+        came: list[Any] = []
+        errors: list[BaseException] = []
+        count = 0
         wake = clock_of_run().event(f"a message on {self.__topic}")
 
         def on_message(message: Any) -> None:
-            if self.__wanted(message):
-                came.append(True)
+            nonlocal count
+            count += 1
+            try:
+                if self.__wanted is None or self.__wanted(message):
+                    came.append(message)
+            except BaseException as error:  # noqa: BLE001  raised in the state's thread
+                errors.append(error)
+            if came or errors:
                 wake.set()
 
         forget = on_preempt(self, wake.set)
@@ -65,17 +89,31 @@ class AwaitMessage(State):
             subscriber = Subscriber(self.__topic, self.__msg_type, on_message)
             with subscriber, subscriber.telling():
                 wake.wait(self.__longest)
+                publishers, others = subscriber.get_num_connections(), subscriber.mismatches
         finally:
             forget()
+        if errors:
+            raise errors[0]
         if came:
+            if self.__key is not None:
+                userdata[self.__key] = came[0]
             return "came"
-        return "preempted" if self.preempt_requested() else "timeout"
+        if self.preempt_requested():
+            return "preempted"
+        if others and not publishers:
+            raise others[0]
+        log.logwarn(
+            f"{current_path() or 'AwaitMessage'}: topic {subscriber.name}: got {count} messages in "
+            f"{self.__longest:g} s, none that was wanted, {publishers} publishers there; expected "
+            f"a {subscriber.type}."
+        )
+        return "timeout"
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the topic and the limit."""
         _, details = super().describe_details()
-        own = (("topic", self.__topic), ("timeout", f"{self.__longest:g} s -> timeout"))
-        return "monitor", (*own, *details)
+        limit = () if self.__longest is None else (("timeout", f"{self.__longest:g} s -> timeout"),)
+        return "monitor", (("topic", self.__topic), *limit, *details)
 
 
 class Wait(State):

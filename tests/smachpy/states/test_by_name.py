@@ -6,22 +6,32 @@ from typing import Any
 
 import pytest
 
+from actionlib_core.exceptions import InterfaceError
 from smachpy import InvalidStateError, StateMachine
-from smachpy.states.by_name import BY_NAME
+from smachpy.states.by_name import BY_NAME, _interface
 
 GOAL = {"target_pose": {"header": {"frame_id": "map"}}}
 ARGUMENTS: dict[str, list[dict[str, Any]]] = {
     "action": [
         {"name": "move_base", "type": "move_base_msgs/MoveBase", "goal": GOAL},
         {"name": "move_base", "type": "move_base_msgs/MoveBase", "goal_key": "goal"},
+        {"name": "spin", "type": "nav2_msgs/action/Spin", "goal": {"target_yaw": 1.57}},
     ],
     "ask": [{"question": "Go?", "answers": ["a", "b"], "patience": 3}],
-    "await_message": [{"topic": "t", "type": "std_msgs/Bool", "until": "data"}],
+    "await_message": [
+        {"topic": "t", "type": "std_msgs/Bool", "until": "data"},
+        {"topic": "t", "type": "nav2_msgs/SpeedLimit", "key": "limit", "timeout": None},
+    ],
     "compute": [{"index": "index + 1"}],
     "drive_to": [{"x": 1.0, "y": 2.0}, {"place": "home"}],
     "locate": [{}],
+    "look_up_transform": [{"key": "cup", "frame": "cup"}],
     "monitor": [{"topic": "t", "type": "std_msgs/Bool", "valid_while": "data"}],
     "nav2_active": [{"timeout": 5.0}],
+    "publish": [
+        {"topic": "t", "type": "std_msgs/Bool", "message": {"data": True}},
+        {"topic": "t", "type": "std_msgs/Bool", "key": "k", "subscribers": 0},
+    ],
     "restore_parameters": [{}, {"before": "speeds", "timeout": None}],
     "service": [{"name": "s", "type": "std_srvs/SetBool", "request": {"data": True}}],
     "set": [{"a": 1, "b": [2]}],
@@ -60,3 +70,29 @@ def test_compute_reads_and_writes_the_userdata():
 def test_wrong_arguments_are_refused(name, given):
     with pytest.raises(InvalidStateError):
         BY_NAME[name](**given)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "module"),
+    [
+        ("message", "std_msgs/Bool", "actionlib_core.interfaces.std_msgs.msg"),
+        ("message", "std_msgs/msg/Bool", "actionlib_core.interfaces.ros2.std_msgs.msg"),
+        ("service", "std_srvs/Trigger", "actionlib_core.interfaces.std_srvs.srv"),
+        ("service", "std_srvs/srv/Trigger", "actionlib_core.interfaces.ros2.std_srvs.srv"),
+        ("service", "nav2_msgs/LoadMap", "actionlib_core.interfaces.ros2.nav2_msgs.srv"),
+        ("action", "nav2_msgs/Spin", "actionlib_core.interfaces.ros2.nav2_msgs.action"),
+        (
+            "action",
+            "move_base_msgs/action/MoveBase",
+            "actionlib_core.interfaces.move_base_msgs.msg",
+        ),
+    ],
+)
+def test_types_are_those_of_ros_1_or_as_ros_2_writes_them_of_ros_2(kind, name, module):
+    """Files could name no type of ROS 2."""
+    assert _interface(kind, name).__module__ == module
+
+
+def test_a_type_that_neither_has_is_told():
+    with pytest.raises(InterfaceError, match=r"nav_msgs/Odometri.*Did you mean"):
+        _interface("message", "nav_msgs/Odometri")
