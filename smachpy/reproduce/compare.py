@@ -130,6 +130,8 @@ class Difference:
         before: The last steps that are the same, in words.
         recorded, now: What happened then and now, in words.
         recorded_next, now_next: What came after that.
+        later: How much later this run was than the recorded one at the last step that was the same
+            there [s]; negative if it was earlier.
     """
 
     number: int
@@ -140,6 +142,7 @@ class Difference:
     now: str
     recorded_next: tuple[str, ...] = ()
     now_next: tuple[str, ...] = ()
+    later: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,4 +277,5 @@ def _difference(old: list[Step], new: list[Step], at: int, when: float) -> Diffe
         now_next=tuple(
             step.words() for step in new[at + (now is not None and now.words() == now_words) :][:1]
         ),
+        later=new[at - 1].at - old[at - 1].at if at else 0.0,
     )

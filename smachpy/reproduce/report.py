@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 from xml.sax.saxutils import escape, quoteattr
 
@@ -11,6 +11,7 @@ from smachpy.events import span_text
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from smachpy.reproduce.compare import Difference
     from smachpy.reproduce.run import Reproduction
 
 MOST_NOTES: Final = 8
@@ -30,6 +31,9 @@ class Verdict:
         lines: For people.
         same, total: Numbers of events.
         seconds: How long it took [s].
+        difference: The first one; None if there is none.
+        changed: What has changed in machine, constants and files, in words.
+        notes: What was lacking, in words.
     """
 
     path: str
@@ -38,6 +42,9 @@ class Verdict:
     same: int = 0
     total: int = 0
     seconds: float = 0.0
+    difference: Difference | None = None
+    changed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return it for programs."""
@@ -48,6 +55,9 @@ class Verdict:
             "events": self.total,
             "seconds": round(self.seconds, 3),
             "text": list(self.lines),
+            "difference": None if self.difference is None else asdict(self.difference),
+            "changed": list(self.changed),
+            "notes": list(self.notes),
         }
 
 
@@ -66,13 +76,13 @@ def lines_of(found: Reproduction) -> tuple[str, ...]:
     lines += [f"            {step}" for step in difference.recorded_next]
     lines.append(f"  now       {difference.now}")
     lines += [f"            {step}" for step in difference.now_next]
-    lines += [f"  changed: {text}" for text in _nearest(found.changed, difference.path)]
+    lines += [f"  changed: {text}" for text in nearest(found.changed, difference.path)]
     return tuple(
         line if len(line) <= LONGEST else f"{line[:LONGEST]}…" for line in (*lines, *notes)
     )
 
 
-def _nearest(changed: Iterable[str], path: str) -> list[str]:
+def nearest(changed: Iterable[str], path: str) -> list[str]:
     """Return the changes, those of the state and of what it is in first."""
     return sorted(
         changed, key=lambda text: not (text.startswith("/") and path.startswith(text.split(":")[0]))

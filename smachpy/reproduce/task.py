@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from actionlib_core.clock import RealClock
 from smachpy.events.recording import read_recording
 from smachpy.exceptions import SmachError
-from smachpy.reproduce.report import Verdict, lines_of
+from smachpy.reproduce.report import Verdict, lines_of, nearest
 from smachpy.reproduce.run import reproduce
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from smachpy.reproduce.run import Reproduction
 
@@ -30,8 +30,16 @@ class Options:
     tolerate: tuple[str, ...] = ()
 
 
-def reproduce_file(path: str, options: Options) -> Verdict:
-    """Reproduce a file; a file that cannot be is a verdict, too."""
+def reproduce_file(
+    path: str, options: Options, keep: Callable[[Reproduction], object] = lambda _found: None
+) -> Verdict:
+    """Reproduce a file; a file that cannot be is a verdict, too.
+
+    Args:
+        path: The file.
+        options: How.
+        keep: Gets what was found.
+    """
     started = RealClock().now()
     try:
         found = run_file(path, options)
@@ -39,10 +47,18 @@ def reproduce_file(path: str, options: Options) -> Verdict:
         took = RealClock().now() - started
         text = str(error)
         return Verdict(path, "failed", (text if path in text else f"{path}: {text}",), seconds=took)
-    kind = "same" if found.is_same else "differs"
-    comparison = found.comparison
+    keep(found)
+    comparison, difference = found.comparison, found.comparison.difference
     return Verdict(
-        path, kind, lines_of(found), comparison.same, comparison.total, RealClock().now() - started
+        path,
+        "same" if difference is None else "differs",
+        lines_of(found),
+        comparison.same,
+        comparison.total,
+        RealClock().now() - started,
+        difference,
+        () if difference is None else tuple(nearest(found.changed, difference.path)),
+        found.notes,
     )
 
 

@@ -617,3 +617,26 @@ def test_what_is_broken_in_the_inputs_is_left_out(night):
     found = reproduce(recording, allow=[path.parent])
     assert found.comparison.total == 15
     assert f"{len(recording.wrong)} record(s) are left out: {recording.wrong[0]}" in found.notes
+
+
+def test_the_new_run_is_recorded_and_programs_learn_where_the_two_part(night, tmp_path, capsys):
+    file, path = night
+    file.write_text(file.read_text().replace("0.30", "0.25"))
+    today = tmp_path / "today.jsonl"
+    words = ["runs", "reproduce", str(path), f"--allow={path.parent}", "--record", str(today)]
+    assert main([*words, "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["difference"]["path"] == "/ROUND/VISIT/WATCH"
+    assert told["difference"]["now"] == "VISIT/WATCH  goes on"
+    assert told["difference"]["later"] == pytest.approx(0.0, abs=0.01)
+    assert any("0.25" in text for text in told["changed"])
+    new, old = read_recording(today), read_recording(path)
+    assert new.record.label == "ROUND"
+    assert [event["kind"] for event in new.events[:5]] == [e["kind"] for e in old.events[:5]]
+    assert new.events != old.events
+    assert main(words) == 2  # a recording is never overwritten
+    assert "cannot write: File exists" in capsys.readouterr().err
+    for more in (["-o", "test_x.py"], []):
+        places = [str(path)] if more else [str(path), str(today)]
+        assert main([*words[:2], *places, *words[3:], *more]) == 2
+        assert "--record: got" in capsys.readouterr().err

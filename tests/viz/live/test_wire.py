@@ -159,6 +159,7 @@ def read_messages(machines, names, lasts=(), *, parts=2, actions=None, between=N
         )
     ]
     settings = {"follow": False, "control": False, "beat": 2.0, "kept": 9, "home": False}
+    settings["reproduces"] = False
 
     async def read():
         stream = Stream(machines, followed, settings, actions)

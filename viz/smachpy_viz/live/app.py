@@ -20,6 +20,8 @@
     GET  /api/simulations     the missions that may be simulated, and the batches
     GET  /api/report          the report of a batch, a page
     POST /api/simulate        start or stop a batch
+    POST /api/reproduce       reproduce a recorded run, write a test of it, or stop that
+    GET  /api/reproduction    what a reproduction has found
     GET  /api/action          the data for a goal's form
     POST /api/action          check, send or cancel a goal
     GET  /api/goals           the running goals of an action's server, whoever sent them
@@ -53,6 +55,7 @@ from smachpy_viz.live.answers import (
 from smachpy_viz.live.command_routes import CommandRoutes
 from smachpy_viz.live.machine_routes import MachineRoutes
 from smachpy_viz.live.machines import MAX_KEPT_EVENTS
+from smachpy_viz.live.reproduction_routes import ReproductionRoutes
 from smachpy_viz.live.run_routes import RunRoutes
 from smachpy_viz.live.runs import Runs
 from smachpy_viz.live.security import Access, Guard
@@ -66,6 +69,7 @@ if TYPE_CHECKING:
     from smachpy.events.introspection import StateRecord
     from smachpy_viz.live.actions import Actions
     from smachpy_viz.live.machines import Machines
+    from smachpy_viz.live.reproductions import Reproductions
     from smachpy_viz.live.simulations import Simulations
     from smachpy_viz.live.wire import Settings
 
@@ -85,6 +89,7 @@ class Viewer:
         runs: The runs for the home page; by default those of `machines`.
         home: Whether pages begin with the list of runs, unless they name a machine.
         simulations: The batches of simulated runs; None for none.
+        reproductions: Reproduces runs; None for none.
         value: Reads the value of a userdata key, by machine, container and key; blocks.
         picture: Reads the picture of a question, by machine and path; returns media type and bytes,
             or None; blocks.
@@ -106,6 +111,7 @@ class Viewer:
         runs: Runs | None = None,
         home: bool = False,
         simulations: Simulations | None = None,
+        reproductions: Reproductions | None = None,
     ) -> None:
         self._access = access = Access(token, read_token)
         settings: Settings = {
@@ -114,6 +120,7 @@ class Viewer:
             "beat": BEAT_S,
             "kept": MAX_KEPT_EVENTS,
             "home": home,
+            "reproduces": token is not None and reproductions is not None,
         }
         self._streams = Streams(machines, dict(settings), actions, access)
         runs = Runs(machines) if runs is None else runs
@@ -125,6 +132,7 @@ class Viewer:
                 *self._streams.routes,
                 *MachineRoutes(machines, statistics, value, picture).routes,
                 *RunRoutes(runs, simulations, access).routes,
+                *ReproductionRoutes(reproductions, access).routes,
                 *CommandRoutes(send, actions, access, machines.sender_of).routes,
                 Route("/{name:path}", self._file),  # last: it matches every path
             ],

@@ -116,7 +116,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="each hour, delete recordings in these folders that are so old: 30d, 12h",
     )
     add_keep(parser, "recordings")
-    add_allow(parser, "Resume may run missions of this place, too")
+    add_allow(parser, "Resume and Reproduce may run missions of this place, too")
     add_ros2_options(parser)
     parser.add_argument("--tui", action="store_true", help="show it in this terminal instead")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
@@ -177,6 +177,7 @@ def _serve(
     from smachpy.command.runs_folder import runs_folder
     from smachpy_viz.live.app import Viewer
     from smachpy_viz.live.journals import Journals
+    from smachpy_viz.live.reproductions import Reproductions
     from smachpy_viz.live.runs import Runs
     from smachpy_viz.live.security import make_token
     from smachpy_viz.live.server import PageServer
@@ -189,6 +190,8 @@ def _serve(
     journals = Journals(args.durable, Path(JOURNAL), folder.parent / "resumed", args.allow)
     simulations = Simulations(folder.parent / "simulated", args.mission)
     folders = [folder, *(Path(place) for place in args.runs)]
+    listed = Runs(machines, folders, journals)
+    reproductions = Reproductions(machines, listed.file_of, args.allow)
     viewer = Viewer(
         machines,
         token=token,
@@ -200,9 +203,10 @@ def _serve(
         actions=actions,
         value=network.value,
         picture=network.picture,
-        runs=Runs(machines, folders, journals),
+        runs=listed,
         home=not args.child and not args.files,
         simulations=simulations,
+        reproductions=reproductions,
     )
     # The server already listens when the address is printed, so it can be opened at once.
     server = PageServer(viewer, args.host, args.port)
@@ -219,6 +223,7 @@ def _serve(
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.closing(journals))
         stack.enter_context(contextlib.closing(simulations))
+        stack.enter_context(contextlib.closing(reproductions))
         if args.prune is not None:
             on_text = partial(tell, "smachpy view")
             pruning = Pruning(folders, args.prune, args.keep, on_text)

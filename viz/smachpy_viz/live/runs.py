@@ -37,6 +37,10 @@ MAX_GOALS: Final = 100
 SAME_NS: Final = 5_000_000
 """Runs of one machine that began within this time are one run, live and in a file."""
 
+AGAIN: Final = ", again "
+"""In the names of machines that show a reproduced run, before its number: they are in no list of
+runs, and no name on a network has it."""
+
 LARGEST: Final = 200_000_000
 """Largest recording that is read [bytes]."""
 
@@ -80,7 +84,7 @@ class Runs:
             rows = [
                 self._row_of(name)
                 for name in (one["name"] for one in self._machines.summaries())
-                if name not in self._opened
+                if name not in self._opened and AGAIN not in name
             ]
             files = self._files()
             # Reading a recording takes long: rows of unchanged files are kept, others dropped.
@@ -172,6 +176,22 @@ class Runs:
                 del self._opened[oldest]
                 self._machines.forget(oldest)
         return machine.name
+
+    def file_of(self, name: str) -> Path | None:
+        """Return the recording of a machine's newest run; None without one.
+
+        Args:
+            name: A machine's name.
+        """
+        machine = self._machines.get(name)
+        if machine is None or machine.record is None or AGAIN in name:
+            return None
+        if machine.file:
+            return Path(machine.file).absolute()
+        row = self._row_of(name)
+        with self._lock:
+            recorded = map(self._row_of_file, self._files())
+            return next((Path(one["file"]) for one in recorded if _is_same(one, row)), None)
 
     def _files(self) -> list[Path]:
         found: list[tuple[int, Path]] = []

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import re
 import signal
-import subprocess
 import threading
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -18,13 +16,20 @@ from actionlib_core.inputs.checked_data import checked
 from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.inputs.json_text import load_json
 from actionlib_core.process.private_files import FOLDER, make_private_folder, open_private
-from actionlib_core.shutdown.child_process import python_command
 from smachpy.command import EXIT_ERROR
 from smachpy.command.targets import list_missions
 from smachpy.exceptions import SmachError
+from smachpy_viz.live.started_commands import (
+    STOP_S,
+    end_all,
+    last_line,
+    send_signal,
+    start_command,
+)
 from smachpy_viz.runs.simulate import Vary
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Iterable
 
 MAX_RUNS: Final = 1_000
@@ -35,15 +40,9 @@ MAX_BATCHES: Final = 50
 """Batches that are listed: the newest ones."""
 
 MAX_VARIED_PARAMETERS: Final = 8
-STOP_S: Final = 5.0
-"""Time after an interrupt until a batch is killed [s]."""
-
 _ID = re.compile(r"[\w-][\w.-]{0,119}", re.ASCII)
 _LIMIT = re.compile(r"\d{1,9}(\.\d{1,3})?[smh]?", re.ASCII)
 LARGEST_FACTS: Final = 1_000_000
-MAX_END_LENGTH: Final = 10_000
-"""End of the error output of a batch that is looked at [bytes]."""
-
 _FACTS = "batch.json"
 _ERRORS = "errors.txt"
 _REPORT = "report.html"
@@ -154,17 +153,7 @@ class Simulations:
             except OSError as error:
                 raise SimulationError(f"{str(folder)!r}: {error.strerror or error}.") from error
             with errors:
-                process = subprocess.Popen(  # noqa: S603  our own command
-                    python_command("-m", "smachpy.command", *self._words(batch, folder)),
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.PIPE,
-                    stderr=errors,
-                    # A group of its own: signals reach the command and its worker processes.
-                    start_new_session=True,
-                    text=True,
-                    encoding="utf-8",
-                    errors="replace",
-                )
+                process = start_command(self._words(batch, folder), errors)
             self._batches[batch.id] = batch
             self._processes[batch.id] = process
         self._tasks.append(
@@ -183,7 +172,7 @@ class Simulations:
             if process is None:
                 raise SimulationError(f"batch: got {name!r}; expected a running one.")
             self._stopped.add(str(name))
-        _signal(process, signal.SIGINT)
+        send_signal(process, signal.SIGINT)
         self._clock.call_later(STOP_S, lambda: self._kill(name, process))
 
     def report(self, name: str) -> bytes:
@@ -205,13 +194,7 @@ class Simulations:
         """
         with self._lock:
             processes, tasks = list(self._processes.values()), list(self._tasks)
-        for process in processes:
-            _signal(process, signal.SIGINT)
-        for process in processes:
-            try:
-                process.wait(STOP_S)
-            except subprocess.TimeoutExpired:
-                _signal(process, signal.SIGKILL)
+        end_all(processes)
         for task in tasks:
             task.join(STOP_S)
 
@@ -224,7 +207,7 @@ class Simulations:
         """
         with self._lock:
             if self._processes.get(str(name)) is process:
-                _signal(process, signal.SIGKILL)
+                send_signal(process, signal.SIGKILL)
 
     def _checked(self, asked: dict[str, Any]) -> Batch:
         """Return the batch that a page asks for; the page's data may be of any type."""
@@ -286,7 +269,7 @@ class Simulations:
             if not (folder / _REPORT).is_file():
                 # The exit code alone is ambiguous: an interrupt while Python starts gives 1.
                 stopped = batch.id in self._stopped or code not in {0, 1, EXIT_ERROR}
-                batch.problem = "it was stopped" if stopped else _last_line(folder / _ERRORS)
+                batch.problem = "it was stopped" if stopped else last_line(folder / _ERRORS)
             with contextlib.suppress(OSError):
                 _write(folder, batch)
 
@@ -298,12 +281,6 @@ class Simulations:
                 return
             batch.failed += 1
             batch.first_failure = batch.first_failure or f"run {run['run']}: {run['error']}"
-
-
-def _signal(process: subprocess.Popen[str], number: int) -> None:
-    """Send a signal to a process and its group, which it leads."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, number)
 
 
 def _write(folder: Path, batch: Batch) -> None:
@@ -322,15 +299,3 @@ def _read(path: Path) -> Batch | None:
     if batch.running:
         batch.running, batch.problem = False, "the viewer ended before the batch"
     return batch
-
-
-def _last_line(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            file.seek(max(0, path.stat().st_size - MAX_END_LENGTH))
-            text = file.read(MAX_END_LENGTH).decode("utf-8", "replace")
-    except OSError:
-        text = ""
-    # The address of an error's description follows it.
-    lines = [line for line in text.split("\n") if line.strip() and not line.startswith("More: ")]
-    return lines[-1].removeprefix("smachpy: ") if lines else "it ended without an error message"

@@ -50,7 +50,7 @@ class Settings(TypedDict):
 
     follow: pages follow the active states from the start. control: commands are accepted, with the
     token. beat: longest time between two beats [s]. kept: events of a live machine that the server
-    keeps. home: pages begin with the list of runs.
+    keeps. home: pages begin with the list of runs. reproduces: recorded runs can be reproduced.
     """
 
     follow: bool
@@ -58,6 +58,7 @@ class Settings(TypedDict):
     beat: float
     kept: int
     home: bool
+    reproduces: bool
 
 
 class MachineFacts(TypedDict):
@@ -323,6 +324,50 @@ class BatchStarted(TypedDict):
     batch: str
 
 
+class RunDifference(TypedDict):
+    """Where a reproduced run first differs (`smachpy.reproduce.compare.Difference`); times in s."""
+
+    number: int
+    at: float
+    path: str
+    before: list[str]
+    recorded: str
+    now: str
+    recorded_next: list[str]
+    now_next: list[str]
+    later: float
+
+
+class Found(TypedDict):
+    """What a reproduction has found (`smachpy_viz.live.reproductions.Found`)."""
+
+    kind: Literal["same", "differs", "failed", "test"]
+    text: list[str]
+    same: int
+    events: int
+    difference: RunDifference | None
+    changed: list[str]
+    notes: list[str]
+    machine: str
+    test: str
+    file: str
+
+
+class Reproduction(TypedDict):
+    """A reproduction; `found` is null while it runs, and where there is a problem."""
+
+    running: bool
+    problem: str
+    found: Found | None
+
+
+class ReproductionStarted(TypedDict):
+    """The reproduction that was started."""
+
+    ok: Literal[True]
+    id: str
+
+
 class WholeValue(TypedDict):
     """A userdata value, unabridged."""
 
@@ -455,12 +500,14 @@ ANSWERS: dict[str, Any] = {
     "GET /api/fleet": FleetPage,
     "GET /api/open": Opened,
     "GET /api/simulations": SimulationList,
+    "GET /api/reproduction": Reproduction,
     "GET /api/action": GoalForm,
     "GET /api/goals": list[ServerGoal],
     "POST /api/control": Done,
     "POST /api/action": CheckedGoal | GoalAccepted | Done,
     "POST /api/simulate": BatchStarted | Done,
     "POST /api/mission": Done,
+    "POST /api/reproduce": ReproductionStarted | Done,
 }
 """What each route answers, unless it fails; the others answer with files."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from smachpy.reproduce.report import Verdict
+    from smachpy.reproduce.run import Reproduction
     from smachpy.reproduce.task import Options
 
 EXAMPLES = """examples:
   smachpy runs reproduce incident.jsonl                       is it the same with today's code?
   smachpy runs reproduce incident.jsonl --tolerate started_at --tolerate CHARGE
+  smachpy runs reproduce incident.jsonl --record today.jsonl  to look at beside the recorded one
   smachpy runs reproduce incident.jsonl -o test_incident.py   write a test
   smachpy runs reproduce incident.jsonl -o test_incident.py --expect succeeded
   smachpy runs reproduce night/ --junit report.xml            in continuous integration
@@ -60,6 +63,9 @@ def add(actions: Any) -> None:
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write a report for CI")
     parser.add_argument("--json", action="store_true", help="one JSON object per recording")
     parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="record the new run in this file"
+    )
+    parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="write a test of the run: test_NAME.py"
     )
     parser.add_argument(
@@ -77,6 +83,8 @@ def _write(args: argparse.Namespace) -> int:
     from smachpy.reproduce.written import write_test
 
     where = "smachpy runs reproduce: -o"
+    if args.record is not None:
+        raise UsageError("smachpy runs reproduce: --record: got it with -o; expected one.")
     if len(args.places) != 1 or Path(args.places[0]).is_dir():
         raise UsageError(f"{where}: got {len(args.places)} places; expected one recording.")
     if args.output.suffix != ".py":
@@ -120,7 +128,7 @@ def _run(args: argparse.Namespace) -> int:
         )
     options = Options(args.mission, tuple(args.allow), args.seed, tuple(args.tolerate))
     verdicts = []
-    for verdict in _verdicts(paths, options, args.jobs or os.cpu_count() or 1):
+    for verdict in _verdicts(paths, options, args.jobs or os.cpu_count() or 1, args.record):
         verdicts.append(verdict)
         _show(verdict, many=len(paths) > 1, as_json=args.json)
     if len(paths) > 1 and not args.json:
@@ -137,6 +145,24 @@ def _run(args: argparse.Namespace) -> int:
     return 2 if "failed" in kinds else 1 if "differs" in kinds else 0
 
 
+def _record(path: Path | None, found: Reproduction) -> None:
+    """Write the new run to a file that must not exist; None: nowhere."""
+    if path is None:
+        return
+    from actionlib_core.process.private_files import open_private
+    from smachpy.events.recording import recording_lines
+
+    assert found.record is not None
+    try:
+        with open_private(path, "x") as file:
+            file.writelines(recording_lines(found.record, found.events, None))
+    except OSError as error:
+        raise UsageError(
+            f"smachpy runs reproduce: --record {str(path)!r}: cannot write: "
+            f"{error.strerror or error}."
+        ) from error
+
+
 def _show(verdict: Verdict, *, many: bool, as_json: bool) -> None:
     if as_json:
         print(json.dumps(verdict.to_json()))
@@ -146,14 +172,20 @@ def _show(verdict: Verdict, *, many: bool, as_json: bool) -> None:
         print(printable(line if number else f"{head}{line}"))
 
 
-def _verdicts(paths: list[str], options: Options, jobs: int) -> Iterator[Verdict]:
+def _verdicts(
+    paths: list[str], options: Options, jobs: int, record: Path | None
+) -> Iterator[Verdict]:
     """Yield the verdicts in the order of the files, whatever the number of processes."""
     from smachpy.reproduce.report import Verdict
     from smachpy.reproduce.task import reproduce_file
 
     if len(paths) == 1:
-        yield reproduce_file(paths[0], options)
+        yield reproduce_file(paths[0], options, partial(_record, record))
         return
+    if record is not None:
+        raise UsageError(
+            f"smachpy runs reproduce: --record: got {len(paths)} recordings; expected one."
+        )
     from smachpy_viz.runs.workers import WorkerError, Workers
 
     workers = Workers(min(jobs, len(paths)))

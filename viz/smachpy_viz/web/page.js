@@ -1185,12 +1185,12 @@ var Hub = class {
     port.postMessage({ event: "standing", standing: this.#standing });
   }
   #tellAll(message) {
-    for (const [port, { follow: follow2 }] of this.#pages) if (follow2) port.postMessage(message);
+    for (const [port, { follow: follow3 }] of this.#pages) if (follow3) port.postMessage(message);
   }
   /** The pages that are to get the events of their machine. */
   get #looking() {
     for (const [port, { heard }] of this.#pages) if (Date.now() - heard > GONE_MS) this.#pages.delete(port);
-    return [...this.#pages.values()].filter(({ follow: follow2 }) => follow2 && !follow2.hidden);
+    return [...this.#pages.values()].filter(({ follow: follow3 }) => follow3 && !follow3.hidden);
   }
   /** Open a stream for what the pages follow now, in a moment. @param pause [ms] */
   #open(pause, anyway = false) {
@@ -1211,7 +1211,7 @@ var Hub = class {
     if (!looking.length && (!this.isShared || !this.#pages.size)) return;
     const words2 = ["actions=1"];
     for (const name of names) {
-      const of = looking.filter(({ follows }) => follows === name).map(({ follow: follow2 }) => follow2);
+      const of = looking.filter(({ follows }) => follows === name).map(({ follow: follow3 }) => follow3);
       const last = of.map((one) => one.last).reduce(older);
       words2.push(`machine=${encoded(name)}`, `last=${encoded(last)}`);
       words2.push(`seen=${last ? of.reduce((least, one) => Math.min(least, one.seen), Infinity) : -1}`);
@@ -1247,8 +1247,8 @@ var Hub = class {
     const words2 = id.split(" ");
     if (!id || words2.length !== this.#names.length) return;
     for (const [i4, name] of this.#names.entries()) this.#lasts.set(name, decodeURIComponent(words2[i4]));
-    for (const { follow: follow2, follows, hasAll } of this.#looking)
-      if (follow2 && hasAll) follow2.last = this.#lasts.get(follows) ?? follow2.last;
+    for (const { follow: follow3, follows, hasAll } of this.#looking)
+      if (follow3 && hasAll) follow3.last = this.#lasts.get(follows) ?? follow3.last;
   }
   #pass(event, text2) {
     const message = { event, text: text2 };
@@ -1913,8 +1913,8 @@ var Run = class {
     return this.begun ?? (this.events.length ? timeOf(this.events[0]) : null);
   }
   last() {
-    const newest2 = this.events.at(-1);
-    return newest2 ? timeOf(newest2) : this.begun;
+    const newest3 = this.events.at(-1);
+    return newest3 ? timeOf(newest3) : this.begun;
   }
   /** The number of events up to and including the instant t [ms]. */
   indexAt(t4) {
@@ -2403,7 +2403,14 @@ var Data = class {
   connection = y3("connecting");
   problem = y3("");
   // why the server refuses this page a stream
-  settings = y3({ follow: false, control: false, beat: 0, kept: 0, home: false });
+  settings = y3({
+    follow: false,
+    control: false,
+    beat: 0,
+    kept: 0,
+    home: false,
+    reproduces: false
+  });
   machines = y3([]);
   wanted = y3("");
   // name of the machine to show
@@ -3149,11 +3156,11 @@ var Status = class {
     const isWithin = (path, top) => `${path}/`.startsWith(`${top}/`);
     const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered);
     const end = innermost(inside, ([path]) => path);
-    const newest2 = end.reduce((a5, b3) => {
+    const newest3 = end.reduce((a5, b3) => {
       const later = (b3[1].left ?? 0) - (a5[1].left ?? 0);
       return later > 0 || later === 0 && depth(b3[0]) > depth(a5[0]) ? b3 : a5;
     });
-    return [newest2[0]];
+    return [newest3[0]];
   });
   runStatus = O(() => {
     this.#playback.tick.value;
@@ -3484,8 +3491,8 @@ var View = class {
   }
   /** Open the containers around a state; returns false if all are open. */
   reveal(path) {
-    const around2 = this.#data.model.value?.ancestors(path) ?? [];
-    const closed = around2.filter((node) => !this.opened.value.has(node.path));
+    const around3 = this.#data.model.value?.ancestors(path) ?? [];
+    const closed = around3.filter((node) => !this.opened.value.has(node.path));
     if (closed.length) this.setOpened(/* @__PURE__ */ new Set([...this.opened.value, ...closed.map((node) => node.path)]));
     return closed.length > 0;
   }
@@ -4019,6 +4026,146 @@ function endsText(within3) {
     running.length ? `Running: ${running.join(", ")}${more(leaves.length)}.` : "No state runs.",
     targets.length ? `Cancels the goal${targets.length > 1 ? "s" : ""} ${targets.join("; ")}${more(sentGoals.length)}.` : ""
   ].filter(Boolean);
+}
+
+// src/core/two_runs.ts
+var BEFORE_S = 30;
+var AFTER_S = 60;
+var NEAR_S = 2e-3;
+function beginOf(run) {
+  const started = run.events.find((e4) => e4.kind === "Started");
+  return started ? started.stamp_ns / 1e6 : run.first() ?? 0;
+}
+function twoRuns({ recorded, now, model }, difference, aligned2) {
+  const at = difference?.at ?? 0;
+  const zero = aligned2 ? at : 0;
+  const sides = [
+    { run: recorded, zero, differs: at },
+    { run: now, zero: zero + (aligned2 ? difference?.later ?? 0 : 0), differs: at + (difference?.later ?? 0) }
+  ].map((side) => lanesOf(side, model, difference?.path ?? null));
+  const order = new Map(model.order.map(({ path }, i4) => [path, i4]));
+  const paths = [...new Set(sides.flatMap((lanes) => [...lanes.keys()]))];
+  paths.sort((a5, b3) => (order.get(a5) ?? Infinity) - (order.get(b3) ?? Infinity));
+  const nameOf2 = (path) => model.get(path)?.name ?? path.slice(path.lastIndexOf("/") + 1);
+  const [old, today] = sides.map(
+    (lanes) => paths.map((path) => ({ path, name: nameOf2(path), bars: lanes.get(path) ?? [] }))
+  );
+  const bars2 = [...old, ...today].flatMap((lane) => lane.bars);
+  return {
+    names: paths.map((path) => [path, nameOf2(path)]),
+    recorded: old,
+    now: today,
+    from: Math.min(0, ...bars2.map((bar) => bar.from)),
+    to: Math.max(1, ...bars2.map((bar) => bar.to))
+  };
+}
+function around({ from, to }, zero) {
+  return { from: Math.max(from, zero - BEFORE_S), to: Math.min(to, zero + AFTER_S) };
+}
+function lanesOf({ run, zero, differs }, model, path) {
+  const began = beginOf(run);
+  const last = run.last() ?? began;
+  const seconds = (t4) => (t4 - began) / 1e3 - zero;
+  const different = path === null ? null : visitAt(run.spans, path, began + 1e3 * (differs + NEAR_S));
+  const lanes = /* @__PURE__ */ new Map();
+  for (const span of run.spans) {
+    const above = span.path.slice(0, span.path.lastIndexOf("/"));
+    if (!above) continue;
+    const isBranch = model.get(above)?.kind === "concurrence";
+    const lane = isBranch ? span.path : above;
+    const bars2 = lanes.get(lane) ?? [];
+    lanes.set(lane, bars2);
+    const node = model.get(span.path);
+    bars2.push({
+      path: span.path,
+      name: node?.name ?? span.path.slice(above.length + 1),
+      from: seconds(span.from),
+      to: seconds(span.to ?? last),
+      at: span.from,
+      kind: span.to === null ? "active" : endClass(node, span.outcome),
+      differs: span === different
+    });
+  }
+  return lanes;
+}
+var visitAt = (spans, path, t4) => spans.findLast((one) => one.path === path && one.from <= t4) ?? null;
+
+// src/core/reproduction.ts
+var POLL_MS = 400;
+var AGAIN = ", again ";
+var newest2 = y3(null);
+var twoRunsShown = y3(false);
+function reproduction() {
+  const one = newest2.value;
+  return one && one.epoch === store.data.facts.value?.epoch ? one : null;
+}
+function canReproduce() {
+  store.playback.tick.value;
+  const facts = store.data.facts.value;
+  if (!facts || isFile() || !hasToken() || !store.data.settings.value.reproduces) return false;
+  if (facts.name.includes(AGAIN)) return false;
+  return store.data.run.now.started != null && (store.data.run.now.ended != null || facts.recorded || facts.stale != null);
+}
+async function reproduce(what, expect = "") {
+  const { name = "", epoch: epoch2 = "" } = store.data.facts.value ?? {};
+  const asked2 = { command: "start", machine: name, what, expect };
+  const answer = await post("/api/reproduce", asked2);
+  if (isFailure(answer)) {
+    if (!answer.wants_token) store.view.notify(`Reproduce: ${answer.text}`, "error");
+    return;
+  }
+  const mine = { id: answer.id, what, epoch: epoch2, problem: "", found: null, now: null };
+  newest2.value = mine;
+  twoRunsShown.value = false;
+  store.view.part.value = "log";
+  await follow2(mine);
+}
+async function follow2(mine) {
+  for (; ; ) {
+    const answer = await ask(`/api/reproduction?id=${encoded2(mine.id)}`);
+    if (newest2.value?.id !== mine.id) return;
+    if (isFailure(answer) || !answer.running) {
+      const problem = isFailure(answer) ? answer.text : answer.problem;
+      const found = isFailure(answer) ? null : answer.found;
+      const now = found?.machine ? await runOf(found.machine) : null;
+      if (newest2.value?.id !== mine.id) return;
+      newest2.value = { ...mine, problem, found, now };
+      twoRunsShown.value = found?.kind === "differs" && now !== null;
+      return;
+    }
+    await new Promise((done) => setTimeout(done, POLL_MS));
+  }
+}
+async function runOf(machine) {
+  try {
+    const answer = await fetch(link("export", "&format=jsonl", machine));
+    const lines = (await answer.text()).split("\n").slice(1).filter(Boolean);
+    const records = lines.map((line) => JSON.parse(line));
+    return answer.ok ? new Run(
+      null,
+      records.filter(({ path }) => path)
+    ) : null;
+  } catch (error) {
+    store.view.notify(`Today's run: ${error}`, "error");
+    return null;
+  }
+}
+var stopReproduction = (id) => post("/api/reproduce", { command: "stop", id });
+function closeReproduction() {
+  newest2.value = null;
+  twoRunsShown.value = false;
+}
+function differenceAt() {
+  const { found, now } = reproduction() ?? {};
+  return found?.difference && now ? beginOf(store.data.run) + 1e3 * found.difference.at : null;
+}
+function seekDifference() {
+  const at = differenceAt();
+  if (at !== null) store.playback.seek(at);
+}
+function pins() {
+  const at = differenceAt();
+  return at === null ? store.notes.all.value : [...store.notes.all.value, { at, text: "≠ differs from today" }];
 }
 
 // src/core/statistics.ts
@@ -4621,8 +4768,8 @@ var Diagram = class {
       const share = found.reduce((sum, one) => sum + one.share, 0);
       line.style.strokeWidth = count ? `${Math.min(4, 1.2 + Math.log2(1 + count) * 0.6)}px` : "";
       line.classList.toggle("never", Boolean(countOf2) && !count);
-      const percent = share && share < 0.995 ? ` ${Math.round(share * 100)}%` : "";
-      if (text2) text2.textContent = count ? `×${count}${percent}` : note;
+      const percent2 = share && share < 0.995 ? ` ${Math.round(share * 100)}%` : "";
+      if (text2) text2.textContent = count ? `×${count}${percent2}` : note;
     }
     for (const [path, { frame, group }] of this.states) {
       if (group.classList.contains("box")) continue;
@@ -4712,7 +4859,7 @@ function containersToOpen(now) {
   const states2 = store.playback.shown().states;
   const open = /* @__PURE__ */ new Set([model.root.path]);
   const ended = store.status.activePaths.value.length === 0;
-  for (const path of ended ? store.status.lastLeaves.value.flatMap(around) : store.status.activePaths.value) {
+  for (const path of ended ? store.status.lastLeaves.value.flatMap(around2) : store.status.activePaths.value) {
     const since = ended ? 0 : states2[path]?.since;
     const node = model.get(path);
     if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
@@ -4724,7 +4871,7 @@ function containersToOpen(now) {
   rearrangedAt = moment;
   return open;
 }
-var around = (path) => store.data.model.value?.ancestors(path).map((node) => node.path) ?? [];
+var around2 = (path) => store.data.model.value?.ancestors(path).map((node) => node.path) ?? [];
 function restart() {
   lastOpen = "";
   rearrangedAt = -Infinity;
@@ -4764,8 +4911,8 @@ function boxToFrame(diagram, view2, whole2) {
   }
   if (view2.scaleFor(active) >= READABLE2) return atLeast(active, view2);
   const states2 = store.playback.shown().states;
-  const newest2 = leaves.reduce((a5, b3) => (states2[b3]?.since ?? 0) > (states2[a5]?.since ?? 0) ? b3 : a5);
-  const at = boxOfOne(diagram, newest2) ?? active;
+  const newest3 = leaves.reduce((a5, b3) => (states2[b3]?.since ?? 0) > (states2[a5]?.since ?? 0) ? b3 : a5);
+  const at = boxOfOne(diagram, newest3) ?? active;
   const [w5, h5] = [view2.width / READABLE2, view2.height / READABLE2];
   return { x: at.x + at.w / 2 - w5 / 2, y: at.y + at.h / 2 - h5 / 2, w: w5, h: h5 };
 }
@@ -6533,7 +6680,7 @@ var Timeline = class {
   /** Draw a pin at each note, with its text. */
   #notes(x3, width, height) {
     const g5 = this.context;
-    for (const { at, text: text2 } of store.notes.all.value) {
+    for (const { at, text: text2 } of pins()) {
       const px = x3(at);
       if (px < this.names || px > width - RIGHT2) continue;
       g5.fillStyle = this.#colours.of("ink");
@@ -7025,6 +7172,12 @@ var Page = class {
     store.data.serversSeen.subscribe(() => this.paintAll());
     store.data.facts.subscribe(() => this.paintAll());
     store.data.wayShown.subscribe(() => this.#showWay());
+    newest2.subscribe(() => {
+      const path = reproduction()?.found?.difference?.path;
+      if (path && store.view.reveal(path)) this.relayout({ frame: true });
+      this.paintAll();
+      this.timeline.draw();
+    });
   }
   /** Begin; the elements must be in the document, so that the browser loads their fonts. */
   async start() {
@@ -7187,9 +7340,9 @@ var Page = class {
     if (moment - this.textAt > TEXT_MS) {
       this.textAt = moment;
       store.playback.slowTick.value += 1;
-      const newest2 = store.data.run.events.at(-1)?.seq ?? 0;
-      const isBusy = newest2 - this.newestSeq > 3 * BUSY * (TEXT_MS / 1e3);
-      this.newestSeq = newest2;
+      const newest3 = store.data.run.events.at(-1)?.seq ?? 0;
+      const isBusy = newest3 - this.newestSeq > 3 * BUSY * (TEXT_MS / 1e3);
+      this.newestSeq = newest3;
       this.diagram.svg.classList.toggle("busy", isBusy);
       this.timeline.tellInstant();
     }
@@ -7251,6 +7404,8 @@ var Page = class {
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
     this.diagram.mark(store.view.selected.value ? [store.view.selected.value] : [], "selected");
+    const differing = reproduction()?.found?.difference?.path;
+    this.diagram.mark(differing ? [differing] : [], "differs");
     this.diagram.showWay(store.data.wayShown.value);
     this.#showNumbers();
   }
@@ -8121,7 +8276,7 @@ var progressText = (progress) => {
   return [distance, progress?.text].filter(Boolean).join(" · ");
 };
 function ProgressBar({ part, ended }) {
-  const percent = Math.round((part ?? (ended ? 1 : 0)) * 100);
+  const percent2 = Math.round((part ?? (ended ? 1 : 0)) * 100);
   return /* @__PURE__ */ a4(
     "div",
     {
@@ -8130,8 +8285,8 @@ function ProgressBar({ part, ended }) {
       "aria-label": "progress",
       "aria-valuemin": 0,
       "aria-valuemax": 100,
-      "aria-valuenow": part === null ? void 0 : percent,
-      children: /* @__PURE__ */ a4("i", { style: { width: `${percent}%` } })
+      "aria-valuenow": part === null ? void 0 : percent2,
+      children: /* @__PURE__ */ a4("i", { style: { width: `${percent2}%` } })
     }
   );
 }
@@ -8875,7 +9030,7 @@ var PARTS = [
 
 // src/core/fleet.ts
 var nameOfRow = (row) => row.robots.length === 1 ? row.robots[0] : row.name ?? row.machine;
-function lanesOf(rows, now) {
+function lanesOf2(rows, now) {
   const begins = rows.flatMap((row) => row.began === null ? [] : [row.began / 1e9]);
   const first = Math.min(...begins, now / 1e3);
   const ends = rows.flatMap((row) => row.last === null ? [] : [row.last / 1e9]);
@@ -8933,7 +9088,7 @@ function OpenFleet() {
   const { rows, total: total2 } = found;
   const last = Math.min(found.skip + MOST_ROWS3, total2);
   const { scene, now } = sceneOf(rows);
-  const { seconds, lanes } = lanesOf(rows, now);
+  const { seconds, lanes } = lanesOf2(rows, now);
   return /* @__PURE__ */ a4("section", { class: "fleet", "aria-labelledby": "fleet-title", children: [
     /* @__PURE__ */ a4("header", { children: [
       /* @__PURE__ */ a4("h2", { id: "fleet-title", tabindex: -1, ref: heading, children: "Fleet" }),
@@ -8983,7 +9138,7 @@ function FleetMap(props) {
   return /* @__PURE__ */ a4("canvas", { ref: canvas2, tabindex: 0, role: "img" });
 }
 function Lane({ lane, seconds }) {
-  const percent = (s4) => `${100 * s4 / seconds}%`;
+  const percent2 = (s4) => `${100 * s4 / seconds}%`;
   return /* @__PURE__ */ a4(
     "svg",
     {
@@ -8995,11 +9150,11 @@ function Lane({ lane, seconds }) {
         "rect",
         {
           class: kind,
-          x: percent(from),
+          x: percent2(from),
           y: "1",
           height: "18",
           rx: "3",
-          width: percent(Math.max(to - from, 4e-3 * seconds)),
+          width: percent2(Math.max(to - from, 4e-3 * seconds)),
           children: /* @__PURE__ */ a4("title", { children: [
             name,
             ": ",
@@ -9047,9 +9202,9 @@ function standing(row) {
   return row.outcome === null ? "cut" : outcomeClass(row.outcome);
 }
 var pinOf = (row) => row.run || (row.stamp === null ? row.id : `${row.machine} ${row.stamp}`);
-function isShown(row, show2, pins) {
+function isShown(row, show2, pins2) {
   if (show2 === "all") return true;
-  if (show2 === "pinned") return pins.has(pinOf(row));
+  if (show2 === "pinned") return pins2.has(pinOf(row));
   if (show2 === "durable") return row.run !== "" || row.mission !== null;
   if (show2 === "asking") return row.asks;
   return standing(row) === show2;
@@ -9059,14 +9214,14 @@ function hasText(row, text2) {
   const inside = all.join(" ").toLowerCase();
   return text2.toLowerCase().split(/\s+/).every((word) => inside.includes(word));
 }
-function chosen(rows, { show: show2, machine, robot, text: text2 }, pins) {
+function chosen(rows, { show: show2, machine, robot, text: text2 }, pins2) {
   const found = rows.filter(
-    (row) => isShown(row, show2, pins) && (machine === null || row.machine === machine) && (robot === null || row.robots.includes(robot)) && hasText(row, text2)
+    (row) => isShown(row, show2, pins2) && (machine === null || row.machine === machine) && (robot === null || row.robots.includes(robot)) && hasText(row, text2)
   );
-  const rank = (row) => row.live ? 0 : pins.has(pinOf(row)) ? 1 : 2;
+  const rank = (row) => row.live ? 0 : pins2.has(pinOf(row)) ? 1 : 2;
   return found.map((row, i4) => ({ row, i: i4 })).sort((a5, b3) => rank(a5.row) - rank(b3.row) || a5.i - b3.i).map(({ row }) => row);
 }
-var countsOf = (rows, pins) => new Map(SHOWN.map((show2) => [show2, rows.filter((row) => isShown(row, show2, pins)).length]));
+var countsOf = (rows, pins2) => new Map(SHOWN.map((show2) => [show2, rows.filter((row) => isShown(row, show2, pins2)).length]));
 function tally(rows, namesOf2) {
   const counts = /* @__PURE__ */ new Map();
   for (const row of rows) for (const name of namesOf2(row)) counts.set(name, (counts.get(name) ?? 0) + 1);
@@ -9138,8 +9293,8 @@ function OpenHome() {
     return () => clearInterval(timer);
   }, [journals.length > 0]);
   store.playback.slowTick.value;
-  const pins = store.view.pins.value;
-  const rows = chosen(runs2, filter, pins);
+  const pins2 = store.view.pins.value;
+  const rows = chosen(runs2, filter, pins2);
   const change2 = (some) => {
     setFilter({ ...filter, ...some });
     setMost(MOST_ROWS4);
@@ -9147,7 +9302,7 @@ function OpenHome() {
   const failed = rows.filter((row) => standing(row) === "failure").length;
   const failedText = failed ? `, ${failed} failed` : "";
   return /* @__PURE__ */ a4("section", { class: "home", "aria-labelledby": "home-title", children: [
-    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins, onChange: change2 }),
+    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins: pins2, onChange: change2 }),
     /* @__PURE__ */ a4("div", { class: "run-list", children: [
       /* @__PURE__ */ a4("header", { children: [
         /* @__PURE__ */ a4("h2", { id: "home-title", tabindex: -1, ref: heading, children: "Runs" }),
@@ -9181,7 +9336,7 @@ function OpenHome() {
         ] }),
         /* @__PURE__ */ a4("button", { onClick: () => setFilter(ALL), children: "Clear filters" })
       ] }),
-      rows.length > 0 && /* @__PURE__ */ a4(Rows2, { rows: rows.slice(0, most), pins }),
+      rows.length > 0 && /* @__PURE__ */ a4(Rows2, { rows: rows.slice(0, most), pins: pins2 }),
       /* @__PURE__ */ a4(More, { left: rows.length - most, onMore: () => setMost(most + 200) })
     ] })
   ] });
@@ -9206,10 +9361,10 @@ function NoRuns() {
 function Filters({
   runs: runs2,
   filter,
-  pins,
+  pins: pins2,
   onChange
 }) {
-  const counts = countsOf(runs2, pins);
+  const counts = countsOf(runs2, pins2);
   const choice = (name, count, on2, choose2) => /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4("button", { class: on2 ? "on" : "", "aria-pressed": on2, onClick: choose2, children: [
     /* @__PURE__ */ a4("span", { children: shorten(name, 24) }),
     /* @__PURE__ */ a4("span", { class: "number", children: count })
@@ -9240,7 +9395,7 @@ function Filters({
     )
   ] });
 }
-function Rows2({ rows, pins }) {
+function Rows2({ rows, pins: pins2 }) {
   const today = /* @__PURE__ */ new Date();
   return /* @__PURE__ */ a4("table", { class: "runs", children: [
     /* @__PURE__ */ a4("thead", { children: /* @__PURE__ */ a4("tr", { children: [
@@ -9251,7 +9406,7 @@ function Rows2({ rows, pins }) {
       /* @__PURE__ */ a4("th", { children: "States" }),
       /* @__PURE__ */ a4("th", { class: "right", children: "Began" })
     ] }) }),
-    /* @__PURE__ */ a4("tbody", { children: rows.map((row) => /* @__PURE__ */ a4(Row, { row, pinned: pins.has(pinOf(row)), today }, row.id)) })
+    /* @__PURE__ */ a4("tbody", { children: rows.map((row) => /* @__PURE__ */ a4(Row, { row, pinned: pins2.has(pinOf(row)), today }, row.id)) })
   ] });
 }
 var UNNAMED = "SM_ROOT";
@@ -9971,6 +10126,252 @@ function titleOf2(row) {
   return lines.join("\n");
 }
 
+// src/panels/reproduction.tsx
+var MOST_LINES3 = 6;
+var MOST_BARS = 400;
+var TICKS = [0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 14400];
+function ReproduceButtons({ class: name = "" }) {
+  if (!canReproduce()) return null;
+  const one = reproduction();
+  const runs2 = one !== null && !one.found && !one.problem;
+  return /* @__PURE__ */ a4("span", { class: `again-buttons ${name}`, children: [
+    /* @__PURE__ */ a4(
+      "button",
+      {
+        class: "small",
+        disabled: runs2,
+        title: "run the recorded mission again: today's code, in virtual time, answered as it was then",
+        onClick: () => reproduce("run"),
+        children: "Reproduce"
+      }
+    ),
+    /* @__PURE__ */ a4("button", { class: "small", disabled: runs2, title: "write a pytest test of this run", onClick: () => reproduce("test"), children: "Make a test" })
+  ] });
+}
+function ReproductionPanel({ page: page2 }) {
+  const one = reproduction();
+  if (!one) return null;
+  return /* @__PURE__ */ a4(Section, { title: one.what === "test" ? "A test of this run" : "This run with today's code", children: /* @__PURE__ */ a4("div", { class: "again", children: [
+    /* @__PURE__ */ a4("span", { class: "again-tools", children: [
+      !one.found && !one.problem && /* @__PURE__ */ a4("button", { class: "small", onClick: () => stopReproduction(one.id), children: "Stop" }),
+      /* @__PURE__ */ a4("button", { class: "small", "aria-label": "close", onClick: closeReproduction, children: "✕" })
+    ] }),
+    /* @__PURE__ */ a4("div", { role: "status", children: /* @__PURE__ */ a4(Result, { one, page: page2 }) })
+  ] }) });
+}
+function Result({ one, page: page2 }) {
+  if (one.problem) return /* @__PURE__ */ a4("p", { class: "problem", children: shorten(one.problem, 600) });
+  const { found } = one;
+  if (!found)
+    return /* @__PURE__ */ a4("p", { children: [
+      /* @__PURE__ */ a4("progress", {}),
+      " ",
+      one.what === "test" ? "runs it again and again, to leave out what does not matter" : "runs",
+      "…"
+    ] });
+  if (found.kind === "test") return /* @__PURE__ */ a4(WrittenTest, { found });
+  if (found.kind === "failed") return /* @__PURE__ */ a4("p", { class: "problem", children: shorten(found.text.join("\n"), 900) });
+  const { difference } = found;
+  return /* @__PURE__ */ a4($, { children: [
+    difference ? /* @__PURE__ */ a4(FirstDifference, { difference, page: page2 }) : /* @__PURE__ */ a4("p", { children: [
+      /* @__PURE__ */ a4("span", { class: "pill-text success", children: "✓ the same" }),
+      " ",
+      found.same,
+      " of ",
+      found.events,
+      " events."
+    ] }),
+    /* @__PURE__ */ a4(Lines, { title: "Changed", lines: found.changed }),
+    /* @__PURE__ */ a4(Lines, { title: "Notes", lines: found.notes }),
+    /* @__PURE__ */ a4("p", { class: "again-actions", children: [
+      one.now && /* @__PURE__ */ a4(
+        "button",
+        {
+          class: twoRunsShown.value ? "small on" : "small",
+          "aria-pressed": twoRunsShown.value,
+          onClick: () => {
+            twoRunsShown.value = !twoRunsShown.value;
+          },
+          children: "Both runs"
+        }
+      ),
+      found.machine && /* @__PURE__ */ a4("button", { class: "small", onClick: () => choose(found.machine), children: "Open today's run" })
+    ] })
+  ] });
+}
+function FirstDifference({ difference, page: page2 }) {
+  const goThere = () => {
+    seekDifference();
+    page2.goTo(difference.path);
+  };
+  const at = differenceAt();
+  const side = (what, first, next) => /* @__PURE__ */ a4("tr", { children: [
+    /* @__PURE__ */ a4("th", { scope: "row", children: what }),
+    /* @__PURE__ */ a4("td", { children: [
+      /* @__PURE__ */ a4("b", { children: shorten(first, 200) }),
+      next.map((line) => /* @__PURE__ */ a4("small", { children: [
+        "then ",
+        shorten(line, 160)
+      ] }))
+    ] })
+  ] });
+  return /* @__PURE__ */ a4($, { children: [
+    /* @__PURE__ */ a4("button", { class: "step first-difference", onClick: goThere, children: [
+      "First difference ",
+      at !== null && /* @__PURE__ */ a4($, { children: [
+        "at ",
+        store.clock.instantText(at)
+      ] }),
+      ", event ",
+      difference.number
+    ] }),
+    difference.before.length > 0 && /* @__PURE__ */ a4("p", { class: "hint", children: [
+      "the same until ",
+      difference.before.map((line) => shorten(line, 120)).join("; ")
+    ] }),
+    /* @__PURE__ */ a4("table", { class: "two-sides", children: [
+      side("recorded", difference.recorded, difference.recorded_next),
+      side("today", difference.now, difference.now_next)
+    ] })
+  ] });
+}
+function Lines({ title, lines }) {
+  if (!lines.length) return null;
+  return /* @__PURE__ */ a4($, { children: [
+    /* @__PURE__ */ a4("h3", { children: title }),
+    /* @__PURE__ */ a4("ul", { class: "again-lines", children: [
+      lines.slice(0, MOST_LINES3).map((line) => /* @__PURE__ */ a4("li", { children: shorten(line, 300) })),
+      lines.length > MOST_LINES3 && /* @__PURE__ */ a4("li", { children: [
+        "and ",
+        lines.length - MOST_LINES3,
+        " more"
+      ] })
+    ] })
+  ] });
+}
+function WrittenTest({ found }) {
+  const copy2 = async () => {
+    try {
+      await navigator.clipboard.writeText(found.test);
+      store.view.notify("Copied");
+    } catch {
+      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
+    }
+  };
+  const save3 = () => {
+    const link2 = document.createElement("a");
+    link2.href = URL.createObjectURL(new Blob([found.test], { type: "text/x-python" }));
+    link2.download = found.file;
+    link2.click();
+    URL.revokeObjectURL(link2.href);
+  };
+  const outcomes = store.data.model.value?.root.outcomes ?? [];
+  return /* @__PURE__ */ a4($, { children: [
+    /* @__PURE__ */ a4("p", { class: "again-actions", children: [
+      /* @__PURE__ */ a4("b", { children: found.file }),
+      /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy" }),
+      /* @__PURE__ */ a4("button", { class: "small", onClick: save3, children: "Save" }),
+      /* @__PURE__ */ a4("label", { children: [
+        "expects",
+        " ",
+        /* @__PURE__ */ a4("select", { "aria-label": "what the test expects", onChange: (e4) => reproduce("test", fieldValue(e4)), children: [
+          /* @__PURE__ */ a4("option", { value: "", children: "what was recorded, or choose" }),
+          outcomes.map((name) => /* @__PURE__ */ a4("option", { value: name, children: name }))
+        ] })
+      ] })
+    ] }),
+    /* @__PURE__ */ a4(Lines, { title: "Notes", lines: found.notes }),
+    /* @__PURE__ */ a4("pre", { class: "written-test", tabindex: 0, children: found.test })
+  ] });
+}
+function TwoRunsView({ page: page2 }) {
+  const one = reproduction();
+  const model = store.data.model.value;
+  if (!twoRunsShown.value || !one?.now || !one.found || !model) return null;
+  return /* @__PURE__ */ a4(OpenTwoRuns, { page: page2, one, found: one.found });
+}
+function OpenTwoRuns({ page: page2, one, found }) {
+  const [aligned2, setAligned] = d2(true);
+  const [whole2, setWhole] = d2(false);
+  const model = store.data.model.value;
+  if (!model || !one.now) return null;
+  const { difference } = found;
+  const both = twoRuns({ recorded: store.data.run, now: one.now, model }, difference, aligned2);
+  const at = difference ? aligned2 ? 0 : difference.at : null;
+  const range = whole2 || at === null ? { from: both.from, to: both.to } : around(both, at);
+  const choice = (text2, on2, choose2) => /* @__PURE__ */ a4("button", { class: on2 ? "small on" : "small", "aria-pressed": on2, onClick: choose2, children: text2 });
+  return /* @__PURE__ */ a4("section", { class: "two-runs", "aria-label": "the recorded run and today's, one under the other", children: [
+    /* @__PURE__ */ a4("header", { children: [
+      difference && /* @__PURE__ */ a4("span", { class: "group", children: [
+        choice("from the difference", aligned2, () => setAligned(true)),
+        choice("from the begin", !aligned2, () => setAligned(false))
+      ] }),
+      difference && choice("whole", whole2, () => setWhole(!whole2)),
+      /* @__PURE__ */ a4("span", { class: "hint", children: difference ? `the same up to the line: ${found.same} events` : "the same throughout" }),
+      /* @__PURE__ */ a4("span", { class: "spread" }),
+      choice("One run", false, () => {
+        twoRunsShown.value = false;
+      })
+    ] }),
+    /* @__PURE__ */ a4(Side, { title: "recorded", lanes: both.recorded, range, at, children: (bar) => {
+      store.playback.seek(bar.at);
+      page2.goTo(bar.path);
+    } }),
+    /* @__PURE__ */ a4(Side, { title: "today", lanes: both.now, range, at, children: (bar) => page2.goTo(bar.path) }),
+    /* @__PURE__ */ a4(Axis, { range, relative: aligned2 && difference !== null })
+  ] });
+}
+var percent = (t4, { from, to }) => 100 * (t4 - from) / Math.max(1e-6, to - from);
+function Side({
+  title,
+  lanes,
+  range,
+  at,
+  children: pick
+}) {
+  const seen2 = (bar) => bar.to >= range.from && bar.from <= range.to;
+  return /* @__PURE__ */ a4("div", { class: "side", role: "group", "aria-label": title, children: [
+    /* @__PURE__ */ a4("h3", { children: title }),
+    lanes.map((lane) => /* @__PURE__ */ a4("div", { class: "lane", children: [
+      /* @__PURE__ */ a4("span", { title: lane.path, children: shorten(lane.name, 40) }),
+      /* @__PURE__ */ a4("div", { class: "bars", children: lane.bars.filter(seen2).slice(0, MOST_BARS).map((bar) => /* @__PURE__ */ a4(BarButton, { bar, range, at, onPick: () => pick(bar) })) })
+    ] }, lane.path)),
+    at !== null && /* @__PURE__ */ a4("div", { class: "difference-line", children: /* @__PURE__ */ a4("i", { style: { left: `${percent(at, range)}%` } }) })
+  ] });
+}
+function BarButton({ bar, range, at, onPick }) {
+  const left = Math.max(0, percent(bar.from, range));
+  const wide = Math.min(100, percent(bar.to, range)) - left;
+  const took = duration(bar.to - bar.from);
+  const isBefore = at !== null && !bar.differs && bar.to < at;
+  return /* @__PURE__ */ a4(
+    "button",
+    {
+      class: `bar ${bar.kind} ${bar.differs ? "differs" : ""} ${isBefore ? "before" : ""}`,
+      style: { left: `${left}%`, width: `${wide}%` },
+      title: `${bar.path}: ${took}${bar.differs ? ", here the runs differ" : ""}`,
+      onClick: onPick,
+      children: [
+        bar.name,
+        " ",
+        took
+      ]
+    }
+  );
+}
+function Axis({ range, relative }) {
+  const step = TICKS.find((one) => (range.to - range.from) / one <= 8) ?? 86400;
+  const ticks2 = [];
+  for (let t4 = Math.ceil(range.from / step) * step; t4 <= range.to; t4 += step)
+    ticks2.push(
+      /* @__PURE__ */ a4("span", { style: { left: `${percent(t4, range)}%` }, children: relative ? `${t4 > 0 ? "+" : ""}${Number(t4.toFixed(1))} s` : store.clock.runText(1e3 * t4, step < 1 ? 1 : 0, 0) })
+    );
+  return /* @__PURE__ */ a4("div", { class: "lane axis", "aria-hidden": "true", children: [
+    /* @__PURE__ */ a4("span", {}),
+    /* @__PURE__ */ a4("div", { class: "bars", children: ticks2 })
+  ] });
+}
+
 // src/panels/selected_state.tsx
 function SelectedState({ data, now, model }) {
   const node = model.get(store.view.selected.value);
@@ -10255,6 +10656,7 @@ function Inspector({ page: page2 }) {
   const shared = { page: page2, data: store.playback.shown(), now: store.playback.nowMs() };
   return /* @__PURE__ */ a4("aside", { class: "inspector", "aria-label": "details", children: [
     /* @__PURE__ */ a4(MissingEvents, { dropped: shared.data.dropped ?? 0 }),
+    /* @__PURE__ */ a4(ReproductionPanel, { page: page2 }),
     /* @__PURE__ */ a4(WhyPanel, { page: page2 }),
     /* @__PURE__ */ a4(SelectedState, { ...shared, model }),
     /* @__PURE__ */ a4(Differences, { page: page2 }),
@@ -10675,6 +11077,10 @@ function commands(page2) {
     item("Next preempt", "p", () => store.playback.jump("kind preempt", 1)),
     item("Next goal", "g", () => store.playback.jump("kind goal", 1)),
     item("Why?", "w", () => showWhy(), "from the first cause to the outcome"),
+    ...canReproduce() ? [
+      item("Reproduce this run", "", () => reproduce("run"), "with today's code, answered as it was then"),
+      item("Make a test of this run", "", () => reproduce("test"), "for pytest")
+    ] : [],
     item("Note", "n", () => store.notes.begin(), "at the instant shown"),
     item("Implicit transitions", "i", () => page2.setImplicit(!store.view.implicit.value), "show or hide")
   );
@@ -15289,7 +15695,7 @@ var Plot = class {
       points: { size: 4 },
       gaps: breaksOf
     }));
-    const percent = unit === "%";
+    const percent2 = unit === "%";
     this.chart = new uPlot(
       {
         width: Math.max(1, element.clientWidth),
@@ -15297,7 +15703,7 @@ var Plot = class {
         padding: [6, RIGHT4, 6, 0],
         cursor: { show: false },
         legend: { show: false },
-        scales: { x: { time: false, auto: false }, y: percent ? { range: [0, 100] } : {} },
+        scales: { x: { time: false, auto: false }, y: percent2 ? { range: [0, 100] } : {} },
         axes: [
           { show: false },
           {
@@ -15918,6 +16324,7 @@ function ViewMenu({ page: page2 }) {
           /* @__PURE__ */ a4("input", { type: "checkbox", checked: store.view.implicit.value, onChange: onImplicit })
         ] }),
         /* @__PURE__ */ a4(NumbersLine, { page: page2 }),
+        /* @__PURE__ */ a4(ReproduceLine, {}),
         /* @__PURE__ */ a4(CompareLine, { page: page2, onDone: () => setOpen(false) })
       ] }),
       /* @__PURE__ */ a4("label", { class: "line", children: [
@@ -15940,6 +16347,13 @@ function ViewMenu({ page: page2 }) {
         /* @__PURE__ */ a4("input", { type: "checkbox", checked: store.view.shortcuts.value, onChange: onShortcuts })
       ] })
     ] })
+  ] });
+}
+function ReproduceLine() {
+  if (!canReproduce()) return null;
+  return /* @__PURE__ */ a4("div", { class: "line", children: [
+    /* @__PURE__ */ a4("span", { children: "This run again" }),
+    /* @__PURE__ */ a4(ReproduceButtons, {})
   ] });
 }
 function AboutQuestions() {
@@ -16040,6 +16454,7 @@ function TopBar({ page: page2 }) {
         children: "Why?"
       }
     ),
+    /* @__PURE__ */ a4(ReproduceButtons, { class: "wide" }),
     problems > 0 && /* @__PURE__ */ a4("span", { class: "chip", title: "problems of the machine's structure; see the inspector", children: [
       "⚠ ",
       problems
@@ -16404,7 +16819,8 @@ var panels = {
     /* @__PURE__ */ a4(Mounted, { element: whole }),
     /* @__PURE__ */ a4(StripTools, {}),
     /* @__PURE__ */ a4(Mounted, { element: canvas }),
-    /* @__PURE__ */ a4(TimeTools, {})
+    /* @__PURE__ */ a4(TimeTools, {}),
+    /* @__PURE__ */ a4(TwoRunsView, { page })
   ] }),
   plots: () => /* @__PURE__ */ a4(PlotsPanel, { page })
 };

@@ -27,6 +27,7 @@ import { Palette } from "#panels/palette.tsx";
 import { PlayBar } from "#panels/play.tsx";
 import { AddLine, PlotsPanel } from "#panels/plots.tsx";
 import { Questions } from "#panels/questions.tsx";
+import { TwoRunsView } from "#panels/reproduction.tsx";
 import { SimulateDialog } from "#panels/simulate.tsx";
 import { TopBar } from "#panels/top_bar.tsx";
 import { Tree } from "#panels/tree.tsx";
@@ -127,6 +128,7 @@ const panels: Record<PanelName, () => ComponentChildren> = {
       <StripTools />
       <Mounted element={canvas} />
       <TimeTools />
+      <TwoRunsView page={page} />
     </div>
   ),
   plots: () => <PlotsPanel page={page} />,

@@ -408,6 +408,40 @@ export interface SimulationList {
   batches: BatchRow[];
 }
 
+/** Where a reproduced run first differs (`smachpy.reproduce.compare.Difference`); times in s. */
+export interface RunDifference {
+  number: number;
+  at: number;
+  path: string;
+  before: string[];
+  recorded: string;
+  now: string;
+  recorded_next: string[];
+  now_next: string[];
+  later: number;
+}
+
+/** What a reproduction has found (`smachpy_viz.live.reproductions.Found`). */
+export interface Found {
+  kind: "same" | "differs" | "failed" | "test";
+  text: string[];
+  same: number;
+  events: number;
+  difference: RunDifference | null;
+  changed: string[];
+  notes: string[];
+  machine: string;
+  test: string;
+  file: string;
+}
+
+/** A reproduction; `found` is null while it runs, and where there is a problem. */
+export interface Reproduction {
+  running: boolean;
+  problem: string;
+  found: Found | null;
+}
+
 /** The length of an array; null for any. */
 export interface ArrayLength {
   length: number | null;
@@ -476,6 +510,12 @@ export interface BatchStarted {
   batch: string;
 }
 
+/** The reproduction that was started. */
+export interface ReproductionStarted {
+  ok: true;
+  id: string;
+}
+
 /** The first message of a stream. */
 export interface Settings {
   follow: boolean;
@@ -483,6 +523,7 @@ export interface Settings {
   beat: number;
   kept: number;
   home: boolean;
+  reproduces: boolean;
 }
 
 /** The summaries that have changed, in the first message all, and the names that are gone. */
@@ -701,12 +742,14 @@ export interface Answers {
   "GET /api/fleet": FleetPage;
   "GET /api/open": Opened;
   "GET /api/simulations": SimulationList;
+  "GET /api/reproduction": Reproduction;
   "GET /api/action": GoalForm;
   "GET /api/goals": ServerGoal[];
   "POST /api/control": Done;
   "POST /api/action": CheckedGoal | GoalAccepted | Done;
   "POST /api/simulate": BatchStarted | Done;
   "POST /api/mission": Done;
+  "POST /api/reproduce": ReproductionStarted | Done;
 }
 
 /** The data of each server-sent event. */

@@ -7,6 +7,7 @@ import type { LinkedView } from "#core/links.ts";
 import { fragmentOf, viewOf } from "#core/links.ts";
 import { showPage } from "#core/pages.ts";
 import { insideText } from "#core/purposes.ts";
+import { newest, reproduction } from "#core/reproduction.ts";
 import { numbersFor } from "#core/statistics.ts";
 import { store } from "#core/store.ts";
 import type { Box, Observed, RunEvent, RunState, StateNode, Theme } from "#core/types.ts";
@@ -160,6 +161,12 @@ export class Page {
     store.data.serversSeen.subscribe(() => this.paintAll());
     store.data.facts.subscribe(() => this.paintAll());
     store.data.wayShown.subscribe(() => this.#showWay());
+    newest.subscribe(() => {
+      const path = reproduction()?.found?.difference?.path;
+      if (path && store.view.reveal(path)) this.relayout({ frame: true });
+      this.paintAll();
+      this.timeline.draw();
+    });
   }
 
   /** Begin; the elements must be in the document, so that the browser loads their fonts. */
@@ -414,6 +421,8 @@ export class Page {
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
     this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
     this.diagram.mark(store.view.selected.value ? [store.view.selected.value] : [], "selected");
+    const differing = reproduction()?.found?.difference?.path;
+    this.diagram.mark(differing ? [differing] : [], "differs");
     this.diagram.showWay(store.data.wayShown.value);
     this.#showNumbers();
   }

@@ -5,6 +5,7 @@ import { countWhile } from "#core/lists.ts";
 import type { Model } from "#core/model.ts";
 import { endClass } from "#core/outcomes.ts";
 import { purposeOfVisit, wordsOf } from "#core/purposes.ts";
+import { pins } from "#core/reproduction.ts";
 import { COLOURS } from "#core/scene.ts";
 import { store } from "#core/store.ts";
 import { askerText, duration } from "#core/text.ts";
@@ -269,7 +270,7 @@ export class Timeline {
   /** Draw a pin at each note, with its text. */
   #notes(x: (t: number) => number, width: number, height: number) {
     const g = this.context;
-    for (const { at, text } of store.notes.all.value) {
+    for (const { at, text } of pins()) {
       const px = x(at);
       if (px < this.names || px > width - RIGHT) continue;
       g.fillStyle = this.#colours.of("ink");

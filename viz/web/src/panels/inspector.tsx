@@ -11,6 +11,7 @@ import { Log } from "#panels/log.tsx";
 import { Notes } from "#panels/notes.tsx";
 import { Numbers } from "#panels/numbers.tsx";
 import { Preempts } from "#panels/preempts.tsx";
+import { ReproductionPanel } from "#panels/reproduction.tsx";
 import { SelectedState } from "#panels/selected_state.tsx";
 import { Changes, Userdata } from "#panels/userdata.tsx";
 import { WhyPanel } from "#panels/why.tsx";
@@ -25,6 +26,7 @@ export function Inspector({ page }: { page: Page }) {
   return (
     <aside class="inspector" aria-label="details">
       <MissingEvents dropped={shared.data.dropped ?? 0} />
+      <ReproductionPanel page={page} />
       <WhyPanel page={page} />
       <SelectedState {...shared} model={model} />
       <Differences page={page} />

@@ -7,6 +7,7 @@ import { KIND_NAMES } from "#core/model.ts";
 import { showPage } from "#core/pages.ts";
 import { asked, type Item, ranked, SIGNS } from "#core/palette.ts";
 import { parseInstant } from "#core/playback.ts";
+import { canReproduce, reproduce } from "#core/reproduction.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import { brief } from "#core/values.ts";
@@ -67,6 +68,12 @@ function commands(page: Page): Item[] {
     item("Next preempt", "p", () => store.playback.jump("kind preempt", 1)),
     item("Next goal", "g", () => store.playback.jump("kind goal", 1)),
     item("Why?", "w", () => showWhy(), "from the first cause to the outcome"),
+    ...(canReproduce()
+      ? [
+          item("Reproduce this run", "", () => reproduce("run"), "with today's code, answered as it was then"),
+          item("Make a test of this run", "", () => reproduce("test"), "for pytest"),
+        ]
+      : []),
     item("Note", "n", () => store.notes.begin(), "at the instant shown"),
     item("Implicit transitions", "i", () => page.setImplicit(!store.view.implicit.value), "show or hide"),
   );

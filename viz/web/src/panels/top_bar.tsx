@@ -12,6 +12,7 @@ import { ActionsButton } from "#panels/actions.tsx";
 import { CompareChip } from "#panels/comparison.tsx";
 import { fieldValue } from "#panels/components.tsx";
 import { togglePage } from "#panels/keys.tsx";
+import { ReproduceButtons } from "#panels/reproduction.tsx";
 import { FollowButton, toggleTree, ViewMenu } from "#panels/view_menu.tsx";
 
 const MOST_FOUND = 12;
@@ -57,6 +58,7 @@ export function TopBar({ page }: { page: Page }) {
           Why?
         </button>
       )}
+      <ReproduceButtons class="wide" />
       {problems > 0 && (
         <span class="chip" title="problems of the machine's structure; see the inspector">
           ⚠ {problems}

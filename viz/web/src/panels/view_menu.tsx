@@ -3,6 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { encoded, isFile, link } from "#core/connection.ts";
 import { ALL_LEVELS } from "#core/model.ts";
+import { canReproduce } from "#core/reproduction.ts";
 import { MODES, OF_RECORDED_RUNS } from "#core/statistics.ts";
 import { save } from "#core/storage.ts";
 import { store } from "#core/store.ts";
@@ -13,6 +14,7 @@ import { ActionsButton } from "#panels/actions.tsx";
 import { CompareLine } from "#panels/comparison.tsx";
 import { fieldValue } from "#panels/components.tsx";
 import { PanelLines } from "#panels/docks.tsx";
+import { ReproduceButtons } from "#panels/reproduction.tsx";
 
 const MOST_LEVELS = 9; // levels with a button of their own
 const MOST_ACTIVE = 200; // active states in the address of a picture
@@ -97,6 +99,7 @@ export function ViewMenu({ page }: { page: Page }) {
                 <input type="checkbox" checked={store.view.implicit.value} onChange={onImplicit} />
               </label>
               <NumbersLine page={page} />
+              <ReproduceLine />
               <CompareLine page={page} onDone={() => setOpen(false)} />
             </>
           )}
@@ -121,6 +124,16 @@ export function ViewMenu({ page }: { page: Page }) {
           </label>
         </div>
       )}
+    </div>
+  );
+}
+
+function ReproduceLine() {
+  if (!canReproduce()) return null;
+  return (
+    <div class="line">
+      <span>This run again</span>
+      <ReproduceButtons />
     </div>
   );
 }

@@ -30,7 +30,14 @@ import { wayOf } from "#core/why.ts";
 export class Data {
   readonly connection: Signal<"connecting" | "live" | "lost" | "file"> = signal("connecting");
   readonly problem = signal(""); // why the server refuses this page a stream
-  readonly settings: Signal<Settings> = signal({ follow: false, control: false, beat: 0, kept: 0, home: false });
+  readonly settings: Signal<Settings> = signal({
+    follow: false,
+    control: false,
+    beat: 0,
+    kept: 0,
+    home: false,
+    reproduces: false,
+  });
   readonly machines: Signal<MachineSummary[]> = signal([]);
   readonly wanted = signal(""); // name of the machine to show
   readonly facts: Signal<MachineFacts | null> = signal(null); // of the machine shown
