@@ -32,6 +32,7 @@ SUMMARIES = {
     "run": "run a mission",
     "check": "find mistakes in a machine without running it",
     "test": "test missions with pytest",
+    "explore": "run a mission with every outcome of its states",
     "render": "draw a state machine into a file",
     "simulate": "do many runs of a mission in virtual time",
     "view": "watch running machines in a browser",

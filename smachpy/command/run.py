@@ -45,7 +45,7 @@ def register_list(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "list",
         help="list the missions",
-        description="List the installed missions, and the Petri net plans in a folder.",
+        description="List the installed missions, and the mission files and plans in a folder.",
     )
     parser.add_argument(
         "folder",
@@ -53,7 +53,7 @@ def register_list(subparsers: Any) -> None:
         nargs="?",
         default=Path(),
         metavar="FOLDER",
-        help="folder of plans (here)",
+        help="folder of mission files and plans (here)",
     )
     parser.set_defaults(run=_list)
 
@@ -194,12 +194,12 @@ def _list(args: argparse.Namespace) -> int:
     from rich.table import Table
     from rich.text import Text as Cell
 
-    from smachpy.command.targets import list_missions, list_plans
+    from smachpy.command.targets import list_files, list_missions
 
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
     table.add_column()
-    for name, summary in {**list_missions(), **list_plans(args.folder)}.items():
+    for name, summary in {**list_missions(), **list_files(args.folder)}.items():
         table.add_row(Cell(printable(name)), Cell(printable(summary)))
     Console(highlight=False).print(table)
     return 0

@@ -7,6 +7,7 @@ import contextlib
 import importlib
 import importlib.util
 import inspect
+import re
 import sys
 import warnings
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import ActionlibError
+from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.inputs.suggest import did_you_mean
 from smachpy.command.extras import advice
 from smachpy.engine.stack_text import trace_of
@@ -162,10 +164,10 @@ def _drives(mission: Any) -> bool:
     return mission_info(mission).world is not None or any(name in names for name in offered)
 
 
-def list_plans(folder: Path) -> dict[str, str]:
-    """Return the Petri net plans in a folder: name for `smachpy run` -> its actions, in one line.
+def list_files(folder: Path) -> dict[str, str]:
+    """Return the plans and mission files in a folder: name for `smachpy run` -> one line.
 
-    If one cannot be read, its line says why.
+    If one cannot be read, its line says why; a YAML file without `states:` is not taken for one.
 
     Raises:
         TargetError: the folder cannot be read.
@@ -174,14 +176,17 @@ def list_plans(folder: Path) -> dict[str, str]:
     from smachpy.pnp.problems import PlanError
     from smachpy.pnp.reading import read_net
 
-    lines = {}
+    lines: dict[str, str] = {}
     try:
-        files = sorted(path for path in folder.iterdir() if path.suffix in PLANS)
+        files = sorted(path for path in folder.iterdir() if path.suffix in DATA and path.is_file())
     except OSError as error:
         raise TargetError(
             str(folder), f"got no list of its files ({error.strerror}); expected a folder."
         ) from error
     for path in files:
+        if path.suffix in MISSION_FILES:
+            lines |= {str(path): line for line in _mission_line(path)}
+            continue
         try:
             plan = understand(read_net(path)[0])
         except PlanError as error:
@@ -190,6 +195,18 @@ def list_plans(folder: Path) -> dict[str, str]:
             names = sorted({name.rpartition("#")[2].partition("_")[0] for name in plan.executables})
             lines[str(path)] = f"Petri net plan of {', '.join(names) or 'no actions'}."
     return lines
+
+
+def _mission_line(path: Path) -> Iterator[str]:
+    """Yield the line of a mission file; nothing for another YAML file."""
+    from smachpy.files import MissionFileError, read
+
+    try:
+        if not re.search(rb"^(\xef\xbb\xbf)?states *:", read_limited(path), re.MULTILINE):
+            return
+        yield (read(path)[0] or "A mission file.").splitlines()[0]
+    except (OSError, MissionFileError) as error:
+        yield f"not available: {str(error).splitlines()[0]}"
 
 
 def load_target(text: str, *, imports: bool = True, allow: Sequence[str] | None = None) -> Target:

@@ -15,7 +15,8 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "test",
         help="test missions with pytest",
         usage="%(prog)s [WORD ...]",
-        epilog="All words are passed to pytest: smachpy test tests -k patrol --smachpy-coverage. "
+        epilog="All words are passed to pytest: smachpy test tests -k patrol --smachpy-coverage. A "
+        "mission file (smachpy test patrol.yaml) is checked and explored. "
         "The options for missions are listed under 'robot missions' in pytest --help.",
     )
     parser.set_defaults(run=run, all_words=())
@@ -36,4 +37,5 @@ def run_pytest(arguments: Sequence[str]) -> int:
     # `smachpy` is already imported, so pytest cannot rewrite its asserts, and warns once per
     # module.
     quiet = "ignore:Module already imported:pytest.PytestAssertRewriteWarning"
-    return int(pytest.main(["-W", quiet, *arguments]))
+    files = ["-p", "smachpy.command.mission_tests"]
+    return int(pytest.main(["-W", quiet, *files, *arguments]))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+from functools import partial
 
 import pytest
 
@@ -113,3 +115,57 @@ def test_export_writes_through_a_link_and_into_an_empty_file(folder):
     assert main(["export", "rounds.yaml", "-o", "link.yaml"]) == 0
     assert (folder / "link.yaml").is_symlink()
     assert load(folder / "real.yaml").name == "ROUNDS"
+
+
+ROUNDS = """\
+outcomes: [done, preempted]
+parameters: {rounds: {type: whole, default: 2}}
+userdata: {count: 0, rounds: "${rounds}"}
+states:
+  GO: {state: 'steps:go', on: {done: COUNT}, outcomes: [preempted]}
+  COUNT:
+    state: compute
+    with: {count: count + 1 / rounds}
+    on: {done: [{when: count > 1, to: done}, {to: GO}]}
+"""
+
+
+def test_explore_finds_what_breaks_a_mission_without_its_code(folder, capsys):
+    (folder / "steps.py").write_text("raise SystemExit\ngo = None\n")
+    (folder / "rounds.yaml").write_text(ROUNDS)
+    assert main(["explore", "rounds.yaml", "--max-runs", "100"]) == 0
+    assert "all there are: no counterexample" in capsys.readouterr().out
+    assert main(["explore", "rounds.yaml", "--input", "rounds=0", "--pictures", "drawn"]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("/ROUNDS: 1 runs in")
+    assert "division by zero" in said
+    assert (folder / "drawn" / "ROUNDS-counterexample.svg").is_file()
+    assert main(["explore", "rounds.yaml", "--input", "round=1"]) == 2
+
+
+@pytest.mark.slow
+def test_test_checks_and_explores_a_file(folder):
+    (folder / "steps.py").write_text("raise SystemExit\ngo = None\n")
+    (folder / "rounds.yaml").write_text(ROUNDS)
+    (folder / "bad.yaml").write_text("outcomes: [done]\nstates: {A: {state: wat}}\n")
+    words = [sys.executable, "-m", "smachpy", "test", "-v", "-p", "no:cacheprovider"]
+    run = partial(subprocess.run, cwd=folder, capture_output=True, text=True)
+    found = run([*words, "bad.yaml", "rounds.yaml"])
+    assert found.returncode == 1
+    assert "rounds.yaml::check PASSED" in found.stdout
+    assert "rounds.yaml::explore PASSED" in found.stdout
+    assert "bad.yaml:2:14: states.A.state: got 'wat'" in found.stdout
+    assert run([*words, "."]).returncode == 5  # no tests: they are not named
+
+
+def test_list_shows_the_mission_files_of_a_folder(folder, capsys):
+    (folder / "rounds.yaml").write_text(GOOD)
+    (folder / "bad.yaml").write_text("states: {A: 1}\nparameters: 3\n")
+    (folder / "other.yaml").write_text("a: 1\n")
+    (folder / "none.yaml").mkdir()
+    assert main(["list"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "rounds.yaml Counts, then waits." in said
+    assert "bad.yaml not available: bad.yaml:2:1: parameters" in said
+    assert "other.yaml" not in said
+    assert "none.yaml" not in said

@@ -1,0 +1,103 @@
+"""`smachpy explore`: runs a mission with all that can happen, with doubles for its states."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actionlib_core.command_line.numbers import between, seconds
+from actionlib_core.process.output import printable
+from smachpy.command.run import add_input, read_inputs
+from smachpy.machines.container import Container
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+EXAMPLES = """examples:
+  smachpy explore patrol.yaml
+  smachpy explore my_mission.py --fault raise --fault deaf --max-runs 5000
+"""
+
+
+def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "explore",
+        help="run a mission with every outcome of its states",
+        description="Run a mission with doubles in the places of its states: with every "
+        "combination of outcomes, a preempt during each state, every order of parallel ones. No "
+        "robot is needed, and no code is run that a mission file names. Exit codes: 0 nothing "
+        "found, 1 a run breaks an invariant (it ends, raises nothing, ends soon after a preempt), "
+        "2 bad input.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("target", metavar="MISSION", help="as for `smachpy run`")
+    add_input(parser)
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        choices=("hang", "raise", "deaf", "kill"),
+        help="states may hang, raise or ignore a preempt, or the process is killed (repeatable)",
+    )
+    parser.add_argument(
+        "--max-runs",
+        type=between(1),
+        default=1_000,
+        metavar="N",
+        help="the most runs (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--max-time",
+        type=seconds,
+        default=60.0,
+        metavar="S",
+        help="the longest time [s] (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--pictures", type=Path, metavar="FOLDER", help="draw the run that breaks an invariant"
+    )
+    parser.set_defaults(run=run, words=())
+
+
+def run(args: argparse.Namespace) -> int:
+    """Explore the mission; return 1 if a run breaks an invariant."""
+    from smachpy.command.mission_run import build
+    from smachpy.command.targets import load_target
+    from smachpy.testing.exploring.exploration import explore
+
+    target, inputs = load_target(args.target, imports=False), read_inputs(args.input)
+
+    def make() -> Container:
+        return build(target, inputs, args.words)
+
+    machine = make()
+    found = explore(
+        make,
+        max_runs=args.max_runs,
+        max_time=args.max_time,
+        faults=args.fault,
+        keep=reckoning_states(machine),
+        folder=None if args.pictures is None else lambda: args.pictures,
+    )
+    print(printable(f"/{machine.name or target.name}: {found}"))
+    return 0 if found.ok else 1
+
+
+def reckoning_states(machine: Container) -> list[str]:
+    """Return the paths of the states that only compute: they are explored as they are.
+
+    With doubles in their places a mission that counts its rounds never ends.
+    """
+    from smachpy.states.by_name import Compute, SetKeys
+
+    def below(container: Container, path: str) -> Iterator[str]:
+        for label, state in container.get_children().items():
+            if isinstance(state, Compute | SetKeys):
+                yield f"{path}/{label}"
+            elif isinstance(state, Container):
+                yield from below(state, f"{path}/{label}")
+
+    return list(below(machine, f"/{machine.name or 'SM_ROOT'}"))
