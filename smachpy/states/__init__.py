@@ -24,7 +24,11 @@ if TYPE_CHECKING:
     from smachpy.states.driving import locate as locate
     from smachpy.states.driving import turn as turn
     from smachpy.states.localising import pose_of as pose_of
+    from smachpy.states.nav2 import clear_costmaps as clear_costmaps
+    from smachpy.states.nav2 import dock as dock
+    from smachpy.states.nav2 import follow_waypoints as follow_waypoints
     from smachpy.states.nav2 import nav2_active as nav2_active
+    from smachpy.states.nav2 import undock as undock
     from smachpy.states.progress import Progress as Progress
     from smachpy.states.questions import AnswerRefusedError as AnswerRefusedError
     from smachpy.states.questions import Question as Question
@@ -68,9 +72,12 @@ __all__ = [
     "SetParameters",
     "Wait",
     "Waypoint",
+    "clear_costmaps",
+    "dock",
     "drive_back",
     "drive_to",
     "find_questions",
+    "follow_waypoints",
     "give_answer",
     "goal_at",
     "load_route",
@@ -80,6 +87,7 @@ __all__ = [
     "serve_during",
     "serving_machine",
     "turn",
+    "undock",
 ]
 
 _HOMES = {
@@ -105,9 +113,12 @@ _HOMES = {
     "TURN_TIMEOUT": "smachpy.states.driving",
     "Wait": "smachpy.states.waiting",
     "Waypoint": "smachpy.states.waypoints",
+    "clear_costmaps": "smachpy.states.nav2",
+    "dock": "smachpy.states.nav2",
     "drive_back": "smachpy.states.driving",
     "drive_to": "smachpy.states.driving",
     "find_questions": "smachpy.states.questions",
+    "follow_waypoints": "smachpy.states.nav2",
     "give_answer": "smachpy.states.questions",
     "goal_at": "smachpy.states.driving",
     "load_route": "smachpy.states.waypoints",
@@ -117,6 +128,7 @@ _HOMES = {
     "serve_during": "smachpy.states.serving",
     "serving_machine": "smachpy.states.serving",
     "turn": "smachpy.states.driving",
+    "undock": "smachpy.states.nav2",
 }
 
 

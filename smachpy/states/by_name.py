@@ -7,7 +7,7 @@ that returns a state, with `Args:` in its docstring.
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from smachpy.exceptions import InvalidStateError
 from smachpy.machines.state import State
@@ -319,12 +319,109 @@ def look_up_transform(
     return LookUpTransform(key, frame, into, tf=tf, timeout=timeout)
 
 
-def nav2_active(manager: str = "lifecycle_manager_navigation", timeout: float = 60.0) -> State:
+def clear_costmaps(
+    navigation: Literal["nav2", "move_base"] = "nav2",
+    namespace: str = "",
+    timeout: float | None = 10.0,
+) -> State:
+    """Let the navigation forget all obstacles. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        navigation: nav2 or, for ROS 1, move_base.
+        namespace: Prefix of its names, such as `robot_0`.
+        timeout: Longest time for each call [s]; none: no limit.
+    """
+    from smachpy.states.nav2 import clear_costmaps as clearing
+
+    return clearing(navigation=navigation, namespace=namespace, timeout=timeout)
+
+
+def dock(
+    id: str = "",  # noqa: A002  its name in files
+    place: str | None = None,
+    dock_type: str = "",
+    navigate: bool = True,
+    action: str = "dock_robot",
+    exec_timeout: float | None = 300.0,
+) -> State:
+    """Dock by Nav2. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        id: The dock's name in the robot's database; or give place.
+        place: The userdata key of the dock's pose.
+        dock_type: The plugin for that dock.
+        navigate: Drive to the staging pose in front of the dock first.
+        action: Name of the action.
+        exec_timeout: Longest time [s]; none: no limit.
+    """
+    from smachpy.states.nav2 import dock as docking
+
+    return docking(
+        id,
+        place=place,
+        dock_type=dock_type,
+        navigate=navigate,
+        action=action,
+        exec_timeout=exec_timeout,
+    )
+
+
+def undock(
+    dock_type: str = "", action: str = "undock_robot", exec_timeout: float | None = 60.0
+) -> State:
+    """Undock by Nav2. Outcomes: 'succeeded', 'aborted', 'preempted'.
+
+    Args:
+        dock_type: The plugin for the dock; "" for that of the dock where it has docked.
+        action: Name of the action.
+        exec_timeout: Longest time [s]; none: no limit.
+    """
+    from smachpy.states.nav2 import undock as undocking
+
+    return undocking(dock_type, action=action, exec_timeout=exec_timeout)
+
+
+def follow_waypoints(
+    places: Sequence[Mapping[str, float]] | str,
+    loops: int = 0,
+    missed_key: str | None = None,
+    action: str = "follow_waypoints",
+    exec_timeout: float | None = None,
+) -> State:
+    """Drive through places by Nav2. Outcomes: 'succeeded', 'missed', 'aborted', 'preempted'.
+
+    Args:
+        places: The places, each with x, y [m] and yaw [rad] in the map frame; or the userdata key
+            of a list of poses.
+        loops: How often to go round again.
+        missed_key: The userdata key that gets the indices of the places that were missed.
+        action: Name of the action.
+        exec_timeout: Longest time [s]; none: no limit.
+    """
+    from smachpy.places.pose import Pose2D
+    from smachpy.states.nav2 import follow_waypoints as following
+
+    where: Any = places
+    if not isinstance(places, str):
+        try:
+            where = [Pose2D(**{"yaw": 0.0, **each}) for each in places]
+        except TypeError as error:
+            raise InvalidStateError(
+                f"follow_waypoints: places: got {places!r}; expected a list of x, y and yaw."
+            ) from error
+    return following(
+        where, loops=loops, missed_key=missed_key, action=action, exec_timeout=exec_timeout
+    )
+
+
+def nav2_active(
+    manager: str = "lifecycle_manager_navigation", timeout: float | None = 60.0
+) -> State:
     """Wait until Nav2 is active. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     Args:
         manager: Name of its lifecycle manager's node.
-        timeout: Longest wait [s].
+        timeout: Longest wait [s]; none: no limit.
     """
     from smachpy.states.nav2 import nav2_active as active
 
@@ -397,8 +494,11 @@ BY_NAME: Final[dict[str, Callable[..., State]]] = {
     "action": action,
     "ask": ask,
     "await_message": await_message,
+    "clear_costmaps": clear_costmaps,
     "compute": compute,
+    "dock": dock,
     "drive_to": drive_to,
+    "follow_waypoints": follow_waypoints,
     "locate": locate,
     "look_up_transform": look_up_transform,
     "monitor": monitor,
@@ -410,6 +510,7 @@ BY_NAME: Final[dict[str, Callable[..., State]]] = {
     "set_lifecycle": set_lifecycle,
     "set_parameters": set_parameters,
     "turn": turn,
+    "undock": undock,
     "wait": wait,
 }
 """Name in files -> function that makes the state."""

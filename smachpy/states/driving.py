@@ -49,6 +49,30 @@ def goal_at(pose: Pose2D, frame: str = MAP_FRAME) -> MoveBaseGoal:
     return MoveBaseGoal(target_pose=PoseStamped(header=Header(frame_id=frame), pose=there))
 
 
+def place_of(value: Any, where: str) -> tuple[Pose2D, str]:
+    """Return the pose [m, m, rad] of a place, and its frame.
+
+    Args:
+        value: A `Pose2D` or `Waypoint` in the map frame, a `Pose`, or a `PoseStamped`.
+        where: Where the value is from, for the error.
+
+    Raises:
+        InvalidStateError: it is a pose that nobody has filled in, or no place at all.
+    """
+    pose, header = getattr(value, "pose", value), getattr(value, "header", None)
+    frame = MAP_FRAME if header is None else header.frame_id or MAP_FRAME
+    if isinstance(pose, Pose2D):
+        return pose, frame
+    if not (hasattr(pose, "position") and hasattr(pose, "orientation")):
+        raise InvalidStateError(
+            f"{where}: got {value!r}; expected a Pose2D, a Waypoint, a Pose or a PoseStamped."
+        )
+    problem = pose_problem(pose)
+    if problem:
+        raise InvalidStateError(f"{where}: {problem}.")
+    return pose_of(pose), frame
+
+
 def drive_to(
     place: Pose2D | str, *, action: str = "move_base", **options: Any
 ) -> SimpleActionState:
@@ -68,16 +92,7 @@ def drive_to(
         return SimpleActionState(action, MoveBaseAction, goal=goal_at(place), **options)
 
     def goal(userdata: UserData, _default: MoveBaseGoal) -> MoveBaseGoal:
-        value = userdata[place]
-        pose = getattr(value, "pose", value)
-        header = getattr(value, "header", None)
-        frame = MAP_FRAME if header is None else header.frame_id or MAP_FRAME
-        if not isinstance(pose, Pose2D):
-            problem = pose_problem(pose)
-            if problem:
-                raise InvalidStateError(f"{current_path() or 'drive_to'}: {place}: {problem}.")
-            pose = pose_of(pose)
-        return goal_at(pose, frame)
+        return goal_at(*place_of(userdata[place], f"{current_path() or 'drive_to'}: {place}"))
 
     keys = [*options.pop("input_keys", ()), place]
     return SimpleActionState(action, MoveBaseAction, goal_cb=goal, input_keys=keys, **options)

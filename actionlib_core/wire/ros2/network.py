@@ -5,10 +5,11 @@ from __future__ import annotations
 import itertools
 import weakref
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from actionlib_core.config import Ros2
 from actionlib_core.exceptions import ConfigError, TransportError
+from actionlib_core.interfaces.ros2 import default_distro
 from actionlib_core.names import clean_namespace
 from actionlib_core.node import open_zenoh
 from actionlib_core.transport._keys import key_matches
@@ -19,6 +20,7 @@ from actionlib_core.wire.ros2.parameters import serve_parameters
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from actionlib_core.config import Distro
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Transport
 
@@ -36,15 +38,15 @@ _ids: weakref.WeakKeyDictionary[Transport, Iterator[int]] = weakref.WeakKeyDicti
 def choose_network(networks: Sequence[Ros2], name: str) -> Ros2:
     """Return the network for the full name `name`.
 
-    Without any setting it is the network that this program has joined anyway, in ROS domain 0. Of
-    several networks it is the first whose robot or patterns match the name, else the one that has
-    neither.
+    Without any setting it is the network that this program has joined anyway, in ROS domain 0, of
+    the default distribution. Of several networks it is the first whose robot or patterns match the
+    name, else the one that has neither.
 
     Raises:
         ConfigError: there are several, and the name belongs to none of them.
     """
     if len(networks) <= 1:
-        return networks[0] if networks else Ros2()
+        return networks[0] if networks else Ros2(distro=cast("Distro", default_distro()))
     for network in networks:
         if is_named(network, name):
             return network

@@ -22,8 +22,11 @@ ARGUMENTS: dict[str, list[dict[str, Any]]] = {
         {"topic": "t", "type": "std_msgs/Bool", "until": "data"},
         {"topic": "t", "type": "nav2_msgs/SpeedLimit", "key": "limit", "timeout": None},
     ],
+    "clear_costmaps": [{}, {"navigation": "move_base", "namespace": "robot_0"}],
     "compute": [{"index": "index + 1"}],
+    "dock": [{"id": "home"}, {"place": "here", "exec_timeout": None}],
     "drive_to": [{"x": 1.0, "y": 2.0}, {"place": "home"}],
+    "follow_waypoints": [{"places": [{"x": 1, "y": 2}], "missed_key": "m"}, {"places": "route"}],
     "locate": [{}],
     "look_up_transform": [{"key": "cup", "frame": "cup"}],
     "monitor": [{"topic": "t", "type": "std_msgs/Bool", "valid_while": "data"}],
@@ -38,6 +41,7 @@ ARGUMENTS: dict[str, list[dict[str, Any]]] = {
     "set_lifecycle": [{"node": "map_server"}, {"node": "map_server", "state": "inactive"}],
     "set_parameters": [{"node": "controller_server", "values": {"max_vel_x": 0.2}}],
     "turn": [{"degrees": 90}],
+    "undock": [{}],
     "wait": [{"seconds": 1}, {}],
 }
 
@@ -65,7 +69,14 @@ def test_compute_reads_and_writes_the_userdata():
 
 @pytest.mark.parametrize(
     ("name", "given"),
-    [("drive_to", {}), ("drive_to", {"place": "a", "x": 1, "y": 2}), ("compute", {"a": "("})],
+    [
+        ("follow_waypoints", {"places": [{"x": 1.0}]}),
+        ("follow_waypoints", {"places": [3]}),
+        ("dock", {}),
+        ("drive_to", {}),
+        ("drive_to", {"place": "a", "x": 1, "y": 2}),
+        ("compute", {"a": "("}),
+    ],
 )
 def test_wrong_arguments_are_refused(name, given):
     with pytest.raises(InvalidStateError):

@@ -39,6 +39,13 @@ def test_name_of_no_network_is_refused():
         choose_network(FLEET[:2], "spin")
 
 
+def test_the_network_without_settings_is_of_the_default_distribution(monkeypatch):
+    """It was of Jazzy, whatever the environment said, so the classes and the network differed."""
+    assert choose_network((), "spin").distro == "jazzy"
+    monkeypatch.setenv("SMACHPY_ROS2_DISTRO", "humble")
+    assert choose_network((), "spin").distro == "humble"
+
+
 def test_only_network_has_every_name_and_none_is_the_own_session():
     assert choose_network(FLEET[1:2], "spin") == FLEET[1]
     assert choose_network((), "spin") == Ros2()
