@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import smachpy
+from actionlib_core.clock import VirtualClock
 from smachpy import StateMachine, when
-from smachpy.events import to_record
+from smachpy.events import from_record, to_record
 from smachpy_viz.model.extract import extract
 from smachpy_viz.model.why import why
+from smachpy_viz.runs.listing import RowFold
+from smachpy_viz.terminal.lines import EventLines
+from smachpy_viz.terminal.panel import TerminalView
 
 
 @smachpy.state(["done", "failed"], output_keys=["level"])
@@ -52,3 +56,21 @@ def test_why_says_that_a_run_without_an_end_tidies_up():
     begun = next(i for i, event in enumerate(story) if event["path"] == "/M/DOCK")
     found = why(smachpy.describe(sm), story[: begun + 1])
     assert "to tidy up" in found.text()
+
+
+def test_terminal_and_list_say_that_a_run_tidies_up():
+    sm, story = machine(), []
+    sm.subscribe(lambda event: story.append(to_record(event)))
+    sm.execute()
+    record = smachpy.describe(sm)
+    view = TerminalView(record, plain=True, clock=VirtualClock())
+    assert ", tidying up" in view._active("/M/DOCK", 1.0).plain
+    assert "tidying up" not in view._active("/M/WORK", 1.0).plain
+    begun = next(i for i, event in enumerate(story) if event["path"] == "/M/DOCK")
+    row = RowFold(record)
+    for event in story[: begun + 1]:
+        row.add(event)
+    assert row.row(lambda: "")["reason"] == "DOCK, tidying up"
+    left = next(event for event in story[begun:] if event["kind"] == "Left")
+    line = EventLines(record, view.history, panel=False).line(from_record(left))
+    assert "DOCK  tidied up: done" in line.plain

@@ -18,7 +18,7 @@ from smachpy.events.outcome_classes import outcome_class
 from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.userdata.shown import literal
-from smachpy_viz.model.labels import GLYPHS, innermost, shorten, visible
+from smachpy_viz.model.labels import GLYPHS, cleanups, innermost, shorten, tidies, visible
 from smachpy_viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ class MissionApp(App[None]):
         self._machines = machines
         self._send = send
         self._machine: Machine | None = None
+        self._cleanups: tuple[str, ...] = ()
         self._shown: tuple[str, int] = ("", 0)  # epoch and revision of the machine in the tree
         self._seq = 0  # number of the newest event in `_state`
         self._until: int | None = None  # while looking back: number of the event that is shown
@@ -168,6 +169,7 @@ class MissionApp(App[None]):
         tree = self.query_one(Tree)
         tree.reset(_clean(shorten(record.label)), record)
         self._places = {record.path: tree.root}
+        self._cleanups = cleanups(record)
         self._targets = {
             (f"{state.path}/{edge.source}", edge.outcome): edge.target
             for state in record.walk()
@@ -271,6 +273,8 @@ class MissionApp(App[None]):
             word, style = "paused", WAITING
         elif self._state.holding_up():
             word, style = "preempting", STYLES["preempted"]
+        elif any(tidies(path, self._cleanups) for path in self._state.active()):
+            word, style = "tidying up", RUNNING
         else:
             word, style = "running", RUNNING
         active = self._state.active()
@@ -341,7 +345,8 @@ class MissionApp(App[None]):
             if node.data is None:
                 continue
             state = self._state.data["states"].get(path)
-            node.set_label(_clean(_label(node.data, state, now)))
+            label = _label(node.data, state, now, tidies=path in self._cleanups)
+            node.set_label(_clean(label))
             if self._follow and state and state["since"] and node.data.children:
                 node.expand()
 
@@ -515,7 +520,9 @@ def _asker(asked: dict[str, Any] | None) -> str:
     return asker_text(asked["source"], asked["by"], asked["why"])
 
 
-def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
+def _label(
+    record: StateRecord, state: dict[str, Any] | None, now: int, *, tidies: bool = False
+) -> Text:
     glyph = GLYPHS.get(record.kind, "\u00b7" if not record.children else "")
     name = f"{glyph} {shorten(record.label)}".strip()
     if state is None:
@@ -523,8 +530,9 @@ def _label(record: StateRecord, state: dict[str, Any] | None, now: int) -> Text:
     if state["since"] is not None:
         style = f"bold {STYLES['preempted']}" if state.get("preempt") else f"bold {RUNNING}"
         note = f" {shorten(state['note'], 40)}" if state.get("note") else ""
+        tidy = ", tidying up" if tidies else ""
         text = Text.assemble(
-            (name, style), note, (f"  {(now - state['since']) / 1e9:.1f} s", "dim")
+            (name, style), tidy, note, (f"  {(now - state['since']) / 1e9:.1f} s", "dim")
         )
         if not state.get("preempt"):
             return text

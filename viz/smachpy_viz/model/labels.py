@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from smachpy.events.outcome_classes import outcome_class
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable
 
+    from smachpy.events.introspection import StateRecord
     from smachpy.events.outcome_classes import OutcomeClass
 
 LABEL_LENGTH = 40
@@ -51,6 +52,21 @@ def end_class(kind: str, outcome: str, success: Collection[str] | None = None) -
 def innermost(paths: Collection[str]) -> list[str]:
     """Return the paths that contain no other one of `paths`."""
     return [path for path in paths if not any(other.startswith(f"{path}/") for other in paths)]
+
+
+def cleanups(record: StateRecord) -> tuple[str, ...]:
+    """Return the paths of the states that run at every end of what they are in."""
+    return tuple(f"{one.path}/{one.cleanup}" for one in record.walk() if one.cleanup)
+
+
+def tidies(path: str, among: Iterable[str]) -> bool:
+    """Return whether a state is a clean-up, or in one.
+
+    Args:
+        path: Of the state.
+        among: What `cleanups` returns.
+    """
+    return any(f"{path}/".startswith(f"{one}/") for one in among)
 
 
 def one_line(text: str) -> str:

@@ -13,7 +13,7 @@ from smachpy.events import answered_text, asker_text
 from smachpy.events.outcome_classes import is_good, outcome_class
 from smachpy.events.run_state import RAISED
 from smachpy.userdata.shown import literal
-from smachpy_viz.model.labels import innermost, shorten
+from smachpy_viz.model.labels import cleanups, innermost, shorten, tidies
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -115,7 +115,7 @@ def why(record: StateRecord, events: Sequence[dict[str, Any]]) -> Explanation:
         return Explanation(record.label, None, None, None)
     ends = [i for i, event in enumerate(run) if _is(event, "Finished", record.path)]
     began = run[0].get("began_ns", run[0]["stamp_ns"])
-    reader = _CauseFinder({one.path: one for one in record.walk()}, run)
+    reader = _CauseFinder(record, run)
     if not ends:
         return Explanation(record.label, None, began, run[-1]["stamp_ns"], reader.running())
     end = run[ends[-1]]
@@ -151,10 +151,10 @@ def _is(event: dict[str, Any], kind: str, path: str) -> bool:
 class _CauseFinder:
     """Follows the causes of one run backwards."""
 
-    def __init__(self, states: dict[str, StateRecord], run: list[dict[str, Any]]) -> None:
-        self._states = states
+    def __init__(self, record: StateRecord, run: list[dict[str, Any]]) -> None:
+        self._states = states = {one.path: one for one in record.walk()}
+        self._cleanups = cleanups(record)
         self._parents = {child.path: one for one in states.values() for child in one.children}
-        self._cleanups = [f"{one.path}/{one.cleanup}" for one in states.values() if one.cleanup]
         self._run = run
 
     def causes(self, path: str, end: int) -> tuple[Cause, ...]:
@@ -187,8 +187,8 @@ class _CauseFinder:
             event = self._run[active[path]]
             cause = self._own_cause(path, active[path], len(self._run), "")
             reason = "" if cause is None else f"{cause.what}: {cause.reason}"
-            tidies = any(f"{path}/".startswith(f"{one}/") for one in self._cleanups)
-            what = "entered, to tidy up, and not left" if tidies else "entered, and not left"
+            is_cleanup = tidies(path, self._cleanups)
+            what = "entered, to tidy up, and not left" if is_cleanup else "entered, and not left"
             found.append(Cause(path, event["stamp_ns"], what, "other", reason))
         return tuple(found)
 

@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from smachpy.events.run_state import RAISED
-from smachpy_viz.model.labels import end_class, innermost, shorten
+from smachpy_viz.model.labels import cleanups, end_class, innermost, shorten, tidies
 from smachpy_viz.model.why import newest_run, why
 
 if TYPE_CHECKING:
@@ -140,7 +140,8 @@ class RowFold:
         if outcome is None:
             for path in innermost(self._active)[:1]:
                 note = self._active[path]
-                reason = _name(path, record) + (f": {note}" if note else "")
+                tidy = ", tidying up" if tidies(path, cleanups(record)) else ""
+                reason = _name(path, record) + tidy + (f": {note}" if note else "")
         elif outcome == RAISED or record.class_of(outcome) in {"failure", "preempted"}:
             reason = cause()
         pieces = [*self._pieces, *(self._piece(path, None, "active") for path in self._since)]

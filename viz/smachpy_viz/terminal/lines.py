@@ -9,7 +9,7 @@ from rich.text import Text
 from smachpy import events as ev
 from smachpy.events.outcome_classes import OutcomeClass, outcome_class
 from smachpy.events.run_state import RAISED
-from smachpy_viz.model.labels import one_line, shorten
+from smachpy_viz.model.labels import cleanups, one_line, shorten
 from smachpy_viz.model.progress import progress_of
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ class EventLines:
         self._panel = panel
         self._narrow = narrow
         self._feedback_lines: dict[str, float] = {}
+        self._cleanups = cleanups(record)
         self._targets = {
             (f"{state.path}/{edge.source}", edge.outcome): edge
             for state in record.walk()
@@ -120,6 +121,8 @@ class EventLines:
         edge = self._targets.get((event.path, event.outcome))
         if edge is not None and not edge.target_is_outcome:
             words = Text.assemble(words, f" \u2192 {shorten(edge.target)}")
+        if event.path in self._cleanups:
+            words = Text.assemble("tidied up: ", words)
         return self._line(event, Text.assemble(words, self._duration(event)))
 
     def _failed(self, event: ev.Failed) -> Text:

@@ -36,7 +36,7 @@ from actionlib_core.clock import current_clock
 from smachpy.userdata.secret import masked
 from smachpy.userdata.shown import is_shown, literal
 from smachpy_viz.model.history import History
-from smachpy_viz.model.labels import GLYPHS, innermost, shorten
+from smachpy_viz.model.labels import GLYPHS, cleanups, innermost, shorten, tidies
 from smachpy_viz.model.progress import progress_of, seconds_left, written_progress
 from smachpy_viz.terminal.lines import NARROW, RUNNING, STYLES, EventLines
 
@@ -95,6 +95,7 @@ class TerminalView:
     ) -> None:
         self.history = History()
         self._record = record
+        self._cleanups = cleanups(record)
         self._kinds = {state.path: state.kind for state in record.walk() if not state.children}
         self._console = console or _standard_output()
         self._clock = clock or current_clock()
@@ -246,6 +247,7 @@ class TerminalView:
             (f"{glyph} ", RUNNING),
             (f"{trail} \u203a " if trail else "", "dim"),
             (names[-1], f"bold {RUNNING}"),
+            (", tidying up" if tidies(path, self._cleanups) else "", ""),
             (f"  {_span(seconds)}", "dim"),
         )
         line.no_wrap = True

@@ -3132,85 +3132,6 @@ var Pointer = class {
   }
 };
 
-// src/core/store/status.ts
-var Status = class {
-  #data;
-  #playback;
-  constructor(data, playback) {
-    this.#data = data;
-    this.#playback = playback;
-  }
-  activePaths = O(() => {
-    this.#playback.tick.value;
-    return Object.entries(this.#playback.shown().states).filter(([, state]) => state.since != null).map(([path]) => path);
-  });
-  activeLeaves = O(() => innermost(this.activePaths.value, (path) => path));
-  /** The running innermost states; after the end of a run, the innermost state that was left last. */
-  lastLeaves = O(() => {
-    if (this.activeLeaves.value.length) return this.activeLeaves.value;
-    const left = Object.entries(this.#playback.shown().states).filter(([, state]) => state.left != null);
-    if (!left.length) return [];
-    const depth = (path) => path.split("/").length;
-    const [last] = left.reduce((a5, b3) => (b3[1].left ?? 0) > (a5[1].left ?? 0) ? b3 : a5);
-    const entered = (this.#data.run.visitAt(last)?.from ?? 0) * 1e6;
-    const isWithin = (path, top) => `${path}/`.startsWith(`${top}/`);
-    const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered);
-    const end = innermost(inside, ([path]) => path);
-    const newest3 = end.reduce((a5, b3) => {
-      const later = (b3[1].left ?? 0) - (a5[1].left ?? 0);
-      return later > 0 || later === 0 && depth(b3[0]) > depth(a5[0]) ? b3 : a5;
-    });
-    return [newest3[0]];
-  });
-  runStatus = O(() => {
-    this.#playback.tick.value;
-    const data = this.#playback.shown();
-    const about = this.#data.facts.value;
-    const connection = this.#data.connection.value;
-    const cutShort = data.ended == null && data.started != null;
-    if (!about) return { word: "waiting", kind: "other" };
-    if (this.#playback.cursor.value !== null) return { word: "replay", kind: "preempted" };
-    if (connection === "file" && cutShort) return { word: "recording ends here", kind: "active" };
-    if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
-    if (connection === "lost") return { word: "reconnecting", kind: "waiting" };
-    if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: outcomeClass(data.outcome) };
-    if (asks(data)) return { word: "asks you", kind: "waiting" };
-    if (about.control?.paused) return { word: this.#pausedText(data), kind: "waiting" };
-    if (data.states[this.#data.model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
-    if (data.started == null) return { word: "not started", kind: "other" };
-    return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
-  });
-  /** The paused state and the reason, as text. */
-  #pausedText(data) {
-    const held = Object.entries(data.states).filter(([, state2]) => state2.waits != null);
-    if (!held.length) return "paused";
-    const [path, state] = held[0];
-    const why = state.waits === "pause" ? "" : ` (${state.waits})`;
-    return `paused before ${this.#data.nameOf(path)}${held.length > 1 ? ` and ${held.length - 1} more` : ""}${why}`;
-  }
-  /** Why commands are disabled; null if they are not. */
-  whyDisarmed = O(() => {
-    if (this.#playback.cursor.value !== null) return "You look at the past: back to live first (l)";
-    if (this.#data.connection.value === "lost") return "The viewer's server does not answer";
-    return this.#data.facts.value?.stale == null ? null : "The mission's program does not answer";
-  });
-  /** Whether a goal seems to wait for a server. A server behind a bridge has no token and shows only by its answers. */
-  hasNoServer(goal) {
-    const { serversSeen, connection, facts, run } = this.#data;
-    if (serversSeen.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
-    if (connection.value !== "live" || this.#playback.cursor.value !== null) return false;
-    if (facts.value?.stale != null || facts.value?.recorded) return false;
-    const plain = (name2) => name2.replace(/^\//, "");
-    const name = plain(goal.action);
-    const [there, gone] = JSON.parse(serversSeen.value);
-    if (there.includes(name)) return false;
-    if (gone.includes(name)) return true;
-    const answered = (one) => plain(one.action) === name && (one.feedback != null || one.result != null);
-    return !Object.values(run.now.goals).some(answered);
-  }
-};
-var asks = (data) => Object.values(data.states).some(({ since, question }) => since != null && question?.answered === null);
-
 // src/core/model.ts
 var CHANGE_SIGNS = {
   added: "+",
@@ -3238,6 +3159,10 @@ var KIND_NAMES = {
   missing: "missing state"
 };
 var isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
+var isCleanup = (node) => node.details.some(([name, value]) => name === "runs" && value === "at any end");
+function isInCleanup(node) {
+  return Boolean(node && (isCleanup(node) || isInCleanup(node.parent)));
+}
 var MANY = 7;
 var READABLE = 40;
 var Model = class {
@@ -3367,6 +3292,89 @@ function linksOf(node) {
   }
   return found;
 }
+
+// src/core/store/status.ts
+var Status = class {
+  #data;
+  #playback;
+  constructor(data, playback) {
+    this.#data = data;
+    this.#playback = playback;
+  }
+  activePaths = O(() => {
+    this.#playback.tick.value;
+    return Object.entries(this.#playback.shown().states).filter(([, state]) => state.since != null).map(([path]) => path);
+  });
+  activeLeaves = O(() => innermost(this.activePaths.value, (path) => path));
+  /** The running innermost states; after the end of a run, the innermost state that was left last. */
+  lastLeaves = O(() => {
+    if (this.activeLeaves.value.length) return this.activeLeaves.value;
+    const left = Object.entries(this.#playback.shown().states).filter(([, state]) => state.left != null);
+    if (!left.length) return [];
+    const depth = (path) => path.split("/").length;
+    const [last] = left.reduce((a5, b3) => (b3[1].left ?? 0) > (a5[1].left ?? 0) ? b3 : a5);
+    const entered = (this.#data.run.visitAt(last)?.from ?? 0) * 1e6;
+    const isWithin = (path, top) => `${path}/`.startsWith(`${top}/`);
+    const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered);
+    const end = innermost(inside, ([path]) => path);
+    const newest3 = end.reduce((a5, b3) => {
+      const later = (b3[1].left ?? 0) - (a5[1].left ?? 0);
+      return later > 0 || later === 0 && depth(b3[0]) > depth(a5[0]) ? b3 : a5;
+    });
+    return [newest3[0]];
+  });
+  runStatus = O(() => {
+    this.#playback.tick.value;
+    const data = this.#playback.shown();
+    const about = this.#data.facts.value;
+    const connection = this.#data.connection.value;
+    const cutShort = data.ended == null && data.started != null;
+    if (!about) return { word: "waiting", kind: "other" };
+    if (this.#playback.cursor.value !== null) return { word: "replay", kind: "preempted" };
+    if (connection === "file" && cutShort) return { word: "recording ends here", kind: "active" };
+    if (about.stale != null && data.ended == null) return { word: "stale", kind: "waiting" };
+    if (connection === "lost") return { word: "reconnecting", kind: "waiting" };
+    if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: outcomeClass(data.outcome) };
+    if (asks(data)) return { word: "asks you", kind: "waiting" };
+    if (about.control?.paused) return { word: this.#pausedText(data), kind: "waiting" };
+    const { model } = this.#data;
+    const isTidying = this.activeLeaves.value.some((path) => isInCleanup(model.value?.get(path)));
+    const isAsked = data.states[model.value?.root.path ?? ""]?.preempt;
+    if (isTidying) return { word: "tidying up", kind: isAsked ? "preempted" : "active" };
+    if (isAsked) return { word: "preempting", kind: "preempted" };
+    if (data.started == null) return { word: "not started", kind: "other" };
+    return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
+  });
+  /** The paused state and the reason, as text. */
+  #pausedText(data) {
+    const held = Object.entries(data.states).filter(([, state2]) => state2.waits != null);
+    if (!held.length) return "paused";
+    const [path, state] = held[0];
+    const why = state.waits === "pause" ? "" : ` (${state.waits})`;
+    return `paused before ${this.#data.nameOf(path)}${held.length > 1 ? ` and ${held.length - 1} more` : ""}${why}`;
+  }
+  /** Why commands are disabled; null if they are not. */
+  whyDisarmed = O(() => {
+    if (this.#playback.cursor.value !== null) return "You look at the past: back to live first (l)";
+    if (this.#data.connection.value === "lost") return "The viewer's server does not answer";
+    return this.#data.facts.value?.stale == null ? null : "The mission's program does not answer";
+  });
+  /** Whether a goal seems to wait for a server. A server behind a bridge has no token and shows only by its answers. */
+  hasNoServer(goal) {
+    const { serversSeen, connection, facts, run } = this.#data;
+    if (serversSeen.value === null || !goal || goal.ended != null || goal.feedback != null) return false;
+    if (connection.value !== "live" || this.#playback.cursor.value !== null) return false;
+    if (facts.value?.stale != null || facts.value?.recorded) return false;
+    const plain = (name2) => name2.replace(/^\//, "");
+    const name = plain(goal.action);
+    const [there, gone] = JSON.parse(serversSeen.value);
+    if (there.includes(name)) return false;
+    if (gone.includes(name)) return true;
+    const answered = (one) => plain(one.action) === name && (one.feedback != null || one.result != null);
+    return !Object.values(run.now.goals).some(answered);
+  }
+};
+var asks = (data) => Object.values(data.states).some(({ since, question }) => since != null && question?.answered === null);
 
 // src/core/store/view.ts
 var AROUND = 60;
@@ -3904,12 +3912,14 @@ function attemptText(path, attempt) {
   const most = /^(\d+) attempts/.exec(retry)?.[1];
   return `attempt ${attempt}${most ? ` of ${most}` : ""}`;
 }
+var tidies = (path) => isInCleanup(store.data.model.value?.get(path));
 function wordsOf(name, span, now) {
   const took = duration(Math.max(0, Math.min(span.to ?? now, now) - span.from) / 1e3);
   const purpose = purposeOfVisit(span);
   const runs2 = span.to === null || span.to > now;
   const facts = [
     (span.attempt ?? 1) > 1 && attemptText(span.path, span.attempt ?? 1),
+    tidies(span.path) && (runs2 ? "tidying up" : "tidied up"),
     runs2 && span.serviced !== null && span.serviced <= now && "cleaning up"
   ].filter(Boolean);
   const more = facts.map((fact) => `, ${fact}`).join("");
@@ -3933,7 +3943,7 @@ function insideText(path) {
 function purposeOfState(path) {
   const span = store.data.run.open.get(path);
   const purpose = span ? purposeOfVisit(span) : "";
-  return purpose && `→ ${purpose}`;
+  return [tidies(path) && "tidying up", purpose && `→ ${purpose}`].filter(Boolean).join(" ");
 }
 
 // src/core/commands.ts
@@ -4654,7 +4664,7 @@ var Diagram = class {
     classes.toggle("raised", !active && Boolean(state?.error));
     classes.toggle("faded", !active && state?.left != null && now - state.left / 1e6 > FADE_MS);
     write(view2.glyph, glyphOf(state, kind));
-    write(view2.badge, active ? elapsed(state, now) : view2.node.note || "");
+    write(view2.badge, active ? elapsed(view2.node, state, now) : view2.node.note || "");
     const part = active ? goal?.progress?.fraction ?? 0 : 0;
     if (view2.bar && view2.part !== part) {
       view2.part = part;
@@ -4725,7 +4735,7 @@ var Diagram = class {
   /** Update the clock of a running state. */
   updateBadge(path, state, now) {
     const view2 = this.states.get(path);
-    if (view2 && state.since != null) write(view2.badge, elapsed(state, now));
+    if (view2 && state.since != null) write(view2.badge, elapsed(view2.node, state, now));
   }
   /** Flash a transition that was just taken. */
   flash(path, outcome, now) {
@@ -4830,11 +4840,13 @@ function write(shown, text2) {
   shown.text = text2;
   shown.element.textContent = text2;
 }
-function elapsed(state, now) {
+function elapsed(node, state, now) {
   const since = (ns) => Math.max(0, now - (ms(ns) ?? now)) / 1e3;
   const attempt = state.attempt ?? 1;
+  const tidies2 = isInCleanup(node);
   if (since(state.since) * 1e3 < BRIEF_MS && !state.preempt && attempt < 2) return "";
   const parts = [];
+  if (tidies2) parts.push("tidying up");
   if (state.item != null) parts.push(`#${state.item + 1}`);
   if (attempt > 1) parts.push(`attempt ${attempt}`);
   if (!state.preempt) parts.push(duration(since(state.since)));

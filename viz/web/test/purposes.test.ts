@@ -1,8 +1,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { goalText, purposeOf, purposeOfVisit, wordsOf } from "#core/purposes.ts";
+import { Model } from "#core/model.ts";
+import { goalText, purposeOf, purposeOfState, purposeOfVisit, wordsOf } from "#core/purposes.ts";
 import { store } from "#core/store.ts";
-import { event } from "./fixtures.ts";
+import { event, fixture } from "./fixtures.ts";
 
 const pose = (x: number, y: number) => ({
   $msg: "move_base_msgs/MoveBaseGoal",
@@ -48,6 +49,26 @@ test("without a purpose a bar has the state's name, and says that it cleans up",
   const span = store.data.run.spans[1];
   assert.deepEqual(wordsOf("WAIT", span, span.from + 500), ["WAIT 0.5 s", "WAIT"]);
   assert.equal(wordsOf("WAIT", span, span.from + 5000)[0], "WAIT, cleaning up 5.0 s");
+});
+
+test("bars of a clean-up say so, while it runs and afterwards", () => {
+  store.startRun(null, [
+    event("Started", "/PATROL"),
+    event("Entered", "/PATROL/DOCK"),
+    event("Left", "/PATROL/DOCK", { outcome: "ok" }),
+    event("Entered", "/PATROL/ROUND"),
+    event("Entered", "/PATROL/ROUND/DRIVE"),
+  ]);
+  const payload = fixture("page_model.json");
+  payload.explicit.children[0].details = [["runs", "at any end"]]; // of ROUND
+  store.data.model.value = new Model(payload, false);
+  const [, dock, tidying, inside] = store.data.run.spans;
+  assert.equal(wordsOf("DOCK", dock, dock.from + 500)[0], "DOCK 0.5 s");
+  assert.equal(wordsOf("ROUND", tidying, tidying.from + 2000)[0], "ROUND, tidying up 2.0 s");
+  assert.equal(wordsOf("ROUND", { ...tidying, to: tidying.from + 3000 }, 1e12)[0], "ROUND, tidied up 3.0 s");
+  assert.equal(wordsOf("DRIVE", inside, inside.from + 2000)[0], "DRIVE, tidying up 2.0 s");
+  assert.equal(purposeOfState("/PATROL/ROUND/DRIVE"), "tidying up");
+  store.data.model.value = null;
 });
 
 test("times of waiting have a beginning, an end and a reason", () => {

@@ -35,6 +35,14 @@ export const KIND_NAMES: Record<string, string> = {
 /** Whether a box is a place or a transition of a plan instead of a state. */
 export const isPartOfNet = ({ kind }: StateNode) => kind === "transition" || kind.endsWith("place");
 
+/** Whether a state runs at every end of what it is in. */
+const isCleanup = (node: StateNode) => node.details.some(([name, value]) => name === "runs" && value === "at any end");
+
+/** Whether a state is a clean-up, or in one. */
+export function isInCleanup(node: StateNode | null | undefined): boolean {
+  return Boolean(node && (isCleanup(node) || isInCleanup(node.parent)));
+}
+
 const MANY = 7; // branches of a concurrence from which they are cards, and stay closed
 const READABLE = 40; // boxes that are readable at a glance
 

@@ -1,6 +1,7 @@
 // What a goal or a state is for, in a few words: "kitchen", "(3.2, 1.0)".
 
 import { own } from "#core/fold.ts";
+import { isInCleanup } from "#core/model.ts";
 import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { GoalRun, Span } from "#core/types.ts";
@@ -42,6 +43,9 @@ export function attemptText(path: string, attempt: number) {
   return `attempt ${attempt}${most ? ` of ${most}` : ""}`;
 }
 
+/** Whether a state is a clean-up, or in one. */
+const tidies = (path: string) => isInCleanup(store.data.model.value?.get(path));
+
 /**
  * What a bar says about a visit, the longest text first.
  * @param now [ms]
@@ -52,6 +56,7 @@ export function wordsOf(name: string, span: Span, now: number) {
   const runs = span.to === null || span.to > now;
   const facts = [
     (span.attempt ?? 1) > 1 && attemptText(span.path, span.attempt ?? 1),
+    tidies(span.path) && (runs ? "tidying up" : "tidied up"),
     runs && span.serviced !== null && span.serviced <= now && "cleaning up",
   ].filter(Boolean);
   const more = facts.map((fact) => `, ${fact}`).join("");
@@ -79,5 +84,5 @@ export function insideText(path: string) {
 export function purposeOfState(path: string) {
   const span = store.data.run.open.get(path);
   const purpose = span ? purposeOfVisit(span) : "";
-  return purpose && `\u2192 ${purpose}`;
+  return [tidies(path) && "tidying up", purpose && `\u2192 ${purpose}`].filter(Boolean).join(" ");
 }

@@ -2,7 +2,7 @@
 
 import { containerOf, ms, own } from "#core/fold.ts";
 import type { Model } from "#core/model.ts";
-import { CHANGE_SIGNS, isPartOfNet, joinText, KIND_NAMES, signed } from "#core/model.ts";
+import { CHANGE_SIGNS, isInCleanup, isPartOfNet, joinText, KIND_NAMES, signed } from "#core/model.ts";
 import { commonClass, endClass, outcomeClass } from "#core/outcomes.ts";
 import type { CountOf, HeatOf } from "#core/statistics.ts";
 import { duration, shorten } from "#core/text.ts";
@@ -374,7 +374,7 @@ export class Diagram {
     classes.toggle("raised", !active && Boolean(state?.error));
     classes.toggle("faded", !active && state?.left != null && now - state.left / 1e6 > FADE_MS);
     write(view.glyph, glyphOf(state, kind));
-    write(view.badge, active ? elapsed(state, now) : view.node.note || "");
+    write(view.badge, active ? elapsed(view.node, state, now) : view.node.note || "");
     const part = active ? (goal?.progress?.fraction ?? 0) : 0;
     if (view.bar && view.part !== part) {
       view.part = part;
@@ -450,7 +450,7 @@ export class Diagram {
   /** Update the clock of a running state. */
   updateBadge(path: string, state: StateRun, now: number) {
     const view = this.states.get(path);
-    if (view && state.since != null) write(view.badge, elapsed(state, now));
+    if (view && state.since != null) write(view.badge, elapsed(view.node, state, now));
   }
 
   /** Flash a transition that was just taken. */
@@ -573,11 +573,13 @@ function write(shown: TextOf, text: string) {
 }
 
 /** The text of a running state's badge: its time, attempt and so on. */
-function elapsed(state: StateRun, now: number) {
+function elapsed(node: StateNode, state: StateRun, now: number) {
   const since = (ns: number | null | undefined) => Math.max(0, now - (ms(ns) ?? now)) / 1000;
   const attempt = state.attempt ?? 1;
+  const tidies = isInCleanup(node);
   if (since(state.since) * 1000 < BRIEF_MS && !state.preempt && attempt < 2) return "";
   const parts = [];
+  if (tidies) parts.push("tidying up");
   if (state.item != null) parts.push(`#${state.item + 1}`);
   if (attempt > 1) parts.push(`attempt ${attempt}`);
   if (!state.preempt) parts.push(duration(since(state.since)));

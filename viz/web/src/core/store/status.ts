@@ -2,6 +2,7 @@
 
 import { computed } from "@preact/signals";
 import { innermost } from "#core/lists.ts";
+import { isInCleanup } from "#core/model.ts";
 import { outcomeClass } from "#core/outcomes.ts";
 import type { Data } from "#core/store/data.ts";
 import type { Playback } from "#core/store/playback.ts";
@@ -58,7 +59,11 @@ export class Status {
     if (data.ended != null) return { word: `ended: ${data.outcome}`, kind: outcomeClass(data.outcome) };
     if (asks(data)) return { word: "asks you", kind: "waiting" };
     if (about.control?.paused) return { word: this.#pausedText(data), kind: "waiting" };
-    if (data.states[this.#data.model.value?.root.path ?? ""]?.preempt) return { word: "preempting", kind: "preempted" };
+    const { model } = this.#data;
+    const isTidying = this.activeLeaves.value.some((path) => isInCleanup(model.value?.get(path)));
+    const isAsked = data.states[model.value?.root.path ?? ""]?.preempt;
+    if (isTidying) return { word: "tidying up", kind: isAsked ? "preempted" : "active" };
+    if (isAsked) return { word: "preempting", kind: "preempted" };
     if (data.started == null) return { word: "not started", kind: "other" };
     return { word: about.recorded ? "recording ends here" : "running", kind: "active" };
   });
