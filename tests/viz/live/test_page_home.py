@@ -208,19 +208,37 @@ def test_the_timeline_has_a_gap_where_no_process_ran_the_mission(served, look):
     assert page.locator(".log >> text=resumed after an outage of 10 s").count() == 1
 
 
-def test_a_large_fleet_is_shown_in_parts(served, look):
-    for number in range(40):
-        served.add(f"r{number:02}", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+def test_a_fleet_of_a_thousand_is_scrolled_through_a_few_cards(served, look):
+    for number in range(1000):
+        served.add(f"r{number:03}", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
     page = look(served.start(home=True), drawn=False)
     page.click("button:has-text('Fleet')")
-    page.wait_for_selector(".fleet header:has-text('1 to 32 of 40 live runs')")
-    assert page.locator(".fleet .cards button").count() == 32
-    page.click("button:has-text('Later')")
-    page.wait_for_selector(".fleet header:has-text('33 to 40 of 40 live runs')")
-    assert page.locator(".fleet .cards button").count() == 8
-    assert page.locator("button:has-text('Later')").is_disabled()
-    page.click("button:has-text('Earlier')")
+    page.wait_for_selector(".fleet header:has-text('1 to 32 of 1,000 live runs')")
+    cards = page.locator(".fleet .cards button")
+    assert cards.count() == page.locator(".fleet .lanes svg").count() == 32
+
+    def scroll(where):
+        page.evaluate(
+            f"() => {{ const box = document.querySelector('.cards'); box.scrollTop = {where}; }}"
+        )
+
+    scroll("box.scrollHeight")
+    last = page.locator(".fleet .cards button:has-text('r999')")
+    last.wait_for()
+    assert cards.count() <= 32
+    assert last.bounding_box()["y"] > page.locator(".cards").bounding_box()["y"]
+    scroll(0)
     page.wait_for_selector(".fleet header:has-text('1 to 32')")
+    # In the middle, the cards in view are those of the place: 500 stand above the first.
+    scroll("box.scrollHeight / 2")
+    page.wait_for_function(
+        """() => { const box = document.querySelector('.cards').getBoundingClientRect();
+          return [...document.querySelectorAll('.cards button')].some((card) => {
+            const { top } = card.getBoundingClientRect();
+            return Math.abs(top - box.top) < 100 && card.textContent.startsWith('r50'); }); }"""
+    )
+    page.click(".fleet header button:has-text('Close')")
+    page.wait_for_selector(".fleet", state="detached")
 
 
 def test_live_runs_together_have_cards_lanes_and_one_map(served, look):

@@ -9078,11 +9078,14 @@ function sceneOf(rows) {
 // src/panels/fleet.tsx
 var REFRESH_MS2 = 1e3;
 var MOST_ROWS3 = 32;
+var GAP2 = 8;
+var CARD2 = { width: 200 + GAP2, height: 88 + GAP2 };
 var FleetPage = () => store.view.pageShown.value === "fleet" ? /* @__PURE__ */ a4(OpenFleet, {}) : null;
 function OpenFleet() {
   const [skip, setSkip] = d2(0);
   const [found, setFound] = d2({ rows: [], skip: 0, total: 0 });
   const heading = T2(null);
+  const box = T2(null);
   A2(() => heading.current?.focus(), []);
   A2(() => {
     let open = true;
@@ -9101,6 +9104,12 @@ function OpenFleet() {
   const last = Math.min(found.skip + MOST_ROWS3, total2);
   const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf2(rows, now);
+  const columns = Math.max(1, Math.floor(((box.current?.clientWidth ?? 0) + GAP2) / CARD2.width));
+  const line = Math.floor(found.skip / columns);
+  const onScroll = (e4) => {
+    const above = Math.floor(e4.target.scrollTop / CARD2.height) - 1;
+    setSkip(Math.max(0, above * columns));
+  };
   return /* @__PURE__ */ a4("section", { class: "fleet", "aria-labelledby": "fleet-title", children: [
     /* @__PURE__ */ a4("header", { children: [
       /* @__PURE__ */ a4("h2", { id: "fleet-title", tabindex: -1, ref: heading, children: "Fleet" }),
@@ -9109,14 +9118,10 @@ function OpenFleet() {
         " live runs"
       ] }),
       /* @__PURE__ */ a4("span", { class: "spread" }),
-      total2 > MOST_ROWS3 && /* @__PURE__ */ a4($, { children: [
-        /* @__PURE__ */ a4("button", { disabled: found.skip === 0, onClick: () => setSkip(Math.max(0, found.skip - MOST_ROWS3)), children: "Earlier" }),
-        /* @__PURE__ */ a4("button", { disabled: last >= total2, onClick: () => setSkip(found.skip + MOST_ROWS3), children: "Later" })
-      ] }),
       /* @__PURE__ */ a4("button", { onClick: () => showPage("runs"), children: "Close" })
     ] }),
     /* @__PURE__ */ a4("div", { class: "fleet-top", children: [
-      /* @__PURE__ */ a4("div", { class: "cards", children: rows.map((row) => /* @__PURE__ */ a4("button", { onClick: () => openRun(row.id), children: [
+      /* @__PURE__ */ a4("div", { class: "cards", ref: box, onScroll, children: /* @__PURE__ */ a4("div", { style: { height: `${Math.ceil(total2 / columns) * CARD2.height}px` }, children: /* @__PURE__ */ a4("div", { class: "in-view", style: { transform: `translateY(${line * CARD2.height}px)`, "--columns": columns }, children: rows.map((row) => /* @__PURE__ */ a4("button", { onClick: () => openRun(row.id), children: [
         /* @__PURE__ */ a4("b", { children: shorten(nameOfRow(row), 26) }),
         /* @__PURE__ */ a4("span", { class: `pill-text ${row.asks ? "waiting" : "active"}`, children: row.asks ? "? asks you" : `● ${shorten(row.strip.findLast((one) => one[3] === null)?.[1] ?? "running", 20)}` }),
         /* @__PURE__ */ a4("small", { title: row.reason, children: [
@@ -9124,7 +9129,7 @@ function OpenFleet() {
           ": ",
           shorten(row.reason, 60)
         ] })
-      ] }, row.id)) }),
+      ] }, row.id)) }) }) }),
       !scene.isEmpty && /* @__PURE__ */ a4("div", { class: "fleet-map", children: /* @__PURE__ */ a4(FleetMap, { scene, now }) })
     ] }),
     /* @__PURE__ */ a4("div", { class: "lanes", role: "list", "aria-label": `the last ${duration(seconds)}`, children: lanes.map((lane) => /* @__PURE__ */ a4($, { children: [

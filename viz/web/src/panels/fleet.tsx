@@ -13,6 +13,8 @@ import { isDark } from "#drawing/theme.ts";
 
 const REFRESH_MS = 1000;
 const MOST_ROWS = 32; // as the viewer sends them
+const GAP = 8;
+const CARD = { width: 200 + GAP, height: 88 + GAP }; // [px]; see `.cards button`
 
 export const FleetPage = () => (store.view.pageShown.value === "fleet" ? <OpenFleet /> : null);
 
@@ -20,6 +22,7 @@ function OpenFleet() {
   const [skip, setSkip] = useState(0);
   const [found, setFound] = useState<FleetRuns>({ rows: [], skip: 0, total: 0 });
   const heading = useRef<HTMLHeadingElement | null>(null);
+  const box = useRef<HTMLDivElement | null>(null);
   useEffect(() => heading.current?.focus(), []);
   useEffect(() => {
     let open = true;
@@ -38,6 +41,13 @@ function OpenFleet() {
   const last = Math.min(found.skip + MOST_ROWS, total);
   const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf(rows, now);
+  const columns = Math.max(1, Math.floor(((box.current?.clientWidth ?? 0) + GAP) / CARD.width));
+  const line = Math.floor(found.skip / columns);
+  // A line before those in view is there, too, so that none is empty while the next answer comes.
+  const onScroll = (e: Event) => {
+    const above = Math.floor((e.target as HTMLElement).scrollTop / CARD.height) - 1;
+    setSkip(Math.max(0, above * columns));
+  };
   return (
     <section class="fleet" aria-labelledby="fleet-title">
       <header>
@@ -48,33 +58,27 @@ function OpenFleet() {
           {total > MOST_ROWS ? `${found.skip + 1} to ${last} of ${total.toLocaleString("en")}` : rows.length} live runs
         </span>
         <span class="spread" />
-        {total > MOST_ROWS && (
-          <>
-            <button disabled={found.skip === 0} onClick={() => setSkip(Math.max(0, found.skip - MOST_ROWS))}>
-              Earlier
-            </button>
-            <button disabled={last >= total} onClick={() => setSkip(found.skip + MOST_ROWS)}>
-              Later
-            </button>
-          </>
-        )}
         <button onClick={() => showPage("runs")}>Close</button>
       </header>
       <div class="fleet-top">
-        <div class="cards">
-          {rows.map((row) => (
-            <button key={row.id} onClick={() => openRun(row.id)}>
-              <b>{shorten(nameOfRow(row), 26)}</b>
-              <span class={`pill-text ${row.asks ? "waiting" : "active"}`}>
-                {row.asks
-                  ? "? asks you"
-                  : `\u25cf ${shorten(row.strip.findLast((one) => one[3] === null)?.[1] ?? "running", 20)}`}
-              </span>
-              <small title={row.reason}>
-                {shorten(row.machine, 20)}: {shorten(row.reason, 60)}
-              </small>
-            </button>
-          ))}
+        <div class="cards" ref={box} onScroll={onScroll}>
+          <div style={{ height: `${Math.ceil(total / columns) * CARD.height}px` }}>
+            <div class="in-view" style={{ transform: `translateY(${line * CARD.height}px)`, "--columns": columns }}>
+              {rows.map((row) => (
+                <button key={row.id} onClick={() => openRun(row.id)}>
+                  <b>{shorten(nameOfRow(row), 26)}</b>
+                  <span class={`pill-text ${row.asks ? "waiting" : "active"}`}>
+                    {row.asks
+                      ? "? asks you"
+                      : `\u25cf ${shorten(row.strip.findLast((one) => one[3] === null)?.[1] ?? "running", 20)}`}
+                  </span>
+                  <small title={row.reason}>
+                    {shorten(row.machine, 20)}: {shorten(row.reason, 60)}
+                  </small>
+                </button>
+              ))}
+            </div>
+          </div>
         </div>
         {!scene.isEmpty && (
           <div class="fleet-map">
