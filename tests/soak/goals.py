@@ -169,8 +169,7 @@ class Group:
     def hurt(self, program: Program, number: int, what: str, lasts: float = NEAR_S) -> None:
         now = time.monotonic()
         program.faults.append((now, now + lasts, what))
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(program.process.pid, number)
+        program.process.send_signal(number)  # nothing happens if it has gone
 
     def _one(self, kind: str) -> Program | None:
         ready = [p for p in self.living(kind) if p.journal.stat().st_size]
@@ -194,8 +193,7 @@ class Group:
         kind = self.random.choice(["server", "client"])
         if program := self._one(kind):
             number = signal.SIGUSR1 if kind == "server" else signal.SIGHUP
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(program.process.pid, number)
+            program.process.send_signal(number)
             self.clocks_set += 1
 
     def overlap_servers(self) -> None:
@@ -240,7 +238,7 @@ class Group:
             # Keepalives come four times within the lease, so a little less can end it, too.
             after = NEAR_S if seconds < LEASE_S / 2 else FOUND_AGAIN_S
             self.hurt(program, signal.SIGSTOP, f"suspended {kind}", seconds + after)
-            self._after(seconds, lambda: os.kill(program.process.pid, signal.SIGCONT))
+            self._after(seconds, lambda: program.process.send_signal(signal.SIGCONT))
             self.busy_until += seconds + self.random.uniform(0.0, after)
 
     def kill_client(self) -> None:
@@ -254,12 +252,12 @@ class Group:
     def storm(self) -> None:
         """Have a client cancel all that it has, one by one."""
         if program := self._one("client"):
-            os.kill(program.process.pid, signal.SIGUSR1)
+            program.process.send_signal(signal.SIGUSR1)
 
     def cancel_all(self) -> None:
         """Have a client cancel every goal of every client."""
         if program := self._one("client"):
-            os.kill(program.process.pid, signal.SIGUSR2)
+            program.process.send_signal(signal.SIGUSR2)
 
     def _after(self, seconds: float, function) -> None:
         self._later.append((time.monotonic() + seconds, function))
@@ -294,8 +292,7 @@ class Group:
         """Leave nothing running."""
         for program in self.programs:
             if program.alive:
-                with contextlib.suppress(ProcessLookupError):
-                    program.process.kill()
+                program.process.kill()
             program.process.wait()
 
 
