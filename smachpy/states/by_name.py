@@ -95,7 +95,7 @@ def drive_to(
     """Drive to a place. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     Args:
-        place: The userdata key of a pose; or give x and y.
+        place: The userdata key of a pose, or of a mapping with x, y and maybe yaw; or give x and y.
         x: Position in the map frame [m].
         y: Position in the map frame [m].
         yaw: Heading there [rad].
@@ -239,6 +239,7 @@ def monitor(topic: str, type: str, valid_while: str, timeout: float | None = Non
     def check(_userdata: UserData, message: Any) -> bool:
         return bool(holds(message))
 
+    check.__name__ = valid_while  # shown in pictures
     return MonitorState(topic, _interface("message", type), check, timeout=timeout)
 
 
@@ -475,7 +476,8 @@ def set_lifecycle(node: str, state: str = "active", timeout: float | None = 60.0
 def _interface(kind: str, name: str) -> Any:
     """Return a class of messages, services or actions: of ROS 1 or, if it has none, of ROS 2.
 
-    A name as ROS 2 writes it, `std_srvs/srv/Trigger`, is ROS 2's first.
+    A name as ROS 2 writes it, `std_srvs/srv/Trigger`, is ROS 2's first. Installed packages are
+    asked for theirs (entry points `smachpy.interfaces`) if nobody else has it.
     """
     from actionlib_core import interfaces
     from actionlib_core.exceptions import InterfaceError
@@ -487,7 +489,11 @@ def _interface(kind: str, name: str) -> Any:
     except InterfaceError:
         with contextlib.suppress(InterfaceError):
             return getattr(second, f"get_{kind}")(name)
-        raise
+        from importlib.metadata import entry_points
+
+        for point in entry_points(group="smachpy.interfaces"):
+            point.load()
+        return getattr(first, f"get_{kind}")(name)
 
 
 BY_NAME: Final[dict[str, Callable[..., State]]] = {

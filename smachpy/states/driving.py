@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actionlib_core.interfaces.geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 SIGNAL_TIMEOUT: Final = 5.0  # [s] a robot's own topic that is silent for this long is not there
 DRIVE_TIMEOUT: Final = 600.0  # [s] longer than any drive in a building
 TURN_TIMEOUT: Final = 60.0  # [s]
+_POSE: Final = ("x", "y", "yaw")
 
 
 def goal_at(pose: Pose2D, frame: str = MAP_FRAME) -> MoveBaseGoal:
@@ -53,7 +55,8 @@ def place_of(value: Any, where: str) -> tuple[Pose2D, str]:
     """Return the pose [m, m, rad] of a place, and its frame.
 
     Args:
-        value: A `Pose2D` or `Waypoint` in the map frame, a `Pose`, or a `PoseStamped`.
+        value: A `Pose2D` or `Waypoint` in the map frame, a mapping with `x`, `y` and maybe `yaw`,
+            as files have it, a `Pose`, or a `PoseStamped`.
         where: Where the value is from, for the error.
 
     Raises:
@@ -63,9 +66,15 @@ def place_of(value: Any, where: str) -> tuple[Pose2D, str]:
     frame = MAP_FRAME if header is None else header.frame_id or MAP_FRAME
     if isinstance(pose, Pose2D):
         return pose, frame
+    if isinstance(value, Mapping):
+        numbers = [as_number(value.get(key, 0.0 if key == "yaw" else None)) for key in _POSE]
+        x, y, yaw = (math.nan if number is None else number for number in numbers)
+        if not all(map(math.isfinite, (x, y, yaw))):
+            raise InvalidStateError(f"{where}: got {value!r}; expected numbers {', '.join(_POSE)}.")
+        return Pose2D(x, y, yaw), frame
     if not (hasattr(pose, "position") and hasattr(pose, "orientation")):
         raise InvalidStateError(
-            f"{where}: got {value!r}; expected a Pose2D, a Waypoint, a Pose or a PoseStamped."
+            f"{where}: got {value!r}; expected a Pose2D, Waypoint, Pose, PoseStamped, or x and y."
         )
     problem = pose_problem(pose)
     if problem:
@@ -79,8 +88,8 @@ def drive_to(
     """Return a state that drives to a place. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     Args:
-        place: A pose [m, m, rad] in the map frame; or the userdata key of one: a `Pose2D`, a
-            `Waypoint`, a `Pose`, or a `PoseStamped`, whose header names another frame.
+        place: A pose [m, m, rad] in the map frame; or the userdata key of one, see
+            `place_of`; the header of a `PoseStamped` names another frame.
         action: Name of the action.
         **options: Those of `SimpleActionState`; the default of `exec_timeout` is 600 s.
 
