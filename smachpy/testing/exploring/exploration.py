@@ -21,6 +21,8 @@ from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container, below
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
+from smachpy.testing.exploring import ahead as _ahead
+from smachpy.testing.exploring.ahead import Ahead
 from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions
 from smachpy.testing.exploring.search import Search
 from smachpy.testing.exploring.verdicts import judge
@@ -138,6 +140,7 @@ def explore(
     grace: float = 10.0,
     folder: Callable[[], Path] | None = None,
     on_run: Callable[[Run], object] | None = None,
+    jobs: int | None = None,
     **options: Unpack[RunOptions],
 ) -> Exploration:
     """Run a mission with every combination of leaf outcomes, preempts, faults and interleavings.
@@ -165,42 +168,36 @@ def explore(
         grace: Longest time from a preempt to the end [s].
         folder: Returns the folder for the picture.
         on_run: Called with each run, for coverage; by default that of the test session.
+        jobs: Number of processes, as far as `machine` and `invariants` are functions that another
+            process can import, and there are no kills; 1: this one only; by default all cores, for
+            explorations that take some seconds. The result does not depend on it, if `invariants`
+            only look at the run.
         **options: See `RunOptions`.
 
     Raises:
         TypeError: `machine` is neither a container nor a function, or there is no such option.
         InvalidStateError: an invariant is no plain function of the run.
-        ValueError: there is no such fault.
+        ValueError: there is no such fault, or `jobs` is less than 1.
         UnknownStateError: `keep` or `writes` names a state that does not exist; or a name in
             `writes` is ambiguous.
     """
     check_machine(machine, "explore", functions=True)
     own = _invariants(invariants)
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"explore: jobs: got {jobs}; expected 1 or more.")
     on_run = on_run or session.current().on_run
     budget = _Budget(max_runs, max_time)
     search = Search(max_depth)
-    stopped_by = ""
-    example: Counterexample | None = None
-    with RepeatedRun("explore", machine, options, merges=not own) as runner:
+    with (
+        Ahead((machine, own, grace, options), jobs, wants_runs=on_run is not None) as ahead,
+        RepeatedRun("explore", machine, options, merges=not own) as runner,
+    ):
 
         def verdict_on(run: Run, error: Exception | None) -> Verdict | None:
             return judge(run, error, runner.explorer, grace=grace, invariants=own)
 
-        while example is None and (prefix := search.next()) is not None:
-            stopped_by = budget.take()
-            if stopped_by:
-                break
-            run, error = runner.run(prefix)
-            if on_run is not None:
-                on_run(run)
-            verdict = verdict_on(run, error)
-            if verdict is not None:
-                example = _shrunk(runner, verdict_on, max_time, verdict, run)
-                break
-            search.add(prefix, runner.explorer.choices)
-            example, stopped_by = _killed_anywhere(runner, verdict_on, budget)
-            if stopped_by:
-                break
+        tries = _Tries(runner, ahead, search, budget, verdict_on, on_run)
+        example, stopped_by = tries.all(max_time)
     stopped_by = "counterexample" if example is not None else stopped_by
     stopped_by = stopped_by or ("max_depth" if search.is_cut else "")
     if example is not None and folder is not None:
@@ -220,6 +217,55 @@ def explore(
         budget.seconds,
         left_out,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Tries:
+    """The runs of one exploration, in this process and in others."""
+
+    runner: RepeatedRun
+    ahead: Ahead
+    search: Search
+    budget: _Budget
+    verdict_on: Callable[[Run, Exception | None], Verdict | None]
+    on_run: Callable[[Run], object] | None
+
+    def all(self, max_time: float) -> tuple[Counterexample | None, str]:
+        """Try what the search asks for; return the counterexample, and why not all was tried."""
+        while (prefix := self.search.next()) is not None:
+            stopped_by = self.budget.take()
+            if stopped_by:
+                return None, stopped_by
+            if self._was_done_elsewhere(prefix):
+                continue
+            run, error = self.runner.run(prefix)
+            self._tell(run)
+            verdict = self.verdict_on(run, error)
+            if verdict is not None:
+                return _shrunk(self.runner, self.verdict_on, max_time, verdict, run), ""
+            choices = self.runner.explorer.choices
+            self.ahead.note(prefix, choices)
+            self.search.add(prefix, choices)
+            example, stopped_by = _killed_anywhere(self.runner, self.verdict_on, self.budget)
+            if example is not None or stopped_by:
+                return example, stopped_by
+        return None, ""
+
+    def _was_done_elsewhere(self, prefix: tuple[int, ...]) -> bool:
+        """Take a run that another process has done, and that keeps all invariants."""
+        if "kill" in self.runner.options["faults"] or self.budget.seconds < _ahead.AFTER_S:
+            return False
+        found = self.ahead.found(prefix, self.search)
+        if found is None:
+            return False
+        choices, run = found
+        self._tell(run)
+        self.search.add(prefix, choices)
+        return True
+
+    def _tell(self, run: Run | None) -> None:
+        if self.on_run is not None and run is not None:
+            self.on_run(run)
 
 
 def replay(machine: Machine, choices: Sequence[str], **options: Unpack[RunOptions]) -> Run:

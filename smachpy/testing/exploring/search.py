@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -52,6 +53,15 @@ class Search:
     def next(self) -> tuple[int, ...] | None:
         """Return the first choices of the next run; None if all were tried."""
         return self._waiting.popleft() if self._waiting else None
+
+    def waiting(self, skipped: int, most: int) -> list[tuple[int, ...]]:
+        """Return the first choices of the runs that `next` will return, without taking them.
+
+        Args:
+            skipped: Leave out so many.
+            most: Return so many at most.
+        """
+        return list(islice(self._waiting, skipped, skipped + most))
 
     def add(self, prefix: tuple[int, ...], choices: list[ScheduleChoice]) -> None:
         """Queue the runs that differ from a finished one by one more choice.

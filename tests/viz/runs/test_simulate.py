@@ -271,6 +271,17 @@ def test_the_command_prints_a_table_and_writes_a_report(job, tmp_path, capsys):
     assert "JOB: 4 runs" in (tmp_path / "all.html").read_text()
 
 
+@pytest.mark.slow
+def test_what_it_prints_does_not_depend_on_the_number_of_processes(job, capfd):
+    said = []
+    for jobs in ("1", "3"):
+        words = ["--runs", "7", "--vary", "seconds=1..119", "--jobs", jobs, "--json"]
+        assert main(["simulate", job, *words]) == 0
+        said.append(capfd.readouterr().out.splitlines())
+    assert said[0] == said[1]
+    assert [json.loads(line)["run"] for line in said[0]] == list(range(1, 8))
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -395,8 +406,8 @@ def test_a_run_whose_process_dies_is_named_and_the_others_end(tmp_path, capsys, 
     assert main(words) == 1
     printed = capsys.readouterr().out
     assert "done x4" in printed
-    assert "run 3: its process died: exit code 3 (kind=crash)" in printed
-    assert "run 6: its process died: exit code 3 (kind=crash)" in printed
+    assert "run 3: its process died 3 times: exit code 3 (kind=crash)" in printed
+    assert "run 6: its process died 3 times: exit code 3 (kind=crash)" in printed
 
 
 STAYS = """

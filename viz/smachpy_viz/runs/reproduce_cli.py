@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -128,7 +127,7 @@ def _run(args: argparse.Namespace) -> int:
         )
     options = Options(args.mission, tuple(args.allow), args.seed, tuple(args.tolerate))
     verdicts = []
-    for verdict in _verdicts(paths, options, args.jobs or os.cpu_count() or 1, args.record):
+    for verdict in _verdicts(paths, options, args.jobs, args.record):
         verdicts.append(verdict)
         _show(verdict, many=len(paths) > 1, as_json=args.json)
     if len(paths) > 1 and not args.json:
@@ -173,7 +172,7 @@ def _show(verdict: Verdict, *, many: bool, as_json: bool) -> None:
 
 
 def _verdicts(
-    paths: list[str], options: Options, jobs: int, record: Path | None
+    paths: list[str], options: Options, jobs: int | None, record: Path | None
 ) -> Iterator[Verdict]:
     """Yield the verdicts in the order of the files, whatever the number of processes."""
     from smachpy.reproduce.report import Verdict
@@ -186,9 +185,9 @@ def _verdicts(
         raise UsageError(
             f"smachpy runs reproduce: --record: got {len(paths)} recordings; expected one."
         )
-    from smachpy_viz.runs.workers import WorkerError, Workers
+    from smachpy.base.workers import WorkerError, Workers, cores
 
-    workers = Workers(min(jobs, len(paths)))
+    workers = Workers(min(jobs or cores(), len(paths)))
     try:
         futures = [workers.submit(reproduce_file, path, options) for path in paths]
         for path, future in zip(paths, futures, strict=True):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import math
-import os
 import random
 import tempfile
 import threading
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import current_clock
 from actionlib_core.process.private_files import open_private
+from smachpy.base.workers import WorkerError, Workers, cores
 from smachpy.command.arguments import Text, parameters_of
 from smachpy.command.extras import advice
 from smachpy.command.mission_run import NO_NAMES, build, needed_servers
@@ -25,13 +25,12 @@ from smachpy.command.targets import load_target
 from smachpy.engine.preempt import asking
 from smachpy.events import Entered, Failed, Left
 from smachpy.events.introspection import describe
-from smachpy.events.recording import Recorder
+from smachpy.events.recording import Recorder, RecordingError
 from smachpy.exceptions import MissionError
 from smachpy.machines.mission_info import mission_info
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.places.robot_file import load_config
 from smachpy_viz.model.labels import innermost
-from smachpy_viz.runs.workers import WorkerError, Workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -261,11 +260,16 @@ def simulate(
         The results in the order of the tasks.
 
     Raises:
-        SmachError: as `SimulationPlan.tasks`.
+        SmachError: as `SimulationPlan.tasks`, or a recording is there already.
 
     Blocks: until all runs have ended.
     """
     tasks = plan.tasks()
+    for task in tasks:
+        if task.file.exists():
+            raise RecordingError(
+                task.file, "the file exists; expected a new name, runs are never overwritten."
+            )
     with contextlib.ExitStack() as stack:
         if executor is None:
             executor = stack.enter_context(_pool(jobs, len(tasks)))
@@ -296,7 +300,7 @@ def _pool(jobs: int | None, runs: int) -> Iterator[Executor]:
         jobs: Number of processes; None: one per core.
         runs: Number of runs, the upper limit for the number of processes.
     """
-    executor = Workers(min(jobs or os.cpu_count() or 1, runs))
+    executor = Workers(min(jobs or cores(), runs))
     try:
         yield executor
     except BaseException:
@@ -335,6 +339,7 @@ def run_one(task: SimulatedRun) -> Result:
             # An executor of threads runs this in the caller's process: restore its `random`.
             stack.callback(random.setstate, random.getstate())
             random.seed(task.seed)
+            here.file.unlink(missing_ok=True)  # of a process that died
             outcome, error = _execute(here)
             recording = b"" if here is task else here.file.read_bytes()
             return Result(task, outcome, error, recording)

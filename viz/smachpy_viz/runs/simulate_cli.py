@@ -11,9 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock import RealClock
 from actionlib_core.command_line.numbers import between
 from actionlib_core.process.output import printable
 from actionlib_core.process.private_files import make_private_folder
+from smachpy.base.workers import cores
 from smachpy.command import UsageError
 from smachpy.command.run import time_span
 
@@ -165,7 +167,9 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
     plan = SimulationPlan(
         args.mission, args.runs, folder, args.vary, args.seed, args.limit, args.allow
     )
-    progress = _RunCounter(args.runs, as_json=args.json)
+    count = min(args.jobs or cores(), args.runs)
+    processes = "" if args.executor else f", {count} process{'es' * (count > 1)}"
+    progress = _RunCounter(args.runs, processes, as_json=args.json)
     with _executor(args.executor) as executor:
         try:
             results = simulate(plan, executor, progress.on_result, jobs=args.jobs)
@@ -245,18 +249,29 @@ def _executor(name: str | None) -> Iterator[Executor | None]:
 
 
 class _RunCounter:
-    """Shows in a terminal how many runs have ended, or prints one line of JSON per run."""
+    """Shows in a terminal how many runs have ended, or prints one line of JSON per run.
 
-    def __init__(self, runs: int, *, as_json: bool) -> None:
+    The lines are in the order of the runs, however many are done at the same time.
+    """
+
+    def __init__(self, runs: int, processes: str, *, as_json: bool) -> None:
         self._runs = runs
+        self._processes = processes
+        self._clock = RealClock()
+        self._begun = self._clock.now()
         self._done = 0
         self._json = as_json
+        self._waiting: dict[int, Result] = {}
+        self._printed = 0
         self._shown = sys.stderr.isatty() and not as_json
 
     def on_result(self, result: Result) -> None:
         """Count an ended run."""
         self._done += 1
-        if self._json:
+        self._waiting[result.task.number] = result
+        while self._json and self._printed + 1 in self._waiting:
+            self._printed += 1
+            result = self._waiting.pop(self._printed)
             task = result.task
             facts: dict[str, Any] = {
                 "run": task.number,
@@ -267,7 +282,9 @@ class _RunCounter:
             }
             print(json.dumps(facts), flush=True)
         if self._shown:
-            sys.stderr.write(f"\r{self._done:d} of {self._runs:d} runs")
+            rate = self._done / max(1e-3, self._clock.now() - self._begun)
+            done = f"{self._done:d} of {self._runs:d} runs, {rate:.2g} per s"
+            sys.stderr.write(f"\r{done}{self._processes}\x1b[K")
             sys.stderr.flush()
 
     def end(self) -> None:

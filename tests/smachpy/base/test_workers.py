@@ -10,7 +10,7 @@ from concurrent.futures import CancelledError
 
 import pytest
 
-from smachpy_viz.runs.workers import WorkerError, Workers
+from smachpy.base.workers import WorkerError, Workers
 
 pytestmark = pytest.mark.slow
 
@@ -29,9 +29,30 @@ def test_a_process_that_dies_takes_only_its_task_with_it(workers):
     results = [workers.submit(abs, -number) for number in range(6)]
     assert [one.result(60) for one in results] == [0, 1, 2, 3, 4, 5]
     assert [str(one.exception(60)) for one in ends] == [
-        "its process died: exit code 3",
-        "its process died: signal SIGABRT",
+        "its process died 3 times: exit code 3",
+        "its process died 3 times: signal SIGABRT",
     ]
+
+
+DIE_ONCE = """
+import os, pathlib, signal
+if not pathlib.Path(path).exists():
+    pathlib.Path(path).touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_process_that_is_killed_costs_its_task_another_try(workers, tmp_path):
+    futures = [
+        workers.submit(exec, DIE_ONCE, {"path": str(tmp_path / str(number))}) for number in range(4)
+    ]
+    assert [one.result(60) for one in futures] == [None] * 4
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_a_result_that_cannot_be_sent_is_an_error_of_its_task(workers):
+    assert "pickle" in str(workers.submit(threading.Lock).exception(60))
+    assert workers.submit(abs, -7).result(60) == 7
 
 
 def test_an_exception_and_sys_exit_are_the_end_of_the_task_only(workers):

@@ -23,12 +23,20 @@ from smachpy.exceptions import SmachError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+MOST_TRIES: Final = 3
+"""A task whose process dies is done again, so often in all."""
+
 END_S: Final = 5.0
 """Longest wait for a process that has nothing more to do; then it is killed [s]."""
 
 
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class WorkerError(SmachError):
-    """The process that did a task died.
+    """The processes that did a task died, one after the other.
 
     Try: run it again; a killed process often means too little memory: use fewer `--jobs`.
 
@@ -40,19 +48,20 @@ class WorkerError(SmachError):
         self.code = code
         names = {number.value: number.name for number in signal.Signals}
         how = f"exit code {code}" if code >= 0 else f"signal {names.get(-code, -code)}"
-        super().__init__(f"its process died: {how}")
+        super().__init__(f"its process died {MOST_TRIES} times: {how}")
 
 
 class Workers(Executor):
     """Starts up to `count` processes, which Ctrl-C in the terminal does not reach.
 
-    The processes have the present `sys.path`; they end when this process ends.
+    A process that dies, such as for lack of memory, costs its task `MOST_TRIES` tries at most. The
+    processes have the present `sys.path`; they end when this process ends.
     """
 
     def __init__(self, count: int) -> None:
         self._clock = RealClock()
         self._waiting: SimpleQueue[tuple[Future[Any], Any] | None] = SimpleQueue()
-        self._processes: set[_WorkerProcess] = set()
+        self._processes: set[WorkerProcess] = set()
         self._killed = False
         self._threads = [
             self._clock.spawn(self._work, name=f"worker {number}") for number in range(count)
@@ -81,14 +90,23 @@ class Workers(Executor):
             process.kill()
 
     def _work(self) -> None:
-        process: _WorkerProcess | None = None
+        process: WorkerProcess | None = None
         while (item := self._waiting.get()) is not None:
             future, task = item
-            if not future.set_running_or_notify_cancel():
-                continue
+            if future.set_running_or_notify_cancel():
+                process = self._do(future, task, process)
+        if process is not None:
+            self._processes.discard(process)
+            process.end()
+
+    def _do(
+        self, future: Future[Any], task: Any, process: WorkerProcess | None
+    ) -> WorkerProcess | None:
+        """Do a task, in another process if one dies; return the process that lives."""
+        for tries_left in reversed(range(MOST_TRIES)):
             try:
                 if process is None:
-                    process = _WorkerProcess()
+                    process = WorkerProcess()
                     self._processes.add(process)
                     if self._killed:
                         process.kill()
@@ -97,21 +115,23 @@ class Workers(Executor):
             except (EOFError, ConnectionError):
                 assert process is not None
                 self._processes.discard(process)
-                future.set_exception(WorkerError(process.end()))
-                process = None
+                code, process = process.end(), None
+                if self._killed or not tries_left:
+                    future.set_exception(WorkerError(code))
+                    break
             except Exception as problem:  # noqa: BLE001  for example, no process can be started
                 future.set_exception(problem)
+                break
             else:
                 if error is None:
                     future.set_result(result)
                 else:
                     future.set_exception(error)
-        if process is not None:
-            self._processes.discard(process)
-            process.end()
+                break
+        return process
 
 
-class _WorkerProcess:
+class WorkerProcess:
     """One process, and the connection to it."""
 
     def __init__(self) -> None:
@@ -130,6 +150,7 @@ class _WorkerProcess:
             return
 
     def kill(self) -> None:
+        """End it at once."""
         self._process.kill()
 
     def end(self) -> int:
@@ -151,17 +172,20 @@ def serve(connection: Connection) -> None:
     Blocks: until then.
     """
     while True:
-        try:
-            function, arguments, named = connection.recv()
-        except EOFError:
-            return
         result, failure = None, None
         try:
+            try:
+                function, arguments, named = connection.recv()
+            except EOFError:
+                return
             result = function(*arguments, **named)
         except BaseException as error:  # noqa: BLE001  also `sys.exit` is the end of the task only
             # Exceptions of a mission need not survive pickling.
             failure = RuntimeError(f"{type(error).__name__}: {error}")
-        connection.send((result, failure))
+        try:
+            connection.send((result, failure))
+        except Exception as error:  # noqa: BLE001  of any kind: the result's own code decides
+            connection.send((None, RuntimeError(f"{type(error).__name__}: {error}")))
 
 
 def _end_with_parent() -> None:
