@@ -12,6 +12,7 @@ computer does not change it. The other keys are needed to resume:
                        `served`: it had serviced the request to stop, which its container is rid of
     Retried            attempt `attempt` has ended; the next begins at `at_ns`
     GoalSent, GoalTaken, GoalDone    a goal is about to be sent, is at a server, has ended
+    Met                the states at `paths` have met at a barrier
     Once               a call has returned `value` for `key`
     Fired              `transitions` of the plan at `path` have fired: its tokens are in `marking`,
                        the actions at the paths `ends` must stop, those at `begins` begin
@@ -93,6 +94,7 @@ class _Visit(TypedDict):
     halted_ns: NotRequired[Stamp]
     stopping: NotRequired[bool]
     again: NotRequired[bool]
+    met: NotRequired[bool]
     ending: NotRequired[tuple[str | None, str, bool]]
 
 
@@ -141,6 +143,7 @@ class Position:
                 and override. A container may also have requests, triples of source, by and why that
                 asked it to stop, and served, those after which it began another child: a served
                 request concerns no later child. recalled: the requests that it has withdrawn.
+                met: it has met others at a barrier.
                 halted_ns: since when its timeouts stand still, if they do.
                 The visit of a clean-up has ending: the fields of the `Ending` after which it runs.
                 The visit of a plan's action may also have: stopping (a transition has asked it to
@@ -386,6 +389,10 @@ class Position:
     def _on_once(self, entry: Mapping[str, Any]) -> None:
         self.visits[entry["path"]]["once"][entry["key"]] = entry["value"]
 
+    def _on_met(self, entry: Mapping[str, Any]) -> None:
+        for path in entry["paths"]:
+            self.visits[path]["met"] = True
+
     def _on_fired(self, entry: Mapping[str, Any]) -> None:
         self.markings[entry["path"]] = entry["marking"]
         for path in entry["ends"]:
@@ -477,6 +484,7 @@ class Position:
         "GoalTaken": _on_goal_taken,
         "GoalDone": _on_goal_done,
         "Once": _on_once,
+        "Met": _on_met,
         "Fired": _on_fired,
         "Noted": _on_noted,
         "PreemptRequested": _on_preempt,

@@ -838,6 +838,17 @@ class Recorder(RunJournal):
     def _visit_of(self, frame: Frame) -> dict[str, Any] | None:
         return self._journal.position.visits.get(frame.here())
 
+    def met(self, frames: Sequence[Frame]) -> None:
+        visits = self._journal.position.visits
+        paths = [path for path in (frame.here() for frame in frames) if path in visits]
+        if paths and not self._write("Met", paths[0], paths=paths):
+            assert self.broken is not None
+            raise self.broken
+
+    def has_met(self, frame: Frame) -> bool:
+        visit = self._journal.position.visits.get(frame.here())
+        return visit is not None and visit.get("met", False)
+
     def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:
         """Call or remember it; raise a NotDurableError if the result of `call` cannot be kept."""
         path = frame.here()

@@ -198,6 +198,13 @@ class RunJournal:
     ) -> None:
         """Write how the goal ended, and whether its state had been asked to stop."""
 
+    def met(self, frames: Sequence[Frame]) -> None:
+        """Write, at once for all, that the states of `frames` have met in their present visits."""
+
+    def has_met(self, frame: Frame) -> bool:  # noqa: ARG002
+        """Return whether the state of `frame` had met the others before the resume."""
+        return False
+
     def once(self, frame: Frame, key: str, call: Callable[[], Any]) -> Any:  # noqa: ARG002
         """Return the result of `call` for `key` in this visit; call it only the first time."""
         return call()

@@ -112,9 +112,11 @@ class ChildBranch(Branch):
 
     Attributes:
         called_off: Its container has asked it to stop.
+        siblings: All branches that run with it, itself included.
     """
 
     called_off = False
+    siblings: Group
 
     is_branch = True
 
@@ -124,7 +126,7 @@ class ChildBranch(Branch):
         self.path = frame.path
         self.step = step
         self.visit = Visit(self, step)
-        self._group = group
+        self.siblings = group
 
     def run_child(self) -> str:
         """Run the child, and again if an operator jumps to it; return its outcome."""
@@ -138,7 +140,7 @@ class ChildBranch(Branch):
 
     def end(self, outcome: str | None, error: BaseException | None) -> ClockEvent | None:
         """Report how the child ended; the event returned wakes the container."""
-        group = self._group
+        group = self.siblings
         with self.run.lock:  # after this no request is being passed on to the branch
             if self.ended:  # its thread was left behind, and has ended now
                 return None
@@ -154,6 +156,8 @@ class ChildBranch(Branch):
                 group.failed = True
             group.reports.append(self)
             group.left -= 1
+            if group.meetings is not None:
+                group.meetings.branch_ended()
             last = group.left == 0
             when_ended = group.when_ended if last else None
         if when_ended is not None:  # it takes the lock again and may end the container
@@ -167,7 +171,7 @@ class ChildBranch(Branch):
 
     def release(self) -> None:
         """Drop the references to objects that refer back to this frame."""
-        del self._group
+        del self.siblings
         self.visit = None
         self.step.watched_window = None
 
@@ -239,6 +243,7 @@ class Group:
         left: Number of branches that have not ended.
         wake: Set to wake the container.
         when_ended: Called once after the last branch has ended; None for nothing.
+        meetings: Where branches wait for each other; None until one does.
     """
 
     __slots__ = (
@@ -248,6 +253,7 @@ class Group:
         "frame",
         "interruption",
         "left",
+        "meetings",
         "reports",
         "started",
         "wake",
@@ -261,6 +267,7 @@ class Group:
         self.started = False
         self.interruption: Interruption | None = None
         self.when_ended: Callable[[], object] | None = None
+        self.meetings: Any = None  # of smachpy.states.barrier, which imports this module
         self.reports: deque[ChildBranch] = deque()
         self.branches = [ChildBranch(self, step) for step in steps]
         self.left = len(steps)

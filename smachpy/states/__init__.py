@@ -1,8 +1,8 @@
 """Ready-made states for robot missions, and their parts.
 
 Each is a state for `sm.add(...)`, or a function that makes one: `drive_to`, `turn`, `locate`,
-`nav2_active`, `AskOperator`, `AwaitMessage`, `Wait`, `Serve`. The lessons in `missions` use them.
-The modules of this package are imported when they are used.
+`nav2_active`, `AskOperator`, `AwaitMessage`, `Barrier`, `Wait`, `Serve`. The lessons in `missions`
+use them. The modules of this package are imported when they are used.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from smachpy.places.exceptions import NavigationError as NavigationError
     from smachpy.places.pose import Pose2D as Pose2D
     from smachpy.states.ask_operator import AskOperator as AskOperator
+    from smachpy.states.barrier import Barrier as Barrier
     from smachpy.states.driving import DRIVE_TIMEOUT as DRIVE_TIMEOUT
     from smachpy.states.driving import SIGNAL_TIMEOUT as SIGNAL_TIMEOUT
     from smachpy.states.driving import TURN_TIMEOUT as TURN_TIMEOUT
@@ -56,6 +57,7 @@ __all__ = [
     "AnswerRefusedError",
     "AskOperator",
     "AwaitMessage",
+    "Barrier",
     "InputFileError",
     "LookUpTransform",
     "MissionError",
@@ -94,6 +96,7 @@ _HOMES = {
     "AnswerRefusedError": "smachpy.states.questions",
     "AskOperator": "smachpy.states.ask_operator",
     "AwaitMessage": "smachpy.states.waiting",
+    "Barrier": "smachpy.states.barrier",
     "DRIVE_TIMEOUT": "smachpy.states.driving",
     "InputFileError": "smachpy.places.exceptions",
     "LookUpTransform": "smachpy.states.topics",

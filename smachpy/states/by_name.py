@@ -415,6 +415,18 @@ def follow_waypoints(
     )
 
 
+def barrier(name: str, parties: int = 2) -> State:
+    """Wait for other branches of a concurrence. Outcomes: 'done', 'aborted', 'preempted'.
+
+    Args:
+        name: Name of the barrier.
+        parties: How many branches must come to it.
+    """
+    from smachpy.states.barrier import Barrier
+
+    return Barrier(name, parties)
+
+
 def nav2_active(
     manager: str = "lifecycle_manager_navigation", timeout: float | None = 60.0
 ) -> State:
@@ -500,6 +512,7 @@ BY_NAME: Final[dict[str, Callable[..., State]]] = {
     "action": action,
     "ask": ask,
     "await_message": await_message,
+    "barrier": barrier,
     "clear_costmaps": clear_costmaps,
     "compute": compute,
     "dock": dock,

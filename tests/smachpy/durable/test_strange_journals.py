@@ -36,6 +36,7 @@ ENTRIES = [
     },
     {"kind": "GoalTaken", "path": "/M/A", "stamp_ns": NOW + 3},
     {"kind": "Once", "path": "/M/A", "key": "k", "value": 1, "stamp_ns": NOW + 3},
+    {"kind": "Met", "path": "/M/A", "paths": ["/M/A"], "stamp_ns": NOW + 3},
     {
         "kind": "PreemptRequested",
         "path": "/M",

@@ -23,6 +23,7 @@ ARGUMENTS: dict[str, list[dict[str, Any]]] = {
         {"topic": "t", "type": "nav2_msgs/SpeedLimit", "key": "limit", "timeout": None},
     ],
     "clear_costmaps": [{}, {"navigation": "move_base", "namespace": "robot_0"}],
+    "barrier": [{"name": "LOADED", "parties": 3}],
     "compute": [{"index": "index + 1"}],
     "dock": [{"id": "home"}, {"place": "here", "exec_timeout": None}],
     "drive_to": [{"x": 1.0, "y": 2.0}, {"place": "home"}],
