@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 SNAPSHOT_EVERY: Final = 1000
 """Entries between two snapshots, and so the most that are read when a run is resumed."""
 
+SNAPSHOT_BYTES: Final = 32 * 2**20
+"""Bytes of new large values after which a snapshot follows earlier: it deletes those that no key
+has any more, so a value that changes in each state does not fill the disk [bytes].
+"""
+
 MAX_STATE_DEPTH: Final = 500
 """Levels of arrays and objects in an entry; each level of a value has up to three of them."""
 
@@ -107,6 +112,7 @@ class Journal:
         self._put = 0
         self._written = 0
         self._since_snapshot = 0
+        self._new_bytes = 0  # of large values since then
         self._now_ns = now_ns
         self._has_begun = False
         self._stored = position.digests()  # large values that the store has
@@ -175,11 +181,13 @@ class Journal:
                 upto = self._put
                 finished = self.position.data["finished"]
                 self._since_snapshot += len(entries)
+                self._new_bytes += sum(map(len, blobs.values()))
                 snapshot = None
                 kept: set[str] = set()
-                if self._since_snapshot >= SNAPSHOT_EVERY or finished:
+                is_long = self._since_snapshot >= SNAPSHOT_EVERY
+                if is_long or self._new_bytes >= SNAPSHOT_BYTES or finished:
                     snapshot = self.position.to_bytes()
-                    self._since_snapshot = 0
+                    self._since_snapshot = self._new_bytes = 0
                     kept = self._stored = self.position.digests()
             self._store.append(
                 self._lease,

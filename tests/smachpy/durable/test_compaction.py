@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import smachpy
+from smachpy.durable import journal
 from smachpy.durable.journal import SNAPSHOT_EVERY, read_position
 from smachpy.durable.store import open_store
 
@@ -35,4 +36,27 @@ def test_a_long_mission_has_a_short_journal(tmp_path):
     assert max(lengths) <= SNAPSHOT_EVERY
     assert sum(b < a for a, b in itertools.pairwise(lengths)) >= 2
     assert store.read("COUNT")[1] == []
+    store.close()
+
+
+def test_a_large_value_that_changes_in_each_state_does_not_fill_the_disk(tmp_path, monkeypatch):
+    monkeypatch.setattr(journal, "SNAPSHOT_BYTES", 1_000_000)
+    store = open_store(tmp_path / "journal.db", synchronous="NORMAL")
+    sizes = []
+
+    @smachpy.state(outcomes=["next", "done"], input_keys=["scan"], output_keys=["scan"])
+    def measure(userdata):
+        kept = read_position(store, "SCAN").userdata["/SCAN"]["scan"]
+        assert store.blob("SCAN", kept["$blob"]).startswith(b'"%d ' % len(sizes))
+        sizes.append(store.size()[1])
+        userdata.scan = f"{len(sizes)} {'x' * 100_000}"
+        return "done" if len(sizes) == 100 else "next"
+
+    machine = smachpy.StateMachine(["done"], name="SCAN")
+    machine.userdata.scan = f"0 {'x' * 100_000}"
+    with machine:
+        machine.add("A", measure, {"next": "B"})
+        machine.add("B", measure, {"next": "A"})
+    assert smachpy.run_durable(machine, store) == "done"
+    assert max(sizes) < 2_000_000
     store.close()
