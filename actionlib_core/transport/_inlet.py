@@ -14,7 +14,9 @@ from threading import get_ident
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock import RealClock
+from actionlib_core.clock._ending import ending
 from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.exceptions import TransportError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,20 +38,57 @@ class Inside:
 
     Attributes:
         depths: Thread id -> number of nested calls; other threads have no entry.
+        ended_by: The id of the thread that ends the interpreter: no other one may begin a call any
+            more. 0 before.
     """
 
     def __init__(self) -> None:
         self.depths: dict[int, int] = {}
+        self.ended_by = 0
 
     def __enter__(self) -> None:
+        """Begin a call.
+
+        Raises:
+            TransportError: as `check_late`.
+        """
         me = get_ident()
-        self.depths[me] = self.depths.get(me, 0) + 1
+        depth = self.depths.get(me, 0)
+        # Before the check: so either `end` sees this thread, or this thread sees the end.
+        self.depths[me] = depth + 1
+        if self.ended_by and not depth:
+            try:
+                self.check_late(me)
+            except TransportError:
+                del self.depths[me]
+                raise
 
     def __exit__(self, *_: object) -> None:
         me = get_ident()
         depth = self.depths.pop(me) - 1
         if depth:
             self.depths[me] = depth
+
+    def check_late(self, me: int) -> None:
+        """Refuse a call of the thread `me` from which it might return after the interpreter's end.
+
+        Raises:
+            TransportError: another thread has called `end`.
+        """
+        if self.ended_by not in {0, me}:
+            ending.slow_down()
+            raise TransportError(
+                "network: got a call as the interpreter exits; expected none. Try to end the "
+                "thread, or to close its node, before the program ends."
+            )
+
+    def end(self, timeout: float) -> None:
+        """Let no other thread begin a call, and wait until those have returned that have begun.
+
+        Blocks: as `wait_idle`.
+        """
+        self.ended_by = get_ident()
+        self.wait_idle(timeout)
 
     def wait_idle(self, timeout: float) -> None:
         """Wait until no other thread is in a call.

@@ -57,6 +57,8 @@ from actionlib_core.transport.zenoh._declared import (
     Queryable,
     Subscriber,
     Token,
+    kept,
+    undeclare,
 )
 from actionlib_core.transport.zenoh._process import process
 from actionlib_core.transport.zenoh._shared import Watches
@@ -296,8 +298,7 @@ class ZenohTransport:
                 )
                 liveliness.get(pattern, direct(on_reply, done.set), timeout=timeout)
             done.wait(timeout)
-            with inside:
-                history.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stub
+            undeclare(history)
             freed.wait(max(0.0, deadline - self.clock.now()))
         except zenoh.ZError as error:
             raise TransportError(f"{pattern}: cannot ask: {error}") from error
@@ -315,7 +316,7 @@ class ZenohTransport:
         self.gate.wait_idle(IDLE_S)
         # Not earlier: once the session is closed, dropping Zenoh's objects has no side effects.
         if ending.begun:
-            _kept.extend(self._declared)
+            kept.extend(self._declared)
         self._declared.clear()
         _open_transports.pop(self, None)
 
@@ -327,7 +328,7 @@ class ZenohTransport:
     def forget(self, entry: Declared) -> bool:
         """Remove an entry that is being closed; False when it was removed before."""
         if ending.begun:
-            _kept.append(entry)
+            kept.append(entry)
         with self._lock:
             return self._declared.pop(entry, False) is None
 
@@ -373,8 +374,8 @@ class ZenohTransport:
                 self._check_open(key)
                 entry = make()
         except zenoh.ZError as error:
-            if ending.begun:  # its traceback refers to objects of Zenoh; see `_kept`
-                _kept.append(error)
+            if ending.begun:  # its traceback refers to objects of Zenoh; see `kept`
+                kept.append(error)
             raise TransportError(f"{key}: cannot be declared: {error}") from error
         self.keep(entry)
         return entry
@@ -412,8 +413,9 @@ def _leave(clock: RealClock, session: zenoh.Session) -> None:
     """
 
     def close() -> None:
-        # An error means that others could not be notified. The session is closed all the same.
-        with inside, contextlib.suppress(zenoh.ZError):
+        # An error means that others could not be notified, or that the interpreter has ended before
+        # this call. The session is closed all the same.
+        with contextlib.suppress(zenoh.ZError, TransportError), inside:
             session.close()  # type: ignore[no-untyped-call]  # zenoh's stub
 
     try:
@@ -426,11 +428,6 @@ def _leave(clock: RealClock, session: zenoh.Session) -> None:
 _open_transports: dict[ZenohTransport, None] = {}
 _loopbacks: weakref.WeakSet[SerialExecutor] = weakref.WeakSet()
 
-# Objects closed while the interpreter exits, kept alive for good. A thread that drops the last
-# reference to an object of Zenoh releases the GIL for a moment, and must not ask for it again after
-# the interpreter's end (see `_close_all`).
-_kept: list[Declared | zenoh.ZError] = []
-
 
 def _close_all() -> None:
     """Close all sessions, and wait for threads that are about to return to Python.
@@ -439,7 +436,7 @@ def _close_all() -> None:
     code is on the thread's stack, this aborts the process ("exception not rethrown"). Two kinds of
     threads can be at that point: those in a callback that started before its session was closed
     (`held` waits until Zenoh has freed the callbacks), and those in a call into Zenoh (`inside`
-    waits for them; later calls are refused).
+    waits for them, and refuses later calls: an answer to a query, for example).
     """
     if process.forked:  # the sessions belong to the parent; their threads do not exist here
         return
@@ -449,7 +446,7 @@ def _close_all() -> None:
     held.wait(LET_GO_S)
     for executor in list(_loopbacks):
         any(executor.join(PART_S) for _ in range(LET_GO_PARTS))
-    inside.wait_idle(LET_GO_S)
+    inside.end(LET_GO_S)
 
 
 atexit.register(_close_all)

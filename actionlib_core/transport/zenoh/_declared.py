@@ -44,8 +44,26 @@ _PLAIN = "zenoh/bytes"  # Zenoh's encoding of a payload without one
 _ERROR = "smachpy/error"  # distinguishes `reply_error` from the errors of Zenoh itself
 
 
+kept: list[Any] = []
+"""Objects that were let go as the interpreter exits, kept alive for good.
+
+A thread that drops the last reference to an object of Zenoh releases the GIL for a moment, and must
+not ask for it again after the interpreter's end.
+"""
+
+
 class _Undeclarable(Protocol):
     def undeclare(self) -> Any: ...
+
+
+def undeclare(handle: _Undeclarable) -> None:
+    """Undeclare what was declared, unless the session or the interpreter does it at its end."""
+    try:
+        # It fails only if the session was closed in the meantime, which undeclares all.
+        with inside, contextlib.suppress(zenoh.ZError):
+            handle.undeclare()
+    except TransportError:
+        kept.append(handle)
 
 
 class Declared:
@@ -63,9 +81,7 @@ class Declared:
         self._inlet.closed = True
         if self._transport.forget(self):
             for handle in reversed(self._handles):
-                # It fails only if the session was closed in the meantime, which undeclares all.
-                with inside, contextlib.suppress(zenoh.ZError):
-                    handle.undeclare()
+                undeclare(handle)
 
 
 class Publisher(Declared):
@@ -101,6 +117,7 @@ class Publisher(Declared):
             raise TransportError(
                 f"{self._key}: the publisher is closed. Try sending before the node is closed."
             )
+        inside.check_late(get_ident())
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         # Before counting as inside, or a thread that keeps sending would delay the exit for good.
@@ -111,7 +128,7 @@ class Publisher(Declared):
         depth = depths.get(me, 0)
         depths[me] = depth + 1  # `with inside`, written out: takes half the time
         try:
-            if self._inlet.closed or process.forked:
+            if self._inlet.closed or process.forked or inside.ended_by:
                 self._check_open()
             self._send(payload, attachment)
         except zenoh.ZError as error:
@@ -141,7 +158,7 @@ class Publisher(Declared):
                 # Queried each time (2 us): a listener would be notified too late.
                 status: Any = self._port.matching_status  # zenoh's stub says bool
                 return bool(status.matching)
-        except zenoh.ZError:  # the session is closed
+        except (zenoh.ZError, TransportError):  # the session is closed, or the interpreter exits
             return False
         finally:
             self._users.pop()
@@ -385,7 +402,8 @@ class ZenohQuery:
     def reply(self, payload: bytes, encoding: str = "", *, attachment: bytes | None = None) -> None:
         raw = self._raw
         if raw is not None:
-            with inside, contextlib.suppress(zenoh.ZError):  # finished, or the caller is gone
+            # Finished, or the caller is gone, or the interpreter exits.
+            with contextlib.suppress(zenoh.ZError, TransportError), inside:
                 raw.reply(
                     self.key,
                     payload,
@@ -397,16 +415,20 @@ class ZenohQuery:
     def reply_error(self, text: str) -> None:
         raw = self._raw
         if raw is not None:
-            with inside, contextlib.suppress(zenoh.ZError):
+            with contextlib.suppress(zenoh.ZError, TransportError), inside:
                 raw.reply_err(text.encode(), encoding=_ERROR)
 
     def finish(self) -> None:
         with self._lock:
             raw, self._raw = self._raw, None
-        if raw is not None:
+        if raw is None:
+            return
+        try:
             with inside:
                 raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
-                del raw  # within `inside`, as freeing it releases the GIL once more
+                raw = None  # within `inside`, as freeing it releases the GIL once more
+        except TransportError:
+            kept.append(raw)
 
 
 class Queryable(Declared):
@@ -432,8 +454,7 @@ class Queryable(Declared):
 
     @staticmethod
     def _refuse(raw: zenoh.Query) -> None:
-        with inside:
-            raw.drop()  # type: ignore[no-untyped-call]  # zenoh's stub
+        ZenohQuery(raw).finish()
 
     def _answer(self, raw: zenoh.Query) -> None:
         if _is_astray(raw.source_info, self._mark, self._key):
@@ -501,8 +522,11 @@ class Asking(Declared):
 
 
 def _cancel(token: zenoh.CancellationToken) -> None:
-    with inside:
-        token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
+    try:
+        with inside:
+            token.cancel()  # type: ignore[no-untyped-call]  # zenoh's stub
+    except TransportError:
+        kept.append(token)
 
 
 class Watcher(Declared):

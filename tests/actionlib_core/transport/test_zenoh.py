@@ -546,6 +546,82 @@ def test_end_of_the_interpreter_waits_for_calls_that_have_begun():
     thread.join(WAIT_S)
 
 
+def test_no_call_begins_after_the_end_of_the_interpreter_has_waited_for_calls():
+    calls = Inside()
+    begun, release, told = threading.Event(), threading.Event(), []
+
+    def call():
+        with calls:
+            begun.set()
+            release.wait(WAIT_S)
+            with calls:  # of a call that was waited for
+                told.append("goes on")
+        try:
+            with calls:
+                told.append("late")
+        except TransportError as error:
+            told.append(str(error).partition(";")[0])
+
+    thread = threading.Thread(target=call)
+    thread.start()
+    assert begun.wait(WAIT_S)
+    timer = threading.Timer(0.05, release.set)
+    timer.start()
+    calls.end(WAIT_S)
+    thread.join(WAIT_S)
+    assert told == ["goes on", "network: got a call as the interpreter exits"]
+    assert not calls.depths
+    with calls:  # by the thread that ends the interpreter
+        assert list(calls.depths) == [threading.get_ident()]
+    timer.join()
+
+
+LATE = """
+import threading
+from actionlib_core.transport.zenoh import ZenohTransport
+
+transport = ZenohTransport()
+queries, asked = [], threading.Event()
+
+def note(query):
+    queries.append(query)
+    asked.set()
+
+transport.queryable("late", note)
+transport.query("late", b"", timeout=20.0, on_reply=print, on_done=int)
+publisher = transport.publisher("later")
+assert asked.wait(20)
+started = threading.Barrier(4)
+
+def repeat(call):
+    started.wait()
+    while True:
+        call()
+
+def publish():
+    try:
+        publisher.put(b"x")
+    except ConnectionError:
+        pass
+
+def answer(query=queries.pop()):
+    query.reply(b"x")
+
+for call in (answer, answer, publish):
+    threading.Thread(target=repeat, args=(call,), daemon=True).start()
+started.wait()
+"""
+
+
+@pytest.mark.slow
+def test_threads_that_still_send_as_the_interpreter_ends_do_not_abort_the_process():
+    """It said 'exception not rethrown': they came back from zenoh after the interpreter's end."""
+    for _ in range(5):
+        with child(LATE) as process:
+            _, errors = process.communicate(timeout=WAIT_S * 2)
+            assert (process.returncode, errors) == (0, "")
+
+
 def test_time_in_which_the_process_was_stopped_is_not_waiting(monkeypatch):
     """As it went on, all that the interpreter's end waits for seemed to be late, and was left."""
     calls, held = Inside(), Held()
@@ -582,7 +658,7 @@ def test_what_fails_as_the_interpreter_ends_is_not_freed(monkeypatch):
     transport = ZenohTransport()
     transport.session.close()
     with monkeypatch.context() as at_the_end:
-        at_the_end.setattr(zenoh_transport, "_kept", kept)
+        at_the_end.setattr(zenoh_transport, "kept", kept)
         at_the_end.setattr(zenoh_transport.ending, "begun", True)
         with pytest.raises(TransportError) as caught:
             transport.subscribe("late", print)
