@@ -1,11 +1,12 @@
-"""Messages of bags of rosbag1, rosbag2 and MCAP, through `rosbags` and `mcap` (their extras).
+"""Bags: reads those of rosbag1, rosbag2 and MCAP, and writes MCAP, through `rosbags` and `mcap`.
 
-They are converted to the message classes of this library by the names of their fields, so a bag of
-ROS 2 gives messages of ROS 1's types, as missions use them.
+Messages that are read are converted to the message classes of this library by the names of their
+fields, so a bag of ROS 2 gives messages of ROS 1's types, as missions use them.
 """
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,10 +16,11 @@ from actionlib_core.interfaces import get_message
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
+    from typing import Self
 
 
 class BagError(ActionlibError):
-    """A bag cannot be read.
+    """A bag cannot be read or written.
 
     Try: check the path; a bag is a `.bag` or `.mcap` file, or a folder of rosbag2.
 
@@ -83,6 +85,91 @@ def read_bag(path: str | Path, topics: Collection[str] | None = None) -> Iterato
         raise BagError(path, f"{error}. Try: pip install 'smachpy[cdr,mcap]'") from error
     except Exception as error:  # of many kinds: those of two packages and of what they use
         raise BagError(path, f"cannot be read: {type(error).__name__}: {error}") from error
+
+
+class BagWriter:
+    """Writes messages of ROS 1 and ROS 2 to a new MCAP file; a context manager.
+
+    Args:
+        path: The file, whose folder is made if there is none. A file that exists is never changed.
+
+    Raises:
+        BagError: the file exists or cannot be made, or the package is missing.
+
+    Threads: one at a time.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        try:
+            from mcap.writer import Writer
+        except ImportError as error:
+            raise BagError(self._path, f"{error}. Try: pip install 'smachpy[mcap]'") from error
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._path.open("xb")
+        except OSError as error:
+            raise BagError(self._path, f"cannot be made: {error.strerror or error}.") from error
+        self._writer: Any = Writer(self._file)
+        self._channels: dict[tuple[str, str, str], int] = {}
+        self._begin()
+
+    def _begin(self) -> None:
+        try:
+            self._writer.start()
+        except OSError as error:
+            self._file.close()
+            raise self._failure(error) from error
+
+    def write(self, topic: str, kind: type[Any], data: bytes, stamp_ns: int) -> None:
+        """Append a message.
+
+        Args:
+            topic: Its topic.
+            kind: Its class.
+            data: Its bytes: those of `to_bytes` of ROS 1's classes, of `to_cdr` of ROS 2's.
+            stamp_ns: When it came [ns since the epoch].
+
+        Raises:
+            BagError: the file cannot be written.
+        """
+        name, ros2 = kind._type, kind._wire == "ros2"
+        key = f"/{topic.strip('/')}", name, kind._full_text
+        try:
+            if key not in self._channels:
+                text = kind._full_text.encode()
+                schema = self._writer.register_schema(name, "ros2msg" if ros2 else "ros1msg", text)
+                encoding = "cdr" if ros2 else "ros1"
+                self._channels[key] = self._writer.register_channel(key[0], encoding, schema)
+            self._writer.add_message(self._channels[key], stamp_ns, data, stamp_ns)
+        except OSError as error:
+            raise self._failure(error) from error
+
+    def close(self) -> None:
+        """Complete the file; a second call does nothing.
+
+        Raises:
+            BagError: it cannot be written.
+        """
+        if self._file.closed:
+            return
+        try:
+            self._writer.finish()
+            self._file.flush()
+        except OSError as error:
+            raise self._failure(error) from error
+        finally:
+            with contextlib.suppress(OSError):  # what it could not write is told above
+                self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _failure(self, error: OSError) -> BagError:
+        return BagError(self._path, f"cannot be written: {error.strerror or error}.")
 
 
 def _mcap(path: Path) -> Iterator[tuple[int, str, str, Any]]:

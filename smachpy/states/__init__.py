@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from smachpy.places.exceptions import NavigationError as NavigationError
     from smachpy.places.pose import Pose2D as Pose2D
     from smachpy.states.ask_operator import AskOperator as AskOperator
+    from smachpy.states.bags import RecordBag as RecordBag
     from smachpy.states.barrier import Barrier as Barrier
     from smachpy.states.driving import DRIVE_TIMEOUT as DRIVE_TIMEOUT
     from smachpy.states.driving import SIGNAL_TIMEOUT as SIGNAL_TIMEOUT
@@ -67,6 +68,7 @@ __all__ = [
     "Progress",
     "Publish",
     "Question",
+    "RecordBag",
     "RestoreParameters",
     "Route",
     "Serve",
@@ -107,6 +109,7 @@ _HOMES = {
     "Progress": "smachpy.states.progress",
     "Publish": "smachpy.states.topics",
     "Question": "smachpy.states.questions",
+    "RecordBag": "smachpy.states.bags",
     "RestoreParameters": "smachpy.states.ros2_nodes",
     "Route": "smachpy.states.waypoints",
     "SIGNAL_TIMEOUT": "smachpy.states.driving",

@@ -303,6 +303,34 @@ def publish(
     )
 
 
+def record_bag(
+    path: str,
+    topics: Mapping[str, str],
+    seconds: float | None = None,
+    key: str | None = None,
+) -> State:
+    """Record topics to a bag. Outcomes: 'done', 'aborted', 'preempted'.
+
+    Args:
+        path: The file, ending in `.mcap`, in the folder in which the mission runs, or below.
+        topics: Topic: type of its messages.
+        seconds: How long to record [s]; without it until the state is preempted.
+        key: The userdata key that gets the path of the file.
+    """
+    from pathlib import PurePath
+
+    from smachpy.states.bags import RecordBag
+
+    # A mission file may be a stranger's: it chooses no place of the computer.
+    where = PurePath(str(path))
+    if where.is_absolute() or ".." in where.parts:
+        raise InvalidStateError(
+            f"record_bag: path: got {path!r}; expected a path below the working folder."
+        )
+    kinds = {topic: _interface("message", type_) for topic, type_ in topics.items()}
+    return RecordBag(path, kinds, seconds=seconds, key=key)
+
+
 def look_up_transform(
     key: str, frame: str, into: str = "map", tf: str = "tf", timeout: float | None = 5.0
 ) -> State:
@@ -523,6 +551,7 @@ BY_NAME: Final[dict[str, Callable[..., State]]] = {
     "monitor": monitor,
     "nav2_active": nav2_active,
     "publish": publish,
+    "record_bag": record_bag,
     "restore_parameters": restore_parameters,
     "service": service,
     "set": set_keys,
