@@ -274,3 +274,47 @@ def test_an_answer_of_the_operator_is_a_cause(by, what):
 def test_the_last_step_has_the_class_that_the_machine_gives_its_outcome(success, kind):
     made = machine([("A", CBState(lambda _: "ok", outcomes=["ok"]), {})], success=success)
     assert why(*ran(made)).steps[-1].kind == kind
+
+
+def test_a_failed_state_says_what_it_read_and_who_had_written_it():
+    sm = StateMachine(outcomes=["done", "aborted"], name="JOB")
+    inner = StateMachine(["done", "failed"], input_keys=["limit"], output_keys=["limit"])
+    with inner:
+        inner.add(
+            "SLOW",
+            CBState(write("speed", 0.3), outcomes=["ok"], output_keys=["speed"]),
+            {"ok": "GO"},
+        )
+        inner.add(
+            "GO",
+            CBState(lambda _: "failed", outcomes=["failed"], input_keys=["v", "limit", "never"]),
+            {"failed": "failed"},
+            remapping={"v": "speed", "never": "nothing"},
+        )
+    inner.userdata.nothing = None
+    with sm:
+        sm.add(
+            "SET",
+            CBState(write("most", 5), outcomes=["ok"], output_keys=["most"]),
+            {"ok": "DRIVE"},
+        )
+        sm.add("DRIVE", inner, {"failed": "aborted"}, remapping={"limit": "most"})
+    story = []
+    sm.subscribe(lambda event: story.append(to_record(event)))
+    assert sm.execute() == "aborted"
+    found = why(describe(sm), story)
+    (step,) = (one for one in found.steps if one.path == "/JOB/DRIVE/GO")
+    assert [one[:3] for one in step.read] == [
+        ("v", "0.3", "/JOB/DRIVE/SLOW"),
+        ("limit", "5", "/JOB/SET"),
+    ]
+    assert "read v = 0.3 (of /JOB/DRIVE/SLOW at 0.0" in found.text()
+    assert all(not one.read for one in found.steps if one.path != "/JOB/DRIVE/GO")
+
+
+def write(key, value):
+    def callback(userdata):
+        userdata[key] = value
+        return "ok"
+
+    return callback

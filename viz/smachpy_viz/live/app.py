@@ -15,6 +15,7 @@
     POST /api/control         a command, or the answer to a question
     GET  /api/runs            live and past runs, for the home page
     GET  /api/fleet           32 live runs, with the data for a common map
+    GET  /api/good            how a machine's run that failed differs from good runs in files
     GET  /api/open            the name of the machine that shows a run
     POST /api/mission         resume or cancel a durable mission
     GET  /api/simulations     the missions that may be simulated, and the batches

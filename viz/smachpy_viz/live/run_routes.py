@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from smachpy_viz.live import assets
-from smachpy_viz.live.answers import Json, RequestError, command_of, failing_with
+from smachpy_viz.live.answers import Json, RequestError, command_of, failing_with, machine_of
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -44,6 +44,7 @@ class RunRoutes:
         self.routes = [
             Route("/api/runs", self._list),
             Route("/api/fleet", self._fleet),
+            Route("/api/good", self._good),
             Route("/api/open", self._open),
             Route("/api/mission", self._command_mission, methods=["POST"]),
             Route("/api/simulations", self._batches),
@@ -59,6 +60,15 @@ class RunRoutes:
         if not _NUMBER.fullmatch(skip):
             raise RequestError(f"skip: got {skip!r}; expected a number of runs.")
         return Json(await run_in_threadpool(self._runs.fleet, int(skip)))
+
+    async def _good(self, request: Request) -> Response:
+        machine = machine_of(request, self._runs.machines)
+        assert machine.record is not None
+        from smachpy_viz.runs.good_runs import compare_with_good
+
+        good = self._runs.good(machine.name)
+        found = await run_in_threadpool(compare_with_good, machine.record, machine.events(), good)
+        return Json(found.to_json())
 
     async def _open(self, request: Request) -> Response:
         asked = request.query_params.get("run", "")

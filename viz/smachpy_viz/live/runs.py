@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -11,8 +12,9 @@ from smachpy.exceptions import MissionError
 from smachpy_viz.runs.listing import run_row
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
 
+    from smachpy.events.introspection import StateRecord
     from smachpy_viz.live.journals import Journals
     from smachpy_viz.live.machines import Machines
 
@@ -41,6 +43,12 @@ AGAIN: Final = ", again "
 """In the names of machines that show a reproduced run, before its number: they are in no list of
 runs, and no name on a network has it."""
 
+MAX_GOOD: Final = 25
+"""Good runs with which one that failed is compared."""
+
+LARGEST_GOOD: Final = 20_000_000
+"""Largest recording among them [bytes]."""
+
 LARGEST: Final = 200_000_000
 """Largest recording that is read [bytes]."""
 
@@ -53,6 +61,9 @@ class Runs:
         folders: Folders of recordings; they need not exist.
         journals: Journals of durable missions; None for none.
 
+    Attributes:
+        machines: The known machines.
+
     Threads: every method may be called from any thread; all read files.
     """
 
@@ -62,7 +73,7 @@ class Runs:
         folders: Iterable[Path] = (),
         journals: Journals | None = None,
     ) -> None:
-        self._machines = machines
+        self.machines = machines
         self._journals = journals
         self._folders = list(dict.fromkeys(folders))
         self._lock = threading.Lock()
@@ -83,7 +94,7 @@ class Runs:
         with self._lock:
             rows = [
                 self._row_of(name)
-                for name in (one["name"] for one in self._machines.summaries())
+                for name in (one["name"] for one in self.machines.summaries())
                 if name not in self._opened and AGAIN not in name
             ]
             files = self._files()
@@ -113,13 +124,13 @@ class Runs:
         """
         names = [
             one["name"]
-            for one in self._machines.summaries()
+            for one in self.machines.summaries()
             if one["stale"] is None and not one["recorded"] and one["ended"] is None
         ]
         skip = max(0, min(skip, len(names) - 1))
         found = []
         for name in names[skip : skip + MAX_FLEET_RUNS]:
-            machine = self._machines.get(name)
+            machine = self.machines.get(name)
             if machine is None or not (row := self._row_of(name))["live"]:
                 continue
             maps = machine.newest_observed("map", 1)
@@ -159,14 +170,14 @@ class Runs:
             RecordingError: there is no such run, or its file cannot be read.
         """
         kind, _, name = run.partition(" ")
-        if kind == "machine" and self._machines.get(name) is not None:
+        if kind == "machine" and self.machines.get(name) is not None:
             return name
         path = Path(name)
         with self._lock:
             # Only files that are listed: a page must not read any other file of this computer.
             if kind != "file" or path not in self._files():
                 raise RecordingError(name, "no such run; expected one in the list.")
-            machine = self._machines.obtain(f"run {path.name}")
+            machine = self.machines.obtain(f"run {path.name}")
             if machine.name not in self._opened or machine.file != str(path):
                 machine.load(read_recording(path))
             self._opened.pop(machine.name, None)  # moved to the end: the most recently used
@@ -174,7 +185,7 @@ class Runs:
             while len(self._opened) > MAX_OPEN_RECORDINGS:
                 oldest = next(iter(self._opened))
                 del self._opened[oldest]
-                self._machines.forget(oldest)
+                self.machines.forget(oldest)
         return machine.name
 
     def file_of(self, name: str) -> Path | None:
@@ -183,7 +194,7 @@ class Runs:
         Args:
             name: A machine's name.
         """
-        machine = self._machines.get(name)
+        machine = self.machines.get(name)
         if machine is None or machine.record is None or AGAIN in name:
             return None
         if machine.file:
@@ -192,6 +203,29 @@ class Runs:
         with self._lock:
             recorded = map(self._row_of_file, self._files())
             return next((Path(one["file"]) for one in recorded if _is_same(one, row)), None)
+
+    def good(self, name: str) -> Iterator[tuple[StateRecord, Sequence[dict[str, Any]]]]:
+        """Yield the newest good runs of a machine in files: structure and events, 25 at most."""
+        machine = self.machines.get(name)
+        if machine is None or machine.record is None:
+            return
+        record = machine.record
+        with self._lock:
+            rows = [self._row_of_file(path) for path in self._files()]
+        good = (
+            Path(row["file"])
+            for row in rows
+            if row["machine"] == record.label
+            and row["outcome"] is not None
+            and record.class_of(row["outcome"]) == "success"
+        )
+        for path in itertools.islice(good, MAX_GOOD):
+            try:
+                if path.stat().st_size <= LARGEST_GOOD:
+                    recording = read_recording(path)
+                    yield recording.record, recording.events
+            except (OSError, RecordingError):
+                continue  # it was removed, or has changed, since it was listed
 
     def _files(self) -> list[Path]:
         found: list[tuple[int, Path]] = []
@@ -204,7 +238,7 @@ class Runs:
         return [path for _, path in sorted(found, reverse=True)[:MAX_FILES]]
 
     def _row_of(self, name: str) -> dict[str, Any]:
-        machine = self._machines.get(name)
+        machine = self.machines.get(name)
         assert machine is not None
         assert machine.record is not None
         row = machine.row()

@@ -14,6 +14,7 @@ from smachpy.events.run_state import RunFacts
 from smachpy.network.reading import CheckProblem, ControlState
 from smachpy_viz.model.machine import Node
 from smachpy_viz.model.why import Cause
+from smachpy_viz.runs.good_runs import GoodRuns
 
 EventRecord: TypeAlias = dict[str, Any]
 """An event: `kind`, the fields of its kind in `smachpy.events`, `seq`; after a gap `dropped`."""
@@ -498,6 +499,7 @@ ANSWERS: dict[str, Any] = {
     "GET /api/value": WholeValue,
     "GET /api/runs": RunList,
     "GET /api/fleet": FleetPage,
+    "GET /api/good": GoodRuns,
     "GET /api/open": Opened,
     "GET /api/simulations": SimulationList,
     "GET /api/reproduction": Reproduction,

@@ -14,6 +14,7 @@ from smachpy.events.outcome_classes import is_good, outcome_class
 from smachpy.events.run_state import RAISED
 from smachpy.userdata.shown import literal
 from smachpy_viz.model.labels import cleanups, innermost, shorten, tidies
+from smachpy_viz.model.reads import begin_of, values_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +26,7 @@ ENDS = frozenset({"Left", "Failed", "Finished"})
 MAX_EARLIER_CAUSES = 10
 """The longest chain of failed states that is shown for one machine."""
 
-MAX_WRITTEN_KEYS = 8
+MAX_KEYS = 8
 MAX_VALUE_LENGTH = 300
 
 
@@ -43,6 +44,8 @@ class Cause:
         written: The userdata that the state wrote: key, value, and the value before ("" if there
             was none), as texts.
         outcome: The outcome, if the step is the end of a state; else "".
+        read: What the state read at its begin: key, value, path of the state that had written it,
+            and when [ns since the epoch].
     """
 
     path: str
@@ -53,6 +56,7 @@ class Cause:
     detail: str = ""
     written: tuple[tuple[str, str, str], ...] = ()
     outcome: str = ""
+    read: tuple[tuple[str, str, str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,9 @@ class Explanation:
             reason = f": {step.reason}" if step.reason else ""
             lines.append(f"{number:3}. {at:8.2f}  {step.path} {step.what}{reason}")
             lines += [f"               {line}" for line in step.detail.splitlines()]
+            for key, value, writer, stamp_ns in step.read:
+                when = f"{writer} at {max(0.0, (stamp_ns - began) / 1e9):.2f}"
+                lines.append(f"               read {key} = {value} (of {when})")
             for key, value, before in step.written:
                 was = f" (was {before})" if before else ""
                 lines.append(f"               wrote {key} = {value}{was}")
@@ -159,11 +166,18 @@ class _CauseFinder:
 
     def causes(self, path: str, end: int) -> tuple[Cause, ...]:
         """Return the steps that led to the end of a state (event number `end`), and that end."""
-        begin = self._begin(path, end)
+        begin = begin_of(self._run, path, end)
         outcome = self._outcome(end)
         state = self._states.get(path)
         led = self._led(path, end)
-        own = self._step(path, end, outcome, led, written=self._written(path, begin, end))
+        own = self._step(
+            path,
+            end,
+            outcome,
+            led,
+            written=self._written(path, begin, end),
+            read=self._read(path, begin),
+        )
         request = self._first("PreemptRequested", path, begin, end)
         if request is not None and self._class(path, outcome) == "preempted":
             return (*self._request(request), own)
@@ -211,12 +225,6 @@ class _CauseFinder:
     def _outcome(self, end: int) -> str:
         return self._run[end].get("outcome") or RAISED
 
-    def _begin(self, path: str, end: int) -> int:
-        for i in range(end - 1, -1, -1):
-            if self._run[i]["path"] == path and self._run[i]["kind"] in {"Entered", "Started"}:
-                return i
-        return 0
-
     def _first(self, kind: str, path: str, begin: int, end: int) -> int | None:
         found = (i for i in range(begin, end) if _is(self._run[i], kind, path))
         return next(found, None)
@@ -237,7 +245,17 @@ class _CauseFinder:
         }
         return tuple(
             (shorten(key, 80), _short(value), _short(before[key]) if key in before else "")
-            for key, value in [*values.items()][-MAX_WRITTEN_KEYS:]
+            for key, value in [*values.items()][-MAX_KEYS:]
+        )
+
+    def _read(self, path: str, begin: int) -> tuple[tuple[str, str, str, int], ...]:
+        """Return what a state without states inside read; a container only hands it on."""
+        if self._states.get(path) is None or self._states[path].children:
+            return ()
+        found = list(values_read(self._states, self._run, path, begin))[:MAX_KEYS]
+        return tuple(
+            (shorten(key, 80), _short(event["value"]), event["path"], event["stamp_ns"])
+            for key, event in found
         )
 
     def _request(self, at: int) -> tuple[Cause, ...]:

@@ -10612,6 +10612,159 @@ function Changes({ page: page2 }) {
   ] });
 }
 
+// src/drawing/card.ts
+var WIDTH = 800;
+var EDGE = 24;
+var LINE = 24;
+var MOST_STEPS = 6;
+var FONTS_MS2 = 150;
+async function copyCard(page2, why) {
+  try {
+    const canvas2 = await draw2(page2, why);
+    const blob = await new Promise((done) => canvas2.toBlob(done, "image/png"));
+    if (!blob) throw new Error("this browser makes no picture of it");
+    try {
+      await navigator.clipboard.write([new ClipboardItem({ "image/png": blob })]);
+      store.view.notify("Copied");
+    } catch {
+      save2(blob, `${page2.fileName()}.png`);
+    }
+  } catch (error) {
+    store.view.notify(`No card: ${messageOf(error)}`, "error");
+  }
+}
+async function draw2(page2, why) {
+  const { svg: svg2 } = page2.diagram;
+  const floor3 = page2.map.canvas;
+  const style = await styleText();
+  await pictureOf(svg2, style);
+  await new Promise((done) => setTimeout(done, FONTS_MS2));
+  const diagram = await pictureOf(svg2, style);
+  const wide = WIDTH - 2 * EDGE;
+  const tall = (from) => from.clientWidth ? Math.round(from.clientHeight * wide / from.clientWidth) : 0;
+  const steps = why.steps.slice(0, MOST_STEPS);
+  const lines = steps.reduce((sum, { reason }) => sum + (reason ? 2 : 1), 0);
+  const heights = { diagram: tall(svg2), map: tall(floor3) };
+  const height = EDGE * 3 + LINE * (lines + 3) + heights.diagram + heights.map;
+  const canvas2 = document.createElement("canvas");
+  const ratio = 2;
+  Object.assign(canvas2, { width: WIDTH * ratio, height: height * ratio });
+  const g5 = canvas2.getContext("2d");
+  g5.scale(ratio, ratio);
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
+  const write2 = (text2, x3, y6, font2, ink, most = WIDTH - EDGE - x3) => {
+    g5.font = font2;
+    g5.fillStyle = colour(ink);
+    let shown = text2;
+    while (shown.length > 4 && g5.measureText(shown).width > most) shown = `${shown.slice(0, -2).trimEnd()}…`;
+    g5.fillText(shown, x3, y6);
+  };
+  g5.fillStyle = colour("background");
+  g5.fillRect(0, 0, WIDTH, height);
+  g5.textBaseline = "middle";
+  let y5 = EDGE + LINE / 2;
+  const outcome = why.outcome ?? "no end";
+  write2(`${page2.title()}: ${outcome}`, EDGE, y5, "680 18px Inter, Arial, sans-serif", "ink");
+  y5 += LINE * 1.5;
+  for (const step of steps) {
+    const t4 = store.clock.runText(step.stamp_ns / 1e6, 1);
+    write2(t4, EDGE, y5, "600 12px 'JetBrains Mono', monospace", "muted");
+    const text2 = `${store.data.nameOf(step.path)} ${shorten(step.what, 120)}`;
+    write2(text2, EDGE + 80, y5, "620 13px Inter, Arial, sans-serif", step.kind === "failure" ? "failure-text" : "ink");
+    y5 += LINE;
+    if (!step.reason) continue;
+    write2(shorten(step.reason, 160), EDGE + 80, y5 - 4, "12px Inter, Arial, sans-serif", "muted");
+    y5 += LINE;
+  }
+  g5.drawImage(diagram, EDGE, y5, wide, heights.diagram);
+  y5 += heights.diagram + EDGE / 2;
+  if (heights.map) g5.drawImage(floor3, EDGE, y5, wide, heights.map);
+  const began = why.began === null ? "" : new Date(why.began / 1e6).toISOString().slice(0, 16).replace("T", " ");
+  const about = `${store.data.facts.value?.name ?? ""}, began ${began}, made with smachpy`;
+  write2(about, EDGE, height - EDGE, "11px Inter, Arial, sans-serif", "muted");
+  return canvas2;
+}
+
+// src/core/good_runs.ts
+var MIDDLE = 0.8;
+function placed2({ good, number }) {
+  if (number === null || !good.length) return null;
+  const sorted2 = [...good].sort((a5, b3) => a5 - b3);
+  const [least, most] = [Math.min(sorted2[0], number), Math.max(sorted2[sorted2.length - 1], number)];
+  const margin = (most - least || Math.abs(most) || 1) * 0.08;
+  const [low, high] = [least - margin, most + margin];
+  const x3 = (value) => (value - low) / (high - low);
+  const at = (share) => sorted2[Math.round(share * (sorted2.length - 1))];
+  const rest = (1 - MIDDLE) / 2;
+  return { low: least, high: most, dots: sorted2.map(x3), box: [x3(at(rest)), x3(at(1 - rest))], here: x3(number) };
+}
+
+// src/panels/good_runs.tsx
+var MOST_FACTS = 8;
+function GoodRunsPart() {
+  const [found, setFound] = d2(null);
+  A2(() => {
+    let open = !isFile();
+    const read = async () => {
+      const answer = await ask(link("good"));
+      if (open && !isFailure(answer)) setFound(answer);
+    };
+    if (open) read();
+    return () => {
+      open = false;
+    };
+  }, []);
+  if (!found?.path || !found.runs) return null;
+  const facts = [...found.facts].sort((a5, b3) => Number(b3.differs) - Number(a5.differs));
+  return /* @__PURE__ */ a4("div", { class: "good-runs", children: [
+    /* @__PURE__ */ a4("h3", { children: [
+      store.data.nameOf(found.path),
+      " in ",
+      found.runs,
+      " good run",
+      found.runs === 1 ? "" : "s"
+    ] }),
+    /* @__PURE__ */ a4("p", { class: facts.some(({ differs }) => differs) ? "conclusion" : "hint", children: shorten(found.text, 400) }),
+    facts.slice(0, MOST_FACTS).map((fact) => /* @__PURE__ */ a4(FactLine, { fact }, fact.name))
+  ] });
+}
+function FactLine({ fact }) {
+  const line = placed2(fact);
+  const text2 = (value) => `${Number(value.toPrecision(3))}${fact.unit && ` ${fact.unit}`}`;
+  const goodText = `${text2(Math.min(...fact.good))} to ${text2(Math.max(...fact.good))}`;
+  return /* @__PURE__ */ a4("div", { class: fact.differs ? "fact differs" : "fact", children: [
+    /* @__PURE__ */ a4("span", { children: [
+      /* @__PURE__ */ a4("b", { children: shorten(fact.name, 30) }),
+      " here ",
+      /* @__PURE__ */ a4("b", { class: "here", children: shorten(fact.here, 60) })
+    ] }),
+    line ? /* @__PURE__ */ a4($, { children: [
+      /* @__PURE__ */ a4("svg", { role: "img", "aria-label": `good runs ${goodText}, here ${fact.here}`, children: [
+        /* @__PURE__ */ a4("line", { x1: "0", x2: "100%", y1: "10", y2: "10" }),
+        /* @__PURE__ */ a4(
+          "rect",
+          {
+            x: `${100 * line.box[0]}%`,
+            width: `${100 * Math.max(4e-3, line.box[1] - line.box[0])}%`,
+            y: "3",
+            height: "14",
+            rx: "3"
+          }
+        ),
+        line.dots.map((x3) => /* @__PURE__ */ a4("circle", { cx: `${100 * x3}%`, cy: "10", r: "2.5" })),
+        /* @__PURE__ */ a4("text", { x: `${100 * line.here}%`, y: "10.5", children: "◆" })
+      ] }),
+      /* @__PURE__ */ a4("small", { children: [
+        /* @__PURE__ */ a4("span", { children: text2(line.low) }),
+        /* @__PURE__ */ a4("span", { children: text2(line.high) })
+      ] })
+    ] }) : /* @__PURE__ */ a4("small", { children: [
+      "good: ",
+      fact.texts.map((one) => shorten(one, 40)).join(", ")
+    ] })
+  ] });
+}
+
 // src/panels/why.tsx
 function WhyPanel({ page: page2 }) {
   const why = store.data.why.value;
@@ -10628,10 +10781,20 @@ function WhyPanel({ page: page2 }) {
   return /* @__PURE__ */ a4(Section, { title, children: /* @__PURE__ */ a4("div", { class: "why", children: [
     /* @__PURE__ */ a4("span", { class: "why-tools", children: [
       /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy as text" }),
+      /* @__PURE__ */ a4(
+        "button",
+        {
+          class: "small",
+          title: "a picture of the causes, the diagram and the map",
+          onClick: () => copyCard(page2, why),
+          children: "Copy as card"
+        }
+      ),
       /* @__PURE__ */ a4("button", { class: "small", "aria-label": "close", onClick: () => showWhy(false), children: "✕" })
     ] }),
     !why.steps.length && /* @__PURE__ */ a4("p", { class: "hint", children: "the causes are unknown" }),
-    /* @__PURE__ */ a4("ol", { children: why.steps.map((step, i4) => /* @__PURE__ */ a4(Step, { step, first: i4 === 0, page: page2 })) })
+    /* @__PURE__ */ a4("ol", { children: why.steps.map((step, i4) => /* @__PURE__ */ a4(Step, { step, first: i4 === 0, page: page2 })) }),
+    /* @__PURE__ */ a4(GoodRunsPart, {}, `${why.label} ${why.ended}`)
   ] }) });
 }
 function Step({ step, first, page: page2 }) {
@@ -10649,6 +10812,18 @@ function Step({ step, first, page: page2 }) {
     ] }),
     step.reason && /* @__PURE__ */ a4("p", { children: step.reason }),
     step.detail && /* @__PURE__ */ a4("pre", { children: step.detail }),
+    step.read.map(([key, value, writer, stamp]) => /* @__PURE__ */ a4("p", { children: [
+      "read ",
+      /* @__PURE__ */ a4("b", { children: key }),
+      " ",
+      value,
+      " ",
+      /* @__PURE__ */ a4("small", { children: "of" }),
+      " ",
+      /* @__PURE__ */ a4(StateLink, { path: writer, page: page2 }),
+      " ",
+      /* @__PURE__ */ a4("small", { children: store.clock.instantText(stamp / 1e6, 2) })
+    ] })),
     step.written.map(([key, value, before]) => /* @__PURE__ */ a4("p", { children: [
       "wrote ",
       /* @__PURE__ */ a4("b", { children: key }),
@@ -11407,7 +11582,7 @@ var LEGEND_SERIES = pre + "series";
 var LEGEND_MARKER = pre + "marker";
 var LEGEND_LABEL = pre + "label";
 var LEGEND_VALUE = pre + "value";
-var WIDTH = "width";
+var WIDTH2 = "width";
 var HEIGHT = "height";
 var TOP = "top";
 var BOTTOM = "bottom";
@@ -12294,7 +12469,7 @@ function cursorPointShow(self, si) {
   let o5 = self.cursor.points;
   let pt = placeDiv();
   let size = o5.size(self, si);
-  setStylePx(pt, WIDTH, size);
+  setStylePx(pt, WIDTH2, size);
   setStylePx(pt, HEIGHT, size);
   let mar = size / -2;
   setStylePx(pt, "marginLeft", mar);
@@ -14745,13 +14920,13 @@ function uPlot(opts, data, then) {
     if (shouldSetSize) {
       setStylePx(under, LEFT, plotLftCss);
       setStylePx(under, TOP, plotTopCss);
-      setStylePx(under, WIDTH, plotWidCss);
+      setStylePx(under, WIDTH2, plotWidCss);
       setStylePx(under, HEIGHT, plotHgtCss);
       setStylePx(over, LEFT, plotLftCss);
       setStylePx(over, TOP, plotTopCss);
-      setStylePx(over, WIDTH, plotWidCss);
+      setStylePx(over, WIDTH2, plotWidCss);
       setStylePx(over, HEIGHT, plotHgtCss);
-      setStylePx(wrap, WIDTH, fullWidCss);
+      setStylePx(wrap, WIDTH2, fullWidCss);
       setStylePx(wrap, HEIGHT, fullHgtCss);
       can.width = round(fullWidCss * pxRatio);
       can.height = round(fullHgtCss * pxRatio);
@@ -15049,7 +15224,7 @@ function uPlot(opts, data, then) {
   };
   function setSelH(off2, dim) {
     setStylePx(selectDiv, LEFT, select.left = off2);
-    setStylePx(selectDiv, WIDTH, select.width = dim);
+    setStylePx(selectDiv, WIDTH2, select.width = dim);
   }
   function setSelV(off2, dim) {
     setStylePx(selectDiv, TOP, select.top = off2);

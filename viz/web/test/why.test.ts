@@ -14,6 +14,7 @@ test("the way to the end is made of the ends of states, each once", () => {
       reason: "",
       detail: "",
       written: [],
+      read: [],
     }) as Cause;
   const steps = [step("/J/A"), step("/J/A", "aborted"), step("/J/A"), step("/J/A", "aborted"), step("/J", "done")];
   const why = { label: "J", outcome: "done", began: 1, ended: 2, steps, text: "" };

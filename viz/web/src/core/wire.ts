@@ -130,6 +130,7 @@ export interface Cause {
   detail: string;
   written: [string, string, string][];
   outcome: string;
+  read: [string, string, string, number][];
 }
 
 /** The causes of a run's end (`smachpy_viz.model.why.Explanation`), also as text. */
@@ -376,6 +377,25 @@ export interface FleetPage {
   rows: FleetRow[];
   skip: number;
   total: number;
+}
+
+/** Something about a visit that can be compared. */
+export interface Fact {
+  name: string;
+  unit: string;
+  here: string;
+  number: number | null;
+  good: number[];
+  texts: string[];
+  differs: boolean;
+}
+
+/** The comparison. */
+export interface GoodRuns {
+  path: string;
+  runs: number;
+  facts: Fact[];
+  text: string;
 }
 
 /** The machine that shows a run. */
@@ -740,6 +760,7 @@ export interface Answers {
   "GET /api/value": WholeValue;
   "GET /api/runs": RunList;
   "GET /api/fleet": FleetPage;
+  "GET /api/good": GoodRuns;
   "GET /api/open": Opened;
   "GET /api/simulations": SimulationList;
   "GET /api/reproduction": Reproduction;

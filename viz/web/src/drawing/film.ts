@@ -100,7 +100,7 @@ async function paint(page: Page, canvas: HTMLCanvasElement, style: string, isFir
   if (below) g.drawImage(timeline, 0, HEAD + stage.h, wide, below);
 }
 
-async function pictureOf(svg: SVGSVGElement, style: string) {
+export async function pictureOf(svg: SVGSVGElement, style: string) {
   const copy = svg.cloneNode(true) as SVGSVGElement;
   const [width, height] = [svg.clientWidth, svg.clientHeight];
   copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
@@ -117,7 +117,7 @@ async function pictureOf(svg: SVGSVGElement, style: string) {
 }
 
 /** The page's style with the diagram's font embedded: an SVG in an image cannot load files. */
-async function styleText() {
+export async function styleText() {
   const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules].map((rule) => rule.cssText));
   const wanted = rules.filter((rule) => !rule.startsWith("@font-face") || rule.includes("Inter"));
   const text = wanted.join("\n");
@@ -132,7 +132,7 @@ async function styleText() {
   return text.replace(address, data);
 }
 
-function save(content: Blob, name: string) {
+export function save(content: Blob, name: string) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(content);
   link.download = name;

@@ -3,8 +3,10 @@
 import { showWhy } from "#core/connection.ts";
 import { store } from "#core/store.ts";
 import type { Cause } from "#core/types.ts";
+import { copyCard } from "#drawing/card.ts";
 import type { Page } from "#drawing/page.ts";
-import { Section } from "#panels/components.tsx";
+import { Section, StateLink } from "#panels/components.tsx";
+import { GoodRunsPart } from "#panels/good_runs.tsx";
 
 export function WhyPanel({ page }: { page: Page }) {
   const why = store.data.why.value;
@@ -25,6 +27,13 @@ export function WhyPanel({ page }: { page: Page }) {
           <button class="small" onClick={copy}>
             Copy as text
           </button>
+          <button
+            class="small"
+            title="a picture of the causes, the diagram and the map"
+            onClick={() => copyCard(page, why)}
+          >
+            Copy as card
+          </button>
           <button class="small" aria-label="close" onClick={() => showWhy(false)}>
             ✕
           </button>
@@ -35,6 +44,7 @@ export function WhyPanel({ page }: { page: Page }) {
             <Step step={step} first={i === 0} page={page} />
           ))}
         </ol>
+        <GoodRunsPart key={`${why.label} ${why.ended}`} />
       </div>
     </Section>
   );
@@ -53,6 +63,12 @@ function Step({ step, first, page }: { step: Cause; first: boolean; page: Page }
       </button>
       {step.reason && <p>{step.reason}</p>}
       {step.detail && <pre>{step.detail}</pre>}
+      {step.read.map(([key, value, writer, stamp]) => (
+        <p>
+          read <b>{key}</b> {value} <small>of</small> <StateLink path={writer} page={page} />{" "}
+          <small>{store.clock.instantText(stamp / 1e6, 2)}</small>
+        </p>
+      ))}
       {step.written.map(([key, value, before]) => (
         <p>
           wrote <b>{key}</b> {value} {before && <small>(was {before})</small>}
