@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import ctypes
 import dataclasses
 import importlib.util
 import json
@@ -278,18 +279,49 @@ def cost_of_timer(clock: Clock, others: int) -> float:
     return took / TIMERS
 
 
-def of_runners(place: str, folder: Path, counts: Sequence[int], missions: int) -> dict[str, float]:
-    """Processes per mission, and missions per second of CPU, with several runners of one queue."""
+def of_runners(place: str, folder: Path, counts: Sequence[int], *, long: bool) -> dict[str, float]:
+    """Processes per mission with several runners of one queue; with `long`, what each one costs.
+
+    A runner and its first mission cost a second of CPU, to import. The costs of the others are the
+    difference of two queues, so that they say what runners cost one another.
+    """
     mission = folder / "errand.py"
     mission.write_text(ERRAND, encoding="utf-8")
+    adopt_orphans()
     found: dict[str, float] = {}
     for count in counts:
-        with contextlib.closing(open_store(place)) as store:
-            for number in range(missions):
-                row = new_mission(errand(), mission=f"m{count}-{number}", target=str(mission))
-                store.create(row)
-        words = ["-m", "smachpy", "runner", "--db", place, "--until-empty", "--allow", str(mission)]
-        before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+        few = cost_of_queue(place, mission, count, 2 * count)
+        found[f"{count} runners: processes per mission"] = few.processes / (2 * count)
+        if long:
+            missions = 2 * count + 40
+            many = cost_of_queue(place, mission, count, missions)
+            each = (many.cpu - few.cpu) / (missions - 2 * count)
+            found[f"{count} runners: processes per mission"] = many.processes / missions
+            found[f"{count} runners: CPU s per mission"] = each
+            found[f"{count} runners: CPU s of one's start"] = few.cpu / count - 2 * each
+            found[f"{count} runners: missions/s"] = missions / many.seconds
+    return found
+
+
+@dataclasses.dataclass
+class QueueCost:
+    """What runners have used for a queue: processes, CPU time [s], time [s]."""
+
+    processes: int
+    cpu: float
+    seconds: float
+
+
+def cost_of_queue(place: str, mission: Path, count: int, missions: int) -> QueueCost:
+    """Let `count` runners empty a queue of trivial missions."""
+    names = [f"m{count}-{missions}-{number}" for number in range(missions)]
+    with contextlib.closing(open_store(place)) as store:
+        for name in names:
+            store.create(new_mission(errand(), mission=name, target=str(mission)))
+    words = ["-m", "smachpy", "runner", "--db", place, "--until-empty", "--allow", str(mission)]
+    texts: list[str] = []
+
+    def run() -> None:
         runners = [
             subprocess.Popen(
                 [sys.executable, *words],
@@ -299,16 +331,23 @@ def of_runners(place: str, folder: Path, counts: Sequence[int], missions: int) -
             )
             for _ in range(count)
         ]
-        text = "".join(runner.communicate()[0] for runner in runners)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        begins = len(re.findall(r"mission \S+: begins", text))
-        ends = len(re.findall(r"mission \S+: ended: done", text))
-        assert ends == missions, text
-        found[f"{count} runners: processes per mission"] = begins / missions
-        found[f"{count} runners: CPU s per mission"] = cpu / missions
-        found[f"{count} runners: missions/s"] = missions / (time.perf_counter() - begun)
-    return found
+        texts.extend(runner.communicate()[0] for runner in runners)
+        with contextlib.suppress(ChildProcessError):
+            while True:  # the servers of processes, which outlive their runners by a moment
+                os.wait()
+
+    begun = time.perf_counter()
+    cpu = cpu_of_children(run)
+    text = "".join(texts)
+    assert len(re.findall(r"mission \S+: ended: done", text)) == missions, text
+    begins = len(re.findall(r"mission \S+: begins", text))
+    return QueueCost(begins, cpu, time.perf_counter() - begun)
+
+
+def adopt_orphans() -> None:
+    """Let this process wait for the children of its children, and so get their CPU time."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER
 
 
 def cpu_of_children(run: Callable[[], object]) -> float:
@@ -546,7 +585,7 @@ def main() -> None:
         os.environ["SMACHPY_RUNS"] = name
         if args.store:
             found |= of_queue(args.store, waiting)
-            found |= of_runners(args.store, folder, (1, 2, 4, 8), 50)
+            found |= of_runners(args.store, folder, (1, 2, 4, 8), long=args.long)
             if importlib.util.find_spec("dbos"):
                 found |= of_dbos(args.store, 200)
         else:
@@ -560,7 +599,8 @@ def main() -> None:
             found |= of_servers(1_000 if args.long else 400)
             if args.long:
                 found |= of_action_states((300, 1_000, 3_000))
-                found |= of_runners(str(folder / "runners.db"), folder, (1, 2, 4, 8), 50)
+            runners = (1, 2, 4, 8) if args.long else (4,)
+            found |= of_runners(str(folder / "runners.db"), folder, runners, long=args.long)
     if args.json:
         print(json.dumps({"figures": found}))
         return
