@@ -35,6 +35,7 @@ SUMMARIES = {
     "explore": "run a mission with every outcome of its states",
     "render": "draw a state machine into a file",
     "simulate": "do many runs of a mission in virtual time",
+    "certify": "try a mission in all ways, and write what was found",
     "view": "watch running machines in a browser",
     "runs": "list, show, compare and export recorded runs",
     "answer": "answer the question of a mission",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +14,10 @@ from smachpy.command.run import add_input, read_inputs
 from smachpy.machines.container import Container
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
+
+    from smachpy.command.arguments import Text
+    from smachpy.command.targets import Target
 
 EXAMPLES = """examples:
   smachpy explore patrol.yaml
@@ -57,6 +62,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="the longest time [s] (default: %(default)g)",
     )
     parser.add_argument(
+        "--jobs", type=between(1), metavar="N", help="at the same time (default: all cores)"
+    )
+    parser.add_argument(
         "--pictures", type=Path, metavar="FOLDER", help="draw the run that breaks an invariant"
     )
     parser.set_defaults(run=run, words=())
@@ -64,15 +72,9 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(args: argparse.Namespace) -> int:
     """Explore the mission; return 1 if a run breaks an invariant."""
-    from smachpy.command.mission_run import build
-    from smachpy.command.targets import load_target
     from smachpy.testing.exploring.exploration import explore
 
-    target, inputs = load_target(args.target, imports=False), read_inputs(args.input)
-
-    def make() -> Container:
-        return build(target, inputs, args.words)
-
+    make = MissionMaker(args.target, read_inputs(args.input), args.words)
     machine = make()
     found = explore(
         make,
@@ -81,9 +83,41 @@ def run(args: argparse.Namespace) -> int:
         faults=args.fault,
         keep=reckoning_states(machine),
         folder=None if args.pictures is None else lambda: args.pictures,
+        jobs=args.jobs,
     )
-    print(printable(f"/{machine.name or target.name}: {found}"))
+    print(printable(f"/{machine.name or args.target}: {found}"))
     return 0 if found.ok else 1
+
+
+@dataclass(frozen=True, slots=True)
+class MissionMaker:
+    """Makes the machine of a mission, here and in other processes.
+
+    Attributes:
+        target: The mission, as for `smachpy run`.
+        inputs: Its arguments by name.
+        words: Its arguments in order.
+        imports, allow: As for `load_target`.
+    """
+
+    target: str
+    inputs: Mapping[str, Text]
+    words: tuple[str, ...] = ()
+    imports: bool = False
+    allow: tuple[str, ...] | None = None
+
+    def __call__(self) -> Container:
+        """Return a new machine."""
+        from smachpy.command.mission_run import build
+
+        return build(_loaded(self.target, self.imports, self.allow), self.inputs, self.words)
+
+
+@cache
+def _loaded(target: str, imports: bool, allow: tuple[str, ...] | None) -> Target:
+    from smachpy.command.targets import load_target
+
+    return load_target(target, imports=imports, allow=allow)
 
 
 def reckoning_states(machine: Container) -> list[str]:

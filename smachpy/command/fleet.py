@@ -18,7 +18,7 @@ from smachpy.command import EXIT_ERROR
 from smachpy.command.durable import JOURNAL, LEASE_S, whole_target, words_of
 from smachpy.command.pruning import add_keep, age, is_kept
 from smachpy.command.queued import Allowed, add_allow, run_words
-from smachpy.command.run import add_input, read_inputs
+from smachpy.command.run import add_input, add_require_evidence, read_inputs
 from smachpy.command.warm import Starter
 from smachpy.durable.store import for_child, store_name
 from smachpy.exceptions import MissionError
@@ -137,6 +137,7 @@ def register_runner(subparsers: Any) -> None:
     )
     add_keep(parser, "missions")
     add_allow(parser, "run missions of this place, too")
+    add_require_evidence(parser)
     parser.set_defaults(run=_run)
 
 
@@ -208,6 +209,7 @@ def _run(args: argparse.Namespace) -> int:
                 at_once=args.at_once,
                 lease_s=args.lease,
                 allow=args.allow,
+                evidence=args.require_evidence,
                 until_empty=args.until_empty,
                 prune=None if args.prune is None else (args.prune, args.keep),
             )
@@ -283,6 +285,7 @@ class Runner:
         lease_s: How long a silent process holds its mission [s].
         allow: Places whose missions are run besides the installed ones, see
             `smachpy.command.queued`.
+        evidence: Files and folders: a mission without evidence in them is not begun; none: any is.
         until_empty: Whether it gives up missions that fail again and again.
         prune: Each hour missions are deleted that have been over for so long [s], except those that
             the second word keeps, see `smachpy.command.pruning`; None: never.
@@ -304,6 +307,7 @@ class Runner:
         at_once: int,
         lease_s: float,
         allow: Sequence[str] = (),
+        evidence: Sequence[str] = (),
         until_empty: bool = False,
         prune: tuple[float, str] | None = None,
     ) -> None:
@@ -315,6 +319,7 @@ class Runner:
         self._at_once = at_once
         self._lease_s = lease_s
         self._allow = allow
+        self._evidence = evidence
         self._allowed = Allowed(allow)
         self._refused: dict[str, None] = {}  # targets that are not allowed here, in their order
         self._given_up: set[str] = set()  # missions that are left to other runners
@@ -452,7 +457,7 @@ class Runner:
     def _start(self, row: MissionRow) -> None:
         """Start the process of a mission that is reserved; if that fails, put it back."""
         lease = self._leases[row.id]
-        words = [*run_words(self._address, row.id, self._allow), "--plain"]
+        words = [*run_words(self._address, row.id, self._allow, self._evidence), "--plain"]
         words += [f"--lease={self._lease_s}", f"--reserved={lease.runner}:{lease.fence}"]
         verb = "begins" if row.status == "queued" else "is resumed"
         print(printable(f"mission {row.id}: {verb}"), flush=True)

@@ -180,8 +180,11 @@ def take_row(args: argparse.Namespace) -> None:
     args.input, args.words = arguments_of(row)
 
 
-def run_words(journal: str, mission: str, allow: Iterable[str]) -> list[str]:
-    """Return the words of the command that runs a row's mission."""
+def run_words(
+    journal: str, mission: str, allow: Iterable[str], evidence: Iterable[str] = ()
+) -> list[str]:
+    """Return the words of the command that runs a row's mission; `evidence` is required."""
     # The target is the row's; this one is only shown, and "=" keeps a value from being an option.
     words = ["run", "mission-of-a-row", "--queued", f"--durable={journal}", f"--mission={mission}"]
-    return [*words, *(f"--allow={place}" for place in allow)]
+    words += [f"--allow={place}" for place in allow]
+    return [*words, *(f"--require-evidence={place}" for place in evidence)]

@@ -156,7 +156,20 @@ def register(subparsers: Any) -> None:
         help="let a mission file name code of this package, besides modules in its own folder "
         "(repeatable)",
     )
+    add_require_evidence(parser)
     parser.set_defaults(run=_run, words=())
+
+
+def add_require_evidence(parser: argparse.ArgumentParser) -> None:
+    """Add the option `--require-evidence`."""
+    parser.add_argument(
+        "--require-evidence",
+        action="append",
+        default=[],
+        metavar="FILE|DIR",
+        help="refuse a mission whose hash has no good evidence of 'smachpy certify' here "
+        "(repeatable)",
+    )
 
 
 def _add_watching(parser: argparse.ArgumentParser) -> None:
@@ -270,6 +283,10 @@ def _run_mission(
         from smachpy.command.queued import check_is_mission
 
         check_is_mission(target)
+    if args.require_evidence:
+        from smachpy.command.evidence import check_evidence
+
+        check_evidence(args.require_evidence, target, args.target)
     if wants_help(args.words):
         print(usage(target))
         return 0

@@ -127,7 +127,7 @@ def _run(args: argparse.Namespace) -> int:
         )
     options = Options(args.mission, tuple(args.allow), args.seed, tuple(args.tolerate))
     verdicts = []
-    for verdict in _verdicts(paths, options, args.jobs, args.record):
+    for verdict in verdicts_of(paths, options, args.jobs, args.record):
         verdicts.append(verdict)
         _show(verdict, many=len(paths) > 1, as_json=args.json)
     if len(paths) > 1 and not args.json:
@@ -171,8 +171,8 @@ def _show(verdict: Verdict, *, many: bool, as_json: bool) -> None:
         print(printable(line if number else f"{head}{line}"))
 
 
-def _verdicts(
-    paths: list[str], options: Options, jobs: int | None, record: Path | None
+def verdicts_of(
+    paths: list[str], options: Options, jobs: int | None, record: Path | None = None
 ) -> Iterator[Verdict]:
     """Yield the verdicts in the order of the files, whatever the number of processes."""
     from smachpy.reproduce.report import Verdict

@@ -1,0 +1,218 @@
+"""Evidence: what was tried with a mission before it may drive a robot.
+
+`smachpy certify` writes it, one JSON file. `smachpy run` and `smachpy runner` with
+`--require-evidence` run only missions whose hash is that of a good one. The file is not signed:
+whoever may write it may say what he likes, as with the code.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import platform
+import sys
+import sysconfig
+from importlib.machinery import PathFinder
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, TypedDict
+
+from actionlib_core.inputs.checked_data import checked
+from actionlib_core.inputs.checked_file import read_limited
+from actionlib_core.inputs.json_text import load_json
+from smachpy.command.targets import DATA, TargetError, names_file
+from smachpy.exceptions import SmachError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from smachpy.command.targets import Target
+
+FORMAT: Final = "smachpy-evidence"
+VERSION: Final = 1
+LARGEST: Final = 20_000_000
+"""Largest file that is read [bytes]."""
+
+MAX_FILES: Final = 2_000
+"""Number of files of a mission that are looked at."""
+
+LIBRARY: Final = ("actionlib_core", "smachpy")
+
+
+class EvidenceError(SmachError):
+    """There is no evidence for a mission, or it cannot be read or written.
+
+    Try: `smachpy certify MISSION -o evidence.json`, and `--require-evidence evidence.json`.
+    """
+
+
+class _Hashed(TypedDict):
+    hash: str
+
+
+class _Evidence(TypedDict):
+    format: Literal["smachpy-evidence"]
+    version: Literal[1]
+    ok: bool
+    mission: _Hashed
+    library: _Hashed
+
+
+def mission_facts(target: Target, text: str) -> dict[str, Any]:
+    """Return what identifies a mission: its `name` in a file, its `files` with their hashes.
+
+    `hash` is that of all this. The files are the module in which it is, and those which that
+    imports, however deep: not modules of Python, of this library and of other installed packages.
+    Of a mission file or a plan it is the file, with all such files and modules below its folder.
+
+    Args:
+        target: The mission.
+        text: As the user named it.
+
+    Raises:
+        TargetError: its module has no file.
+    """
+    place = text.partition(":")[0]
+    if place.endswith(DATA):
+        folder = Path(place).resolve().parent
+        found = [path for path in sorted(folder.rglob("*")) if path.suffix in {*DATA, ".py"}]
+        files = {str(path.relative_to(folder)): path for path in found[:MAX_FILES]}
+    else:
+        module = sys.modules.get(target.source.partition(":")[0])
+        file = getattr(module, "__file__", None)
+        if file is None:
+            raise TargetError(text, "its module has no file; expected one that can be hashed.")
+        files = _imported(target.source.partition(":")[0], Path(file).resolve(), names_file(place))
+    hashes = {name: _hash(path) for name, path in sorted(files.items())}
+    name = Path(place).name if place.endswith(DATA) else target.source.partition(":")[2]
+    return {"target": text, "name": name, "hash": _whole({**hashes, ":": name}), "files": hashes}
+
+
+def library_facts() -> dict[str, Any]:
+    """Return what identifies this library: its `version`, the `hash` of its files, and `python`."""
+    hashes = {}
+    for name in LIBRARY:
+        folder = Path(str(sys.modules[name].__file__)).parent
+        for path in sorted(folder.rglob("*.py")):
+            hashes[f"{name}/{path.relative_to(folder).as_posix()}"] = _hash(path)
+    return {
+        "version": version("smachpy"),
+        "hash": _whole(hashes),
+        "python": platform.python_version(),
+    }
+
+
+def check_evidence(places: Sequence[str], target: Target, text: str) -> None:
+    """Refuse a mission without good evidence.
+
+    Args:
+        places: Files of `smachpy certify`, and folders with them.
+        target: The mission, just loaded.
+        text: As the user named it.
+
+    Raises:
+        EvidenceError: there is none for these files and this library; or one cannot be read.
+    """
+    mission, library = mission_facts(target, text)["hash"], library_facts()["hash"]
+    near = "none of this mission"
+    for path in _files(places):
+        found = read_evidence(path)
+        if found["mission"]["hash"] != mission:
+            continue
+        if found["library"]["hash"] != library:
+            near = f"{path}, of another version of smachpy"
+        elif not found["ok"]:
+            near = f"{path}, which has found problems"
+        else:
+            return
+    raise EvidenceError(
+        f"mission {target.name!r}, hash {mission}: evidence: got {near}; expected one that is "
+        f"good. Try 'smachpy certify {text} -o FILE'."
+    )
+
+
+def read_evidence(path: Path) -> dict[str, Any]:
+    """Return the content of a file.
+
+    Raises:
+        EvidenceError: it has none.
+    """
+    try:
+        data = load_json(read_limited(path, LARGEST).decode("utf-8"), longest=LARGEST)
+        found: dict[str, Any] = checked(_Evidence, data, known_only=True)
+    except (OSError, ValueError) as error:
+        why = (error.strerror if isinstance(error, OSError) else None) or error
+        raise EvidenceError(
+            f"evidence {str(path)!r}: {why}; expected a file of 'smachpy certify'."
+        ) from error
+    return found
+
+
+def _files(places: Sequence[str]) -> Iterator[Path]:
+    for place in map(Path, places):
+        if place.is_dir():
+            yield from sorted(place.glob("*.json"))
+        else:
+            yield place
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _whole(hashes: dict[str, str]) -> str:
+    return hashlib.sha256(json.dumps(sorted(hashes.items())).encode()).hexdigest()[:16]
+
+
+# -- the modules of a program ----------------------------------------------------------------------
+
+
+def _imported(name: str, file: Path, is_file: bool) -> dict[str, Path]:
+    """Return the program's modules that a module imports, and itself: name -> file."""
+    apart = [Path(p).resolve() for p in {*sysconfig.get_paths().values(), sys.base_prefix}]
+    top = name.partition(".")[0]
+    path = [str(file.parent), *sys.path] if is_file else sys.path
+    found = {file.stem if is_file else name: file}
+    waiting = [(name, file)]
+    while waiting and len(found) < MAX_FILES:
+        for word in _names_in(*waiting.pop()):
+            for one, where in _found(word, path):
+                first = one.partition(".")[0]
+                is_apart = any(where.is_relative_to(place) for place in apart)
+                is_own = first == top or (first not in {*LIBRARY, "smachpy_viz"} and not is_apart)
+                if one not in found and is_own and where.suffix == ".py":
+                    found[one] = where
+                    waiting.append((one, where))
+    return found
+
+
+def _names_in(module: str, file: Path) -> Iterator[str]:
+    """Yield the names that the import statements of a file may mean, anywhere in it."""
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) + 1 - node.level]
+            base = ".".join(
+                [*(above if node.level else []), *([node.module] if node.module else [])]
+            )
+            yield from (f"{base}.{alias.name}".strip(".") for alias in node.names)
+
+
+def _found(name: str, path: Sequence[str]) -> Iterator[tuple[str, Path]]:
+    """Yield the files of a module and of the packages in which it is; nothing is imported."""
+    so_far: list[str] = []
+    where: Any = path
+    for part in name.split("."):
+        so_far.append(part)
+        whole = ".".join(so_far)
+        spec = None if where is None else PathFinder.find_spec(whole, where)
+        origin = None if spec is None else spec.origin
+        if origin is None and where is path:  # of an editable installation
+            origin = getattr(sys.modules.get(whole), "__file__", None)
+        if origin is not None and Path(origin).is_file():
+            yield whole, Path(origin).resolve()
+        known = getattr(sys.modules.get(whole), "__path__", None)
+        where = known if spec is None else spec.submodule_search_locations

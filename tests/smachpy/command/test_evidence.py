@@ -1,0 +1,150 @@
+"""What was tried with a mission, and missions that are refused without it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from smachpy.command import main
+from smachpy.command.evidence import library_facts, mission_facts
+from smachpy.command.targets import load_target
+
+MISSION = """
+import evidence_helper
+from evidence_parts.first import part
+from smachpy import CBState, StateMachine
+
+
+def work(_userdata):
+    return evidence_helper.OUTCOME
+
+
+def mission(word: str = "x") -> StateMachine:
+    sm = StateMachine(["done", "preempted"], name="GOOD")
+    sm.add("WORK", CBState(work, outcomes=["done"]))
+    return sm
+
+
+def other():
+    return mission()
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("good.py").write_text(MISSION)
+    Path("evidence_helper.py").write_text('OUTCOME = "done"\n')
+    Path("unused.py").write_text("")
+    Path("evidence_parts").mkdir()
+    Path("evidence_parts/__init__.py").write_text("")
+    Path("evidence_parts/first.py").write_text("from .second import part\n")
+    Path("evidence_parts/second.py").write_text("def part():\n    import evidence_late\n")
+    Path("evidence_late.py").write_text("LIMIT = 3\n")
+    return tmp_path
+
+
+def hash_of(text):
+    return mission_facts(load_target(text), text)["hash"]
+
+
+def test_the_hash_is_of_all_that_the_mission_imports():
+    facts = mission_facts(load_target("good.py"), "good.py")
+    assert sorted(facts["files"]) == [
+        "evidence_helper",
+        "evidence_late",
+        "evidence_parts",
+        "evidence_parts.first",
+        "evidence_parts.second",
+        "good",
+    ]
+    assert hash_of("good.py") == facts["hash"] == hash_of(f"{Path.cwd()}/good.py:mission")
+    assert hash_of("good.py:other") != facts["hash"]
+    Path("unused.py").write_text("X = 1\n")
+    assert hash_of("good.py") == facts["hash"]
+    Path("evidence_late.py").write_text("LIMIT = 4\n")
+    assert hash_of("good.py") != facts["hash"]
+
+
+def test_a_shipped_mission_and_a_mission_file_have_a_hash_of_their_own_files():
+    shipped = mission_facts(load_target("countdown"), "countdown")
+    assert "smachpy_missions.course.countdown" in shipped["files"]
+    assert not any(name.startswith(("smachpy.", "actionlib_core")) for name in shipped["files"])
+    text = "name: M\nstates:\n  WAIT: {wait: 1.0}\n"
+    Path("files").mkdir()
+    for name in ("one", "two"):
+        Path(f"files/{name}.yaml").write_text(text)
+    one, two = hash_of("files/one.yaml"), hash_of("files/two.yaml")
+    assert one != two
+    Path("files/two.yaml").write_text(text.replace("1.0", "2.0"))
+    assert hash_of("files/one.yaml") != one  # it may use the other one
+
+
+def evidence(**facts):
+    mission = mission_facts(load_target("good.py"), "good.py")
+    made = {"format": "smachpy-evidence", "version": 1, "ok": True, "mission": mission}
+    return json.dumps({**made, "library": library_facts(), **facts})
+
+
+REFUSED = [
+    (lambda: evidence(ok=False), "e.json, which has found problems"),
+    (lambda: evidence(library={"hash": "x"}), "e.json, of another version of smachpy"),
+    (lambda: evidence(mission={"hash": "x"}), "none of this mission"),
+    (lambda: evidence(mission=5), "$.mission: got 5; expected an object"),
+    (lambda: evidence(ok="yes"), "$.ok: got 'yes'"),
+    (lambda: evidence(version=2), "$.version: got 2"),
+    (lambda: evidence()[:-9], "it is no JSON"),
+    (lambda: "", "it is no JSON"),
+    (lambda: None, "No such file"),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), REFUSED, ids=[said for _, said in REFUSED])
+def test_a_mission_without_good_evidence_is_refused(text, said, capsys):
+    if (content := text()) is not None:
+        Path("e.json").write_text(content)
+    assert main(["run", "good.py", "--plain", "--require-evidence", "e.json"]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_a_mission_with_evidence_runs_until_it_is_changed(folder, capsys):
+    Path("all").mkdir()
+    Path("all/e.json").write_text(evidence())
+    run = ["run", "good.py", "--plain", "--require-evidence", "all"]
+    assert main(run) == 0
+    Path("evidence_parts/second.py").write_text("def part():\n    return 7\n")
+    assert main(run) == 2
+    assert (
+        "evidence: got none of this mission; expected one that is good." in capsys.readouterr().err
+    )
+
+
+@pytest.mark.slow
+def test_what_is_certified_is_run_by_runners_and_nothing_else(folder, capfd):
+    certify = ["certify", "good.py", "--runs", "3", "--input", "word=y", "--jobs", "1"]
+    properties = ["--property", "always_reaches(done)", "--property", "never(WORK)"]
+    assert main(["run", "good.py", "--plain", "--record", "runs.jsonl"]) == 0
+    recordings = ["--recordings", "runs.jsonl"]
+    assert main([*certify, *properties, "-o", "bad.json"]) == 1
+    assert main([*certify, *properties[:2], *recordings, "--faults", "raise", "-o", "e.json"]) == 1
+    assert main([*certify, *properties[:2], *recordings, "-o", "good.json"]) == 0
+    bad, good = (json.loads(Path(name).read_text()) for name in ("bad.json", "good.json"))
+    assert (bad["ok"], bad["check"]["ok"], good["ok"]) == (False, False, True)
+    assert good["check"]["properties"] == ["always_reaches(done)"]
+    assert good["explore"]["exhaustive"]
+    assert good["explore"]["doubles"] == ["/GOOD/WORK"]
+    assert good["explore"]["coverage"]["states"] == [2, 2]
+    assert good["simulate"]["outcomes"] == {"done": 3}
+    assert [one["result"] for one in good["reproduce"]["recordings"]] == ["same"]
+    assert good["inputs"] == {"word": "y"}
+    assert main([*certify, "-o", "good.json"]) == 2  # it is there
+    assert main(["submit", "good.py", "--db", "j.db", "--mission", "one"]) == 0
+    runner = ["runner", "--db", "j.db", "--allow", ".", "--until-empty", "--require-evidence"]
+    assert main([*runner, "bad.json"]) == 2
+    assert "bad.json, which has found problems" in capfd.readouterr().err
+    assert main([*runner, "good.json"]) == 0
+    assert "mission one: ended: done" in capfd.readouterr().out
