@@ -47,7 +47,7 @@ def quantile(values, share):
 
 def measure(page, pid, seconds):
     page.evaluate("""() => {
-        smachpy.page.latencies.length = 0; window.frames_ = 0; window.go_ = true;
+        smachpy.page.scheduler.latency.measured.length = 0; window.frames_ = 0; window.go_ = true;
         const frame = () => { window.frames_ += 1; if (window.go_) requestAnimationFrame(frame); };
         requestAnimationFrame(frame);
         window.from_ = smachpy.store.data.run.events.length;
@@ -57,7 +57,7 @@ def measure(page, pid, seconds):
     took = time.perf_counter() - begun
     frames, latencies, events, left = page.evaluate("""() => { window.go_ = false;
         const fresh = smachpy.store.data.run.events.slice(window.from_);
-        return [window.frames_, smachpy.page.latencies, fresh.length,
+        return [window.frames_, smachpy.page.scheduler.latency.measured, fresh.length,
             fresh.filter((e) => e.kind === "Left").length]; }""")
     cpu = (processor_time(pid) - cpu) / took
     print(
@@ -99,8 +99,8 @@ def main():
             page.wait_for_selector("html[data-drawn]", timeout=60_000)
             first = time.perf_counter() - begun
             page.evaluate(
-                f"async () => {{ smachpy.page.setDepth({args.depth});"
-                " await smachpy.page.drawing; }"
+                f"async () => {{ smachpy.page.layouts.setDepth({args.depth});"
+                " await smachpy.page.layouts.running; }"
             )
             page.wait_for_timeout(1000)
             shown = page.evaluate("() => document.querySelectorAll('.diagram *').length")
@@ -109,7 +109,7 @@ def main():
                 file=sys.stderr,
             )
             figures = {"first picture s": first, **measure(page, view.pid, args.seconds)}
-            page.evaluate("() => smachpy.page.setFollow(true)")
+            page.evaluate("() => smachpy.page.layouts.setFollow(true)")
             page.wait_for_timeout(1000)
             print("following:", file=sys.stderr)
             measure(page, view.pid, args.seconds)

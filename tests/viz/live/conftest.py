@@ -293,8 +293,8 @@ def shared(first_page):
     def reset():
         first_page.keyboard.press("Escape")
         first_page.evaluate(
-            """async () => { const { page, store } = smachpy; page.setFollow(false); page.timeline.live();
-            page.select(null); store.view.query.value = ""; page.setDepth(9); await page.drawing; }"""
+            """async () => { const { page, store } = smachpy; page.layouts.setFollow(false); page.timeline.live();
+            page.select(null); store.view.query.value = ""; page.layouts.setDepth(9); await page.layouts.running; }"""
         )
         return first_page
 

@@ -60,10 +60,10 @@ def test_collapse_expand_and_depth_without_moving_the_rest(delivery, shared):
     page = shared()
     before = page.evaluate("() => ({...smachpy.page.view, svg: 0, world: 0}).k")
     page.dblclick(group("/DELIVER/PICK") + " > text.title", force=True)
-    page.evaluate("() => smachpy.page.drawing")
+    page.evaluate("() => smachpy.page.layouts.running")
     wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
     assert page.evaluate("() => smachpy.page.view.k") == before
-    page.evaluate("() => smachpy.page.setDepth(9)")
+    page.evaluate("() => smachpy.page.layouts.setDepth(9)")
     wait_for(page, "document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
     page.keyboard.press("1")
     wait_for(page, "!document.querySelector('g[data-path=\"/DELIVER/PICK/GRASP\"]')")
@@ -563,7 +563,7 @@ def test_at_first_no_more_is_open_than_can_be_read_and_a_new_size_shows_all_agai
     start.robot("--name", "wide", "--rate", 2, "--states", 60)
     view = start.view()
     page = look(view.base + "?machine=wide")
-    wait_for(page, "smachpy.page.drawing === null")
+    wait_for(page, "smachpy.page.layouts.running === null")
     assert page.evaluate("() => smachpy.page.view.k") >= 0.55
     assert page.evaluate("() => smachpy.store.view.opened.value.size") < 5
     whole = """() => { const { view, diagram } = smachpy.page, s = diagram.size;

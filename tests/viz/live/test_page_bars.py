@@ -24,7 +24,7 @@ WATCH = """() => {
         if (this.canvas === canvas) strokes.push(this.strokeStyle);
         return stroke.apply(this, what);
     };
-    smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw();
+    smachpy.page.timeline.window.fitAll(); smachpy.page.timeline.draw();
     Object.assign(proto, { fillText: fill, stroke });
     return { said, strokes };
 }"""
@@ -74,7 +74,7 @@ def test_a_failure_among_thousands_of_visits_is_drawn_last_and_wide_enough(serve
     success = [i for i, one in enumerate(strokes) if one != colour and i > 30]
     assert strokes.index(colour) >= max(success) - 2
     (wide,) = page.evaluate(
-        "() => smachpy.page.timeline.hits.filter((h) => h.span.outcome === 'aborted').map((h) => h.right - h.left)"
+        "() => smachpy.page.timeline.bars.hits.filter((h) => h.span.outcome === 'aborted').map((h) => h.right - h.left)"
     )
     assert wide >= 3
 

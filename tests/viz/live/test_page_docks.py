@@ -55,8 +55,8 @@ def test_a_panel_is_dragged_to_another_side_and_stays_there(page):
     page.wait_for_function(f"() => ({WORD})().join() === 'map,details,time tree'")
     page.wait_for_selector(".dock.bottom [role=treeitem]")
     assert page.evaluate("() => smachpy.page.map.canvas.clientWidth") > 100  # it draws there
-    address = page.evaluate("() => smachpy.page.address()")
-    page.wait_for_function("() => location.hash === new URL(smachpy.page.address()).hash")
+    address = page.evaluate("() => smachpy.page.address.text")
+    page.wait_for_function("() => location.hash === new URL(smachpy.page.address.text).hash")
     page.reload()
     page.wait_for_function(f"() => ({WORD})().join() === 'map,details,time tree'")
     page.evaluate("() => localStorage.clear()")

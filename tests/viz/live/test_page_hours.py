@@ -48,7 +48,7 @@ def drag(page, begin, end):
 
 def test_the_window_is_moved_and_stretched(page):
     page.evaluate(
-        "() => { const t = smachpy.store.playback.began(); smachpy.page.timeline.showRange({ from: t + 600e3, to: t + 1200e3 }); }"
+        "() => { const t = smachpy.store.playback.began(); smachpy.page.timeline.window.show({ from: t + 600e3, to: t + 1200e3 }); }"
     )
     wait_for(page, f"{RANGE}[0] === 600")
     drag(page, 900, 1500)
@@ -66,9 +66,9 @@ def test_the_window_is_moved_and_stretched(page):
 
 def test_lanes_are_found_by_name(page):
     page.fill(".lane-filter", "nothing")
-    wait_for(page, "smachpy.page.timeline.hits.length === 0")
+    wait_for(page, "smachpy.page.timeline.bars.hits.length === 0")
     page.fill(".lane-filter", "b")
-    wait_for(page, "smachpy.page.timeline.hits.length > 0")
+    wait_for(page, "smachpy.page.timeline.bars.hits.length > 0")
 
 
 def test_one_clock_for_all_instants(page):

@@ -36,10 +36,12 @@ def regions(count):
 
 
 def all_levels(page):
-    page.evaluate("() => { smachpy.page.setDepth(99); return smachpy.page.drawing; }")
+    page.evaluate(
+        "() => { smachpy.page.layouts.setDepth(99); return smachpy.page.layouts.running; }"
+    )
     return page.evaluate(
-        """() => { const { page } = smachpy; return { size: page.diagram.size, k: page.view.k, ms: page.layoutMs,
-        stage: page.view.width / page.view.height, boxes: Object.fromEntries(page.diagram.boxes) }; }"""
+        """() => { const { page } = smachpy; return { size: page.diagram.size, k: page.view.k, ms: page.layouts.ms,
+        stage: page.view.width / page.view.height, boxes: Object.fromEntries(page.diagram.picture.boxes) }; }"""
     )
 
 
@@ -91,7 +93,7 @@ def recovery():
 
 
 ROOTS = """() => {
-    const { view, layout } = smachpy.page;
+    const { view, layouts: { layout } } = smachpy.page;
     const roots = [...layout.cache.values()].filter((one) => one.node.parent === null);
     const arrows = roots.flatMap((root) => root.edges.map((edge) => edge.points));
     const isStraight = (points) => points.every((p, i) =>
@@ -168,8 +170,8 @@ def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(ser
     again = all_levels(page)
     assert again["boxes"] == shown["boxes"]
     page.dblclick(f'g[data-path="{path}"] .frame', force=True)  # its diagram, there
-    wait_for(page, "!smachpy.store.view.overview.value && !smachpy.page.drawing")
-    assert page.evaluate(f"() => smachpy.page.diagram.boxes.has('{path}')")
+    wait_for(page, "!smachpy.store.view.overview.value && !smachpy.page.layouts.running")
+    assert page.evaluate(f"() => smachpy.page.diagram.picture.boxes.has('{path}')")
     assert page.locator("path.edge").count() > 5
     page.keyboard.press("9")  # and back
     wait_for(page, "smachpy.store.view.overview.value")
@@ -206,7 +208,7 @@ def test_each_branch_of_a_concurrence_has_its_bar_however_many_they_are(served, 
     served.add("fleet", sm=fleet, events=events)
     page = look(served.start())  # an error in the page fails the test
     bars = page.evaluate(
-        "() => smachpy.page.timeline.hits.filter((one) => one.span.path !== '/FLEET')"
+        "() => smachpy.page.timeline.bars.hits.filter((one) => one.span.path !== '/FLEET')"
     )
     assert {bar["span"]["path"] for bar in bars} == set(paths)
     tops = [bar["top"] for bar in sorted(bars, key=lambda bar: paths.index(bar["span"]["path"]))]
@@ -229,7 +231,7 @@ def test_follow_frames_all_that_runs_and_never_below_nine_pixels(served, look):
     page = look(served.start(follow=True))
     wait_for(
         page,
-        "smachpy.store.view.follow.value && !smachpy.page.drawing && smachpy.page.view.k > 0.8",
+        "smachpy.store.view.follow.value && !smachpy.page.layouts.running && smachpy.page.view.k > 0.8",
     )
     # Each running state, or what it is folded into, is in view and legible.
     wait_for(
@@ -246,16 +248,16 @@ def test_a_shape_at_which_the_layouter_fails_is_left_out(served, look):
     served.add("one", labels="ABCD", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
     page = look(served.start())
     drawn = page.evaluate(
-        """async () => { const { page } = smachpy, { elk } = page.layout, real = elk.layout.bind(elk), seen = [];
+        """async () => { const { page } = smachpy, { elk } = page.layouts.layout, real = elk.layout.bind(elk), seen = [];
           elk.layout = async (graph) => {
             const all = graph.children.map((one) => one.layoutOptions["elk.direction"]);
             seen.push(...all);
             if (all.includes("DOWN")) throw new Error("Index: -1, Size: 0");
             return real(graph);
           };
-          page.layout.clear();
-          await page.relayout({ frame: true });
-          return [seen.includes("DOWN"), [...page.layout.chosen.values()][0], smachpy.store.data.failure.value,
+          page.layouts.layout.clear();
+          await page.layouts.relayout({ frame: true });
+          return [seen.includes("DOWN"), [...page.layouts.layout.chosen.values()][0], smachpy.store.data.failure.value,
             document.querySelectorAll('g.leaf').length]; }"""
     )
     assert drawn[0]
@@ -268,8 +270,8 @@ def test_what_is_drawn_stays_when_nothing_can_be_laid_out(served, look):
     page = look(served.start())
     page.evaluate(
         """async () => { const { page } = smachpy;
-          page.layout.elk.layout = async () => { throw new Error("Index: -1, Size: 0"); };
-          page.layout.clear(); await page.relayout({ frame: true }); }"""
+          page.layouts.layout.elk.layout = async () => { throw new Error("Index: -1, Size: 0"); };
+          page.layouts.layout.clear(); await page.layouts.relayout({ frame: true }); }"""
     )
     assert page.locator("g.leaf").count() == 4
     page.wait_for_selector(".notice.error:has-text('could not be laid out')")
@@ -279,18 +281,18 @@ def test_while_the_page_opens_the_layout_follows_the_shape_that_is_left(served, 
     served.add("one", labels="ABCD", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
     page = look(served.start())
     page.set_viewport_size({"width": 1000, "height": 900})
-    wait_for_shape = """() => { const { layout, view, drawing } = smachpy.page;
-      return !drawing && layout.suits(view.width / view.height); }"""
+    wait_for_shape = """() => { const { view, layouts: { layout, running } } = smachpy.page;
+      return !running && layout.suits(view.width / view.height); }"""
     page.wait_for_function(wait_for_shape)
     page.set_viewport_size({"width": 1400, "height": 560})
     page.wait_for_function(wait_for_shape)
-    page.evaluate("() => { smachpy.page.openedAt = -1e6; }")  # long ago: it stays as it is
-    aspect = page.evaluate("() => smachpy.page.layout.aspect")
+    page.evaluate("() => { smachpy.page.layouts.openedAt = -1e6; }")  # long ago: it stays as it is
+    aspect = page.evaluate("() => smachpy.page.layouts.layout.aspect")
     page.set_viewport_size({"width": 800, "height": 900})
     page.wait_for_function(
-        "() => { const { view, fitted } = smachpy.page; return view.height > 500 && view.is(fitted); }"
+        "() => { const { view, layouts: { fitted } } = smachpy.page; return view.height > 500 && view.is(fitted); }"
     )
-    assert page.evaluate("() => smachpy.page.layout.aspect") == aspect
+    assert page.evaluate("() => smachpy.page.layouts.layout.aspect") == aspect
 
 
 def test_long_outcomes_are_cut_with_the_whole_in_a_tip(served, look):

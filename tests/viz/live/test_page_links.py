@@ -42,14 +42,16 @@ def pin(page, text):
 
 def test_a_link_shows_another_browser_the_same(address, look):
     page = look(f"{address}#token=t")
-    page.evaluate("async () => { smachpy.page.setDepth(9); await smachpy.page.drawing; }")
+    page.evaluate(
+        "async () => { smachpy.page.layouts.setDepth(9); await smachpy.page.layouts.running; }"
+    )
     page.evaluate(
         "() => { const { data, playback } = smachpy.store; playback.seek(data.run.first() + 5000); }"
     )
     page.evaluate("() => smachpy.page.select('/JOB/IN/GO')")
     pin(page, "<b>here</b> it hesitates")
     wait_for(page, "location.hash.includes('note=')")
-    link = page.evaluate("() => smachpy.page.address()")
+    link = page.evaluate("() => smachpy.page.address.text")
     assert page.url.split("#")[1] == link.split("#")[1]
     assert "token" not in link
     assert parse_qs(urlsplit(link).query) == {"machine": ["one"]}

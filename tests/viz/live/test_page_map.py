@@ -117,7 +117,7 @@ def test_hovering_is_linked_both_ways(office, look):
     assert "00:05.0 \u2013 00:09.0, 4.0 s" in page.text_content(".map-view .tip")
     page.wait_for_selector("g[data-path='/JOB/B'].linked")
     bar = """() => { const t = smachpy.page.timeline, b = t.canvas.getBoundingClientRect(),
-      h = t.hits.find((one) => one.span.path === '/JOB/A'); return [b.left + h.left + 5,
+      h = t.bars.hits.find((one) => one.span.path === '/JOB/A'); return [b.left + h.left + 5,
         b.top + (h.top + h.bottom) / 2]; }"""
     page.mouse.move(*page.evaluate(bar))
     page.wait_for_selector("g[data-path='/JOB/A'].linked")

@@ -52,7 +52,7 @@ def test_a_run_that_has_ended_is_shown_whole_and_commands_nothing(served, look):
     page = look(f"{served.start(token='t')}#token=t")
     wait_for(page, "smachpy.store.data.run.now.ended")
     assert page.query_selector("#pause") is None
-    assert page.evaluate("() => smachpy.page.timeline.length") > 300_000
+    assert page.evaluate("() => smachpy.page.timeline.window.length") > 300_000
     machine.add(served.events(BEGUN, after=5))
     page.wait_for_selector("#pause")
 
@@ -71,7 +71,7 @@ def test_the_instant_stays_on_the_lanes(served, look):
     page = look(served.start())
     seek(page, 1)
     page.evaluate(
-        "() => { const t = smachpy.page.timeline; t.end = smachpy.store.data.run.last(); t.length = 2000; t.draw(); }"
+        "() => { const t = smachpy.page.timeline; t.window.end = smachpy.store.data.run.last(); t.window.length = 2000; t.draw(); }"
     )
     # The line is drawn at the left end of the lanes, not over their names.
     column = """() => { const t = smachpy.page.timeline, c = t.canvas, r = devicePixelRatio;
@@ -354,7 +354,9 @@ def test_the_way_to_the_end_is_opened_and_drawn_thick(served, look):
     ]
     served.add("one", sm=sm, events=events)
     page = look(served.start())
-    page.evaluate("async () => { smachpy.page.setDepth(1); await smachpy.page.drawing; }")
+    page.evaluate(
+        "async () => { smachpy.page.layouts.setDepth(1); await smachpy.page.layouts.running; }"
+    )
     assert page.locator('g[data-path="/JOB/IN/GO"]').count() == 0
     page.click(".why-button")
     for path in ("/JOB/IN/GO", "/JOB/IN", "/JOB"):

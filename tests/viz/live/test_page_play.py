@@ -170,7 +170,7 @@ STRETCH = """() => { const { data, playback } = smachpy.store, stretch = playbac
 def test_a_drag_over_the_lanes_selects_what_is_looped(served, look):
     served.add("one", events=run())
     page = look(served.start())
-    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    page.evaluate("() => { smachpy.page.timeline.window.fitAll(); smachpy.page.timeline.draw(); }")
     freeze(page)
     drag(page, at(page, 12), at(page, 22))
     assert page.evaluate(STRETCH) == [12, 22]
@@ -200,7 +200,7 @@ def test_a_drag_over_the_lanes_selects_what_is_looped(served, look):
 def test_a_drag_on_the_axis_moves_the_instant(served, look):
     served.add("one", events=run())
     page = look(served.start())
-    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    page.evaluate("() => { smachpy.page.timeline.window.fitAll(); smachpy.page.timeline.draw(); }")
     axis = page.evaluate("() => smachpy.page.timeline.canvas.clientHeight - 8")
     drag(page, at(page, 12, axis), at(page, 22, axis))
     assert page.evaluate(SHOWN).startswith("00:22")
@@ -210,7 +210,7 @@ def test_a_drag_on_the_axis_moves_the_instant(served, look):
 def test_only_the_first_button_moves_the_instant_and_the_wheel_zooms_at_once(served, look):
     served.add("one", events=run())
     page = look(served.start())
-    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    page.evaluate("() => { smachpy.page.timeline.window.fitAll(); smachpy.page.timeline.draw(); }")
     axis = page.evaluate("() => smachpy.page.timeline.canvas.clientHeight - 8")
     page.mouse.click(*at(page, 12, axis), button="right")
     assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
@@ -227,7 +227,7 @@ def test_the_axis_tells_instants_as_the_clock_does(served, look):
     texts = """() => { const { timeline } = smachpy.page, { prototype } = CanvasRenderingContext2D,
       texts = [], before = prototype.fillText;
       prototype.fillText = function (text, ...place) { texts.push(text); before.call(this, text, ...place); };
-      for (const end of [50, 1]) { timeline.length = 1000 * end; timeline.end = smachpy.store.data.run.first() + 1000 * end;
+      for (const end of [50, 1]) { timeline.window.length = 1000 * end; timeline.window.end = smachpy.store.data.run.first() + 1000 * end;
         timeline.draw(); }
       prototype.fillText = before; return texts.filter((text) => /[0-9]/.test(text)); }"""
     told = page.evaluate(texts)
@@ -245,7 +245,7 @@ def test_the_stretch_is_chosen_by_keys_by_the_selected_state_and_by_a_link(serve
     page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 2000)")
     page.keyboard.press("]")  # it would end before it begins
     assert page.evaluate(STRETCH) == [5, 15]
-    address = page.evaluate("() => smachpy.page.address()")
+    address = page.evaluate("() => smachpy.page.address.text")
     page.goto("about:blank")
     page.goto(address)
     page.wait_for_selector("html[data-drawn]")

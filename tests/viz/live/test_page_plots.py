@@ -82,7 +82,7 @@ def test_the_usual_plots_tell_the_values_of_the_instant_shown(page):
 
 
 def test_a_plot_draws_its_line_and_a_click_in_it_goes_to_the_instant(page):
-    page.evaluate("() => { smachpy.page.timeline.fitAll(); smachpy.page.timeline.draw(); }")
+    page.evaluate("() => { smachpy.page.timeline.window.fitAll(); smachpy.page.timeline.draw(); }")
     painted = page.evaluate(
         """() => { const [plot] = smachpy.page.plots; const { ctx, bbox } = plot.chart;
           const { data } = ctx.getImageData(bbox.left, bbox.top, bbox.width, bbox.height);
@@ -126,8 +126,8 @@ def test_any_number_is_plotted_and_the_choice_is_kept_and_linked(page):
     wait_for_values(page, ["4.5", "30"])
     assert values(page) == {"distance left": "2 m", "pose.x": "4.5", "place.x": "30"}
     chosen = [["progress,go,distance"], ["userdata,%2FJOB,pose,x", "feedback,go,place,x"]]
-    address = page.evaluate("() => smachpy.page.address()")
-    page.wait_for_function("() => location.hash === new URL(smachpy.page.address()).hash")
+    address = page.evaluate("() => smachpy.page.address.text")
+    page.wait_for_function("() => location.hash === new URL(smachpy.page.address.text).hash")
     page.reload()
     page.wait_for_selector(".plot")
     assert page.evaluate("() => smachpy.store.panels.plotsChosen.value") == chosen

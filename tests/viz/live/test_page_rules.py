@@ -137,7 +137,7 @@ def test_what_a_condition_finds_is_drawn_as_no_failure(served, look):
     served.add("one", sm=sm)
     page = look(served.start())
     kinds = page.evaluate(
-        "() => ['A', 'B'].map((name) => [...smachpy.page.diagram.arrows].filter(([key]) => /(false|no)$/.test(key)"
+        "() => ['A', 'B'].map((name) => [...smachpy.page.diagram.picture.arrows].filter(([key]) => /(false|no)$/.test(key)"
         " && key.startsWith(`/JOB/${name}`)).map(([, [{ line }]]) => line.getAttribute('class')))"
     )
     assert kinds == [["edge other"], ["edge failure"]]
@@ -147,10 +147,12 @@ def test_a_hidden_page_gathers_nothing_to_draw(served, look):
     machine = served.add("one", events=run()[:1])
     page = look(served.start())
     page.evaluate("() => Object.defineProperty(document, 'hidden', { value: true })")
-    page.evaluate("() => { smachpy.page.frame = 1; }")  # asked for, and never drawn
+    page.evaluate("() => { smachpy.page.scheduler.frame = 1; }")  # asked for, and never drawn
     machine.add(served.events([("Entered", "/JOB/A"), ("Left", "/JOB/A", {"outcome": "ok"})], 1))
     wait_for(page, "smachpy.store.data.run.events.length === 3")
-    assert page.evaluate("() => [smachpy.page.flashes.length, smachpy.page.arrived.length]") == [
+    assert page.evaluate(
+        "() => [smachpy.page.scheduler.flashes.length, smachpy.page.scheduler.latency.arrived.length]"
+    ) == [
         0,
         0,
     ]
@@ -539,7 +541,7 @@ def test_looking_back_stays_where_it_is_while_older_events_are_forgotten(served,
         "() => { smachpy.store.playback.seekEvent(-1); smachpy.store.playback.seekEvent(1); }"
     )
     assert page.evaluate("() => smachpy.store.playback.shown().states") == shown
-    wait_for(page, "smachpy.page.flashes.length === 0")
+    wait_for(page, "smachpy.page.scheduler.flashes.length === 0")
 
 
 def test_what_comes_just_before_one_looks_back_does_not_flash_later(served, look):
@@ -548,12 +550,12 @@ def test_what_comes_just_before_one_looks_back_does_not_flash_later(served, look
     page.evaluate(
         """() => { const { page, store } = smachpy;
           const newest = store.data.run.events.at(-1);
-          page.takeEvents([{ ...newest, kind: "Left", outcome: "ok", seq: newest.seq + 1 }]);
-          window.waiting = page.flashes.length;
+          page.scheduler.takeEvents([{ ...newest, kind: "Left", outcome: "ok", seq: newest.seq + 1 }]);
+          window.waiting = page.scheduler.flashes.length;
           store.playback.seekTo(1); }"""  # before the next frame
     )
     assert page.evaluate("() => window.waiting") == 1
-    wait_for(page, "smachpy.page.flashes.length === 0")
+    wait_for(page, "smachpy.page.scheduler.flashes.length === 0")
 
 
 class Network:

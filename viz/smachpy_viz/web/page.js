@@ -4178,75 +4178,79 @@ function pins() {
   return at === null ? store.notes.all.value : [...store.notes.all.value, { at, text: "≠ differs from today" }];
 }
 
-// src/core/statistics.ts
-var MODES = [
-  ["none", "No numbers"],
-  ["counts", "Counts of this run"],
-  ["time", "Time in this run"],
-  ["runs", "Recorded runs"],
-  ["failures", "Failures in recorded runs"],
-  ["compare", "This run against recorded runs"]
-];
-var OF_RECORDED_RUNS = ["runs", "failures", "compare"];
-var total = (outcomes) => Object.values(outcomes ?? {}).reduce((a5, b3) => a5 + b3, 0);
-function numbersFor(mode, run, statistics, model) {
-  const recorded = statistics?.states ?? {};
-  const counts = (states2) => (path, outcome) => {
-    const outcomes = own(states2, path)?.outcomes;
-    const count = own(outcomes, outcome);
-    return count ? { count, share: count / total(outcomes) } : null;
-  };
-  switch (mode) {
-    case "counts":
-      return { countOf: counts(run), heatOf: null };
-    case "time": {
-      const most = mostSeconds(run, model);
-      return { countOf: counts(run), heatOf: (path) => Math.min(1, (own(run, path)?.seconds ?? 0) / most) };
-    }
-    case "runs":
-      return { countOf: counts(recorded), heatOf: null };
-    case "failures":
-      return { countOf: counts(recorded), heatOf: (path) => own(recorded, path)?.failures ?? 0 };
-    case "compare":
-      return { countOf: counts(run), heatOf: (path) => slower(own(run, path), own(recorded, path)) };
-    default:
-      return { countOf: null, heatOf: null };
+// src/drawing/address.ts
+var WRITE_MS = 300;
+var Address = class {
+  #linked = viewOf(location.hash);
+  // the view in the address, until it is shown
+  #due;
+  constructor() {
+    const { view: view2, playback, panels: panels2, notes } = store;
+    const chosen2 = [view2.selected, view2.opened, notes.all, playback.stretch, panels2.arrangement, panels2.plotsChosen];
+    for (const one of [...chosen2, playback.instant]) one.subscribe(() => this.#write());
   }
-}
-function mostSeconds(run, model) {
-  const leaves = Object.entries(run).filter(([path]) => !model?.get(path)?.children.length);
-  return Math.max(1e-3, ...leaves.map(([, state]) => state.seconds));
-}
-function heatScale(mode, run, model) {
-  switch (mode) {
-    case "time":
-      return ["0 s", duration(mostSeconds(run, model))];
-    case "failures":
-      return ["none failed", "all failed"];
-    case "compare":
-      return ["as usual", "twice as long"];
-    default:
-      return null;
+  /** Take the view of the address again. */
+  read() {
+    this.#linked = viewOf(location.hash);
   }
-}
-function slower(state, recorded) {
-  if (!state || !recorded?.median) return 0;
-  const ended = total(state.outcomes);
-  return ended ? Math.min(1, Math.max(0, state.seconds / ended / recorded.median - 1)) : 0;
-}
-function coverage(model, run) {
-  let taken = 0;
-  let all = 0;
-  for (const node of model?.order ?? [])
-    for (const edge of node.edges) {
-      if (edge.implicit) continue;
-      for (const outcome of edge.outcomes) {
-        all += 1;
-        if (own(own(run, `${node.path}/${edge.source}`)?.outcomes, outcome)) taken += 1;
-      }
-    }
-  return { taken, all };
-}
+  /** The address of the view. */
+  get text() {
+    const address = new URL(location.href);
+    const name = store.data.facts.value?.name;
+    if (name && !isFile()) address.searchParams.set("machine", name);
+    address.hash = this.#fragment();
+    return String(address);
+  }
+  #fragment() {
+    const { view: view2, playback, panels: panels2, notes } = store;
+    const stretch = playback.stretch.value;
+    return fragmentOf({
+      at: playback.cursor.value,
+      selected: view2.selected.value,
+      opened: [...view2.opened.value],
+      notes: notes.all.value,
+      stretch: stretch && [stretch.from, stretch.to],
+      panels: panels2.arrangement.value,
+      plots: panels2.plotsChosen.value
+    });
+  }
+  #write() {
+    clearTimeout(this.#due);
+    this.#due = setTimeout(() => {
+      if (store.data.model.value && !this.#linked && store.view.pageShown.value === "machine")
+        history.replaceState(null, "", `#${this.#fragment()}`);
+    }, WRITE_MS);
+  }
+  /**
+   * Show the view of the address, as far as it exists.
+   * @param onInstant called before another instant than now is shown
+   */
+  show(onInstant) {
+    const model = store.data.model.value;
+    const linked2 = this.#linked;
+    this.#linked = null;
+    if (!linked2 || !model) return;
+    const { view: view2, playback, panels: panels2, notes } = store;
+    const known2 = linked2.opened?.filter((path) => model.get(path)?.children.length);
+    if (known2?.length) view2.keepOpened(new Set(known2));
+    if (linked2.notes.length) notes.add(linked2.notes);
+    if (linked2.panels) panels2.arrangement.value = linked2.panels;
+    if (linked2.stretch) playback.selectStretch(...linked2.stretch);
+    if (linked2.plots) panels2.plotsChosen.value = linked2.plots;
+    const { run } = store.data;
+    const first = run.first();
+    const isKept = first !== null && linked2.at !== null && linked2.at >= first && linked2.at <= (run.last() ?? first) + 1;
+    if (isKept) {
+      onInstant();
+      playback.seek(linked2.at);
+    } else if (linked2.at !== null) view2.notify("The instant of this link is not in this run", "error");
+    if (linked2.selected === null) return;
+    if (model.get(linked2.selected)) {
+      view2.selected.value = linked2.selected;
+      view2.reveal(linked2.selected);
+    } else view2.notify("The state of this link is not in this machine", "error");
+  }
+};
 
 // src/drawing/measure.ts
 var context = null;
@@ -4261,6 +4265,29 @@ function measure(text2, size = 11, bold = false) {
   widths.set(key, width);
   return width;
 }
+function fitting(text2, width) {
+  let short = text2;
+  while (short.length > 1 && measure(short, 10) > width) short = `${short.slice(0, -2)}…`;
+  return short;
+}
+
+// src/drawing/placed.ts
+var SEP = "";
+var LEAF_H = 26;
+var DIRECTIONS = ["DOWN", "RIGHT"];
+var pillWidth = (outcome) => measure(shorten(outcome), 9, true) + 15;
+function leafWidth(node) {
+  const closed = node.children.length ? 20 + measure(String(node.total - 1), 9) : 0;
+  return Math.max(56, 44 + measure(node.shown, 11, true) + closed);
+}
+function boxesOf(layout, x3 = 0, y5 = 0, found = /* @__PURE__ */ new Map()) {
+  found.set(layout.node.path, { x: x3, y: y5, w: layout.w, h: layout.h });
+  for (const { node, inner, ...box } of layout.boxes)
+    if (inner) boxesOf(inner, x3 + box.x, y5 + box.y, found);
+    else found.set(node.path, { x: x3 + box.x, y: y5 + box.y, w: box.w, h: box.h });
+  return found;
+}
+var isOpen = (node, open) => node.children.length > 0 && open.has(node.path);
 
 // src/drawing/svg.ts
 var NS = "http://www.w3.org/2000/svg";
@@ -4338,20 +4365,9 @@ function arrowHeads() {
   return el("defs", {}, ...heads);
 }
 
-// src/drawing/diagram.ts
-var SEP = "";
-var FLASH_MS = 380;
-var FADE_MS = 5e3;
-var BRIEF_MS = 400;
-var MINIMAP_BELOW = 0.6;
-var CORNERS = ["bottom-right", "bottom-left", "top-right", "top-left"];
-var CLASSES = ["success", "failure", "preempted", "other"];
-var CARD_TEXT = 118;
+// src/drawing/picture.ts
 var TAGS = { concurrence: "concurrent", iterator: "repeats", sequence: "sequence" };
-var Diagram = class {
-  svg;
-  minimap;
-  world;
+var Picture = class {
   states = /* @__PURE__ */ new Map();
   arrows = /* @__PURE__ */ new Map();
   // by path of the state and outcome
@@ -4362,40 +4378,19 @@ var Diagram = class {
   // texts of the branches that are cards
   pills = /* @__PURE__ */ new Map();
   // by path of the container and outcome
-  minimapRects = /* @__PURE__ */ new Map();
-  minimapDue = /* @__PURE__ */ new Map();
-  // changes for the minimap: path -> whether the state is active
-  flashing = /* @__PURE__ */ new Map();
-  // end of the flash of each element [ms]
-  problems = /* @__PURE__ */ new Map();
-  model = null;
-  // the one that is drawn
   size = null;
-  window = null;
-  // the part in view, on the minimap
-  constructor(svg2, minimap2) {
-    this.svg = svg2;
-    this.minimap = minimap2;
-    this.world = el("g", { class: "world" });
-    svg2.replaceChildren(arrowHeads(), this.world);
-  }
-  draw(layout, model, problems) {
-    const { states: states2, arrows, joins, boxes, cards: cards2, pills, minimapRects, minimapDue } = this;
-    for (const map of [states2, arrows, joins, boxes, cards2, pills, minimapRects, minimapDue]) map.clear();
-    this.model = model;
-    this.problems = groupByPath(problems);
-    const isCompared = model.order.some((n3) => n3.change || n3.note || n3.edges.some((e4) => e4.change || e4.note));
-    this.svg.classList.toggle("compared", isCompared);
+  // null: nothing is drawn yet
+  #model = null;
+  #problems = /* @__PURE__ */ new Map();
+  /** Build the elements of a layout. */
+  build(layout, model, problems) {
+    this.#model = model;
+    this.#problems = groupByPath(problems);
     this.size = { x: 0, y: 0, w: layout.w + 16, h: layout.h + 16 };
-    const picture = document.createDocumentFragment();
-    this.#container(layout, 8, 8, picture);
-    this.world.replaceChildren(picture);
-    this.#drawMinimap(this.size);
+    const built = document.createDocumentFragment();
+    this.#container(layout, 8, 8, built);
+    return built;
   }
-  boxOf(path) {
-    return path === null ? void 0 : this.boxes.get(path);
-  }
-  // -- building ---------------------------------------------------------------------------------
   #container(layout, x3, y5, into) {
     const { node } = layout;
     const box = { x: x3, y: y5, w: layout.w, h: layout.h };
@@ -4456,7 +4451,7 @@ var Diagram = class {
       "aria-label": `${node.label}, ${kind}`
     });
     const details = node.details.map(([name, value]) => `${name}: ${value}`).join("\n");
-    const found = (this.problems.get(node.path) ?? []).map((one) => `⚠ ${one.text}`).join("\n");
+    const found = (this.#problems.get(node.path) ?? []).map((one) => `⚠ ${one.text}`).join("\n");
     const lines = [node.path, node.change, node.note, `${node.type_name} (${kind})`, node.doc, details, found];
     queueMicrotask(() => group.prepend(el("title", {}, lines.filter(Boolean).join("\n").slice(0, 2e3))));
     return group;
@@ -4512,10 +4507,6 @@ var Diagram = class {
     group.append(inside);
     this.cards.set(node.path, { element: inside, text: "" });
   }
-  /** Write into the cards what they say now. */
-  paintCards(textOf) {
-    for (const [path, card] of this.cards) write(card, fitting(textOf(path), CARD_TEXT));
-  }
   /**
    * Add the badges, which are empty at first, and keep the elements that change.
    * @param room for the name
@@ -4524,7 +4515,7 @@ var Diagram = class {
     const badge = el("text", { class: "badge", x: box.x + box.w - 5, y: box.y - 3, "text-anchor": "end" });
     const glyph = el("text", { class: "glyph", x: box.x + room - 8, y: box.y + 10, "text-anchor": "middle" });
     group.append(badge, glyph);
-    const found = this.problems.get(node.path);
+    const found = this.#problems.get(node.path);
     if (found) {
       group.classList.add("problem");
       const worst = found.some((one) => one.severity === "error") ? "failure" : "preempted";
@@ -4546,7 +4537,7 @@ var Diagram = class {
   }
   #edge(edge, x3, y5) {
     const points2 = edge.points.map((p5) => ({ x: p5.x + x3, y: p5.y + y5 }));
-    const kind = edge.kind === "link" ? commonClass(this.model?.get(edge.source), edge.outcomes) : edge.kind;
+    const kind = edge.kind === "link" ? commonClass(this.#model?.get(edge.source), edge.outcomes) : edge.kind;
     const implicit = edge.link?.implicit ? " implicit" : "";
     const change2 = edge.link?.change ? ` cmp-${edge.link.change}` : "";
     const line = el("path", {
@@ -4580,7 +4571,7 @@ var Diagram = class {
     for (const label of edge.labels) {
       const place2 = { x: x3 + label.x, y: y5 + label.y + 9.2, "text-anchor": "middle" };
       const name = signed(edge.link?.change, shorten(label.text));
-      const kind = endClass(this.model?.get(edge.source), label.text);
+      const kind = endClass(this.#model?.get(edge.source), label.text);
       into.append(el("text", { class: `label ${kind}`, ...place2 }, name));
     }
     if (!edge.link) return;
@@ -4598,48 +4589,110 @@ var Diagram = class {
     for (const arrow of this.arrows.get(edge.source + SEP + edge.outcomes[0]) ?? [])
       if (arrow.edge === edge) Object.assign(arrow, { count, note: text2 });
   }
-  #drawMinimap({ w: w5, h: h5 }) {
-    this.minimap.setAttribute("viewBox", `0 0 ${w5} ${h5}`);
-    for (const [path, box] of this.boxes) {
-      const isOpen2 = this.states.get(path)?.group.classList.contains("box");
-      const place = { x: box.x, y: box.y, width: box.w, height: box.h, rx: 6 };
-      this.minimapRects.set(path, el("rect", { class: isOpen2 ? "area" : "spot", ...place }));
-    }
-    this.window = el("rect", { class: "window" });
-    this.minimap.replaceChildren(...this.minimapRects.values(), this.window);
+};
+function outcomePill(node, pill, x3, y5) {
+  const byDefault = node.pills.find((one) => one.outcome === pill.outcome)?.by_default ? " default" : "";
+  const shown = pill.from ? `${shorten(pill.outcome)}, from ${pill.from}` : shorten(pill.outcome);
+  const place = { x: x3 + pill.x, y: y5 + pill.y, width: pill.w, height: pill.h, rx: pill.h / 2 };
+  const centre = { x: place.x + pill.w / 2, y: place.y + pill.h / 2 + 3.1, "text-anchor": "middle" };
+  return el(
+    "g",
+    { class: `pill ${outcomeClass(pill.outcome)}${byDefault}` },
+    el("rect", place),
+    el("text", centre, shown),
+    ...shown === pill.outcome ? [] : [el("title", {}, shorten(pill.outcome, 400))]
+  );
+}
+function groupByPath(problems) {
+  const found = /* @__PURE__ */ new Map();
+  for (const one of problems) found.set(one.path, [...found.get(one.path) ?? [], one]);
+  return found;
+}
+
+// src/drawing/state_texts.ts
+var BRIEF_MS = 400;
+function glyphOf(state, kind) {
+  if (state?.waits) return "⏸";
+  if (state?.since != null) return state.preempt ? state.serviced ? "✓" : "■" : "";
+  if (!kind) return "";
+  if (state?.error) return "⚠";
+  return { success: "✓", failure: "✕", preempted: "■", other: "" }[kind];
+}
+function statusOf(state, goal, noServer) {
+  if (state?.since == null) return state?.outcome ?? "not visited";
+  if (state.preempt) return `asked to stop${state.serviced ? ", cleaning up" : ""}`;
+  return noServer && goal ? `no server of ${goal.action} seen` : "running";
+}
+function elapsed(node, state, now) {
+  const since = (ns) => Math.max(0, now - (ms(ns) ?? now)) / 1e3;
+  const attempt = state.attempt ?? 1;
+  if (since(state.since) * 1e3 < BRIEF_MS && !state.preempt && attempt < 2) return "";
+  const parts = [];
+  if (isInCleanup(node)) parts.push("tidying up");
+  if (state.item != null) parts.push(`#${state.item + 1}`);
+  if (attempt > 1) parts.push(`attempt ${attempt}`);
+  if (!state.preempt) parts.push(duration(since(state.since)));
+  else if (state.serviced) parts.push(`cleans up ${duration(since(state.serviced))}`);
+  else {
+    const grace = state.asked?.grace;
+    parts.push(`asked to stop ${duration(since(state.preempt))}${grace != null ? ` of ${duration(grace)}` : ""}`);
   }
-  /** Show on the minimap which part is in view. */
-  showWindow(view2) {
-    if (!this.window || !this.size) return;
-    const { x: x3, y: y5, k: k4, width, height } = view2;
-    const place = { x: -x3 / k4, y: -y5 / k4, width: width / k4, height: height / k4 };
-    for (const [name, value] of Object.entries(place)) this.window.setAttribute(name, String(value));
-    const { w: w5, h: h5 } = this.size;
-    this.window.style.strokeWidth = `${Math.max(w5, h5) / 70}px`;
-    const seen2 = (from, size, room) => Math.max(0, Math.min(room, from + size * k4) - Math.max(0, from)) / (size * k4);
-    const isIdle = seen2(x3, w5, width) * seen2(y5, h5, height) > MINIMAP_BELOW;
-    this.minimap.classList.toggle("idle", isIdle);
-    if (!isIdle) this.minimap.setAttribute("data-corner", this.#freeCorner(view2));
+  return parts.join(" · ");
+}
+function tokensIn(plan, state) {
+  const counts = /* @__PURE__ */ new Map();
+  if (state?.marking) for (const place of state.marking) counts.set(place, (counts.get(place) ?? 0) + 1);
+  else for (const child of plan.children) counts.set(child.label, child.tokens ?? 0);
+  return (label) => counts.get(label) ?? 0;
+}
+function lackOf(plan, transition, tokensOf) {
+  const inputs = plan.links.filter((link2) => link2.target === transition.label).map((link2) => link2.source);
+  const empty = plan.children.filter((child) => inputs.includes(child.label) && !tokensOf(child.label));
+  const places = empty.filter(isPartOfNet).map((child) => child.name);
+  return places.length ? `lacks tokens in ${places.join(", ")}` : "";
+}
+
+// src/drawing/diagram.ts
+var FLASH_MS = 380;
+var FADE_MS = 5e3;
+var CLASSES = ["success", "failure", "preempted", "other"];
+var CARD_TEXT = 118;
+var Diagram = class {
+  svg;
+  world;
+  picture = new Picture();
+  onActive;
+  flashing = /* @__PURE__ */ new Map();
+  // end of the flash of each element [ms]
+  /** @param onActive called when a state may have begun or ended to run */
+  constructor(svg2, onActive) {
+    this.svg = svg2;
+    this.onActive = onActive;
+    this.world = el("g", { class: "world" });
+    svg2.replaceChildren(arrowHeads(), this.world);
+  }
+  draw(layout, model, problems) {
+    const isCompared = model.order.some((n3) => n3.change || n3.note || n3.edges.some((e4) => e4.change || e4.note));
+    this.svg.classList.toggle("compared", isCompared);
+    this.picture = new Picture();
+    this.world.replaceChildren(this.picture.build(layout, model, problems));
+  }
+  /** The box around the machine; null before it is drawn. */
+  get size() {
+    return this.picture.size;
+  }
+  boxOf(path) {
+    return path === null ? void 0 : this.picture.boxes.get(path);
+  }
+  /** Adapt titles and details to a scale. */
+  showScale(k4) {
     this.svg.classList.toggle("far", k4 < 0.6);
     this.svg.classList.toggle("farther", k4 < 0.35);
     this.svg.style.setProperty("--title", `${Math.max(11, Math.min(11 / k4, 44)).toFixed(1)}px`);
   }
-  /** The corner of the view where the minimap covers the fewest states. */
-  #freeCorner({ x: x3, y: y5, k: k4, width, height }) {
-    const [w5, h5] = [this.minimap.clientWidth + 20, this.minimap.clientHeight + 20];
-    const covered = Object.fromEntries(CORNERS.map((corner) => [corner, 0]));
-    for (const [path, box] of this.boxes) {
-      if (this.states.get(path)?.group.classList.contains("box")) continue;
-      const [left, top] = [box.x * k4 + x3, box.y * k4 + y5];
-      const [right, bottom] = [left + box.w * k4, top + box.h * k4];
-      for (const corner of CORNERS) {
-        const atX = corner.endsWith("right") ? right > width - w5 && left < width : left < w5 && right > 0;
-        const atY = corner.startsWith("bottom") ? bottom > height - h5 && top < height : top < h5 && bottom > 0;
-        if (atX && atY) covered[corner] += 1;
-      }
-    }
-    const now = this.minimap.getAttribute("data-corner") ?? CORNERS[0];
-    return CORNERS.reduce((best, one) => covered[one] < covered[best] ? one : best, now);
+  /** Write into the cards what they say now. */
+  paintCards(textOf) {
+    for (const [path, card] of this.picture.cards) write(card, fitting(textOf(path), CARD_TEXT));
   }
   // -- restyling --------------------------------------------------------------------------------
   /**
@@ -4648,7 +4701,7 @@ var Diagram = class {
    * @param noServer no action server is seen that would take it
    */
   paint(path, state, now, goal, noServer = false) {
-    const view2 = this.states.get(path);
+    const view2 = this.picture.states.get(path);
     if (!view2 || isPartOfNet(view2.node)) return;
     const active = state?.since != null;
     const asked2 = active && Boolean(state?.preempt);
@@ -4675,12 +4728,12 @@ var Diagram = class {
       view2.label = label;
       view2.group.setAttribute("aria-label", label);
     }
-    this.minimapDue.set(path, active);
+    this.onActive(path, active);
   }
   /** Show at the joins of a container how many conditions were met in its visit. */
   paintJoins(path, states2) {
     const since = own(states2, path)?.since ?? null;
-    for (const { join: join2, text: text2, lines } of this.joins.get(path) ?? []) {
+    for (const { join: join2, text: text2, lines } of this.picture.joins.get(path) ?? []) {
       let come = 0;
       for (const [label, outcome] of join2.conditions) {
         const child = own(states2, `${path}/${label}`);
@@ -4694,11 +4747,11 @@ var Diagram = class {
   }
   /** Show the tokens of a plan and, beside a waiting transition, why it does not fire. */
   paintNet(path, state) {
-    const plan = this.states.get(path)?.node;
+    const plan = this.picture.states.get(path)?.node;
     if (plan?.kind !== "plan") return;
     const tokensOf = tokensIn(plan, state);
     for (const child of plan.children) {
-      const view2 = this.states.get(child.path);
+      const view2 = this.picture.states.get(child.path);
       if (!view2 || !isPartOfNet(child)) continue;
       const isTransition = child.kind === "transition";
       const tokens = isTransition ? 0 : tokensOf(child.label);
@@ -4714,32 +4767,27 @@ var Diagram = class {
       if (view2.label === label) continue;
       view2.label = label;
       view2.group.setAttribute("aria-label", label);
-      this.minimapDue.set(child.path, tokens > 0);
+      this.onActive(child.path, tokens > 0);
     }
   }
   /** Flash the arrows along which tokens have just moved. */
   flashFired(path, fired, now) {
     const transition = `${path}/${fired}`;
-    const arrows = [...this.arrows.values()].flat();
+    const arrows = [...this.picture.arrows.values()].flat();
     for (const { line, edge } of arrows)
       if (edge.source === transition || edge.link?.target === fired && containerOf(edge.source) === path) {
         line.classList.add("taken");
         this.flashing.set(line, now + FLASH_MS);
       }
   }
-  /** Update the minimap; a few times a second, as doing it at every event costs as much as the rest. */
-  paintMinimap() {
-    for (const [path, active] of this.minimapDue) this.minimapRects.get(path)?.classList.toggle("active", active);
-    this.minimapDue.clear();
-  }
   /** Update the clock of a running state. */
   updateBadge(path, state, now) {
-    const view2 = this.states.get(path);
+    const view2 = this.picture.states.get(path);
     if (view2 && state.since != null) write(view2.badge, elapsed(view2.node, state, now));
   }
   /** Flash a transition that was just taken. */
   flash(path, outcome, now) {
-    for (const { line } of this.arrows.get(path + SEP + outcome) ?? []) {
+    for (const { line } of this.picture.arrows.get(path + SEP + outcome) ?? []) {
       line.classList.add("taken");
       this.flashing.set(line, now + FLASH_MS);
     }
@@ -4760,19 +4808,19 @@ var Diagram = class {
       "on-way"
     );
     for (const { path, outcome } of ends) {
-      for (const { line } of this.arrows.get(path + SEP + outcome) ?? []) line.classList.add("on-way");
-      this.pills.get(path + SEP + outcome)?.classList.add("on-way");
+      for (const { line } of this.picture.arrows.get(path + SEP + outcome) ?? []) line.classList.add("on-way");
+      this.picture.pills.get(path + SEP + outcome)?.classList.add("on-way");
     }
   }
   /** Give these states a class, and remove it from all others. */
   mark(paths, name) {
     for (const group of this.world.querySelectorAll(`.${name}`)) group.classList.remove(name);
-    for (const path of paths) this.states.get(path)?.group.classList.add(name);
+    for (const path of paths) this.picture.states.get(path)?.group.classList.add(name);
   }
   /** Show numbers on transitions and heat on states. */
   showNumbers(countOf2, heatOf) {
     this.svg.classList.toggle("heated", Boolean(countOf2));
-    for (const { line, edge, count: text2, note } of new Set([...this.arrows.values()].flat())) {
+    for (const { line, edge, count: text2, note } of new Set([...this.picture.arrows.values()].flat())) {
       const found = edge.outcomes.map((outcome) => countOf2?.(edge.source, outcome) ?? { count: 0, share: 0 });
       const count = found.reduce((sum, one) => sum + one.count, 0);
       const share = found.reduce((sum, one) => sum + one.share, 0);
@@ -4781,113 +4829,55 @@ var Diagram = class {
       const percent2 = share && share < 0.995 ? ` ${Math.round(share * 100)}%` : "";
       if (text2) text2.textContent = count ? `×${count}${percent2}` : note;
     }
-    for (const [path, { frame, group }] of this.states) {
+    for (const [path, { frame, group }] of this.picture.states) {
       if (group.classList.contains("box")) continue;
       const heat = Math.round((heatOf?.(path) ?? 0) * 100);
       frame.style.fill = heat ? `color-mix(in srgb, var(--failure-fill) ${heat}%, var(--inactive-fill))` : "";
     }
   }
 };
-function fitting(text2, width) {
-  let short = text2;
-  while (short.length > 1 && measure(short, 10) > width) short = `${short.slice(0, -2)}…`;
-  return short;
-}
-function outcomePill(node, pill, x3, y5) {
-  const byDefault = node.pills.find((one) => one.outcome === pill.outcome)?.by_default ? " default" : "";
-  const shown = pill.from ? `${shorten(pill.outcome)}, from ${pill.from}` : shorten(pill.outcome);
-  const place = { x: x3 + pill.x, y: y5 + pill.y, width: pill.w, height: pill.h, rx: pill.h / 2 };
-  const centre = { x: place.x + pill.w / 2, y: place.y + pill.h / 2 + 3.1, "text-anchor": "middle" };
-  return el(
-    "g",
-    { class: `pill ${outcomeClass(pill.outcome)}${byDefault}` },
-    el("rect", place),
-    el("text", centre, shown),
-    ...shown === pill.outcome ? [] : [el("title", {}, shorten(pill.outcome, 400))]
-  );
-}
-function tokensIn(plan, state) {
-  const counts = /* @__PURE__ */ new Map();
-  if (state?.marking) for (const place of state.marking) counts.set(place, (counts.get(place) ?? 0) + 1);
-  else for (const child of plan.children) counts.set(child.label, child.tokens ?? 0);
-  return (label) => counts.get(label) ?? 0;
-}
-function lackOf(plan, transition, tokensOf) {
-  const inputs = plan.links.filter((link2) => link2.target === transition.label).map((link2) => link2.source);
-  const empty = plan.children.filter((child) => inputs.includes(child.label) && !tokensOf(child.label));
-  const places = empty.filter(isPartOfNet).map((child) => child.name);
-  return places.length ? `lacks tokens in ${places.join(", ")}` : "";
-}
-function groupByPath(problems) {
-  const found = /* @__PURE__ */ new Map();
-  for (const one of problems) found.set(one.path, [...found.get(one.path) ?? [], one]);
-  return found;
-}
-function glyphOf(state, kind) {
-  if (state?.waits) return "⏸";
-  if (state?.since != null) return state.preempt ? state.serviced ? "✓" : "■" : "";
-  if (!kind) return "";
-  if (state?.error) return "⚠";
-  return { success: "✓", failure: "✕", preempted: "■", other: "" }[kind];
-}
-function statusOf(state, goal, noServer) {
-  if (state?.since == null) return state?.outcome ?? "not visited";
-  if (state.preempt) return `asked to stop${state.serviced ? ", cleaning up" : ""}`;
-  return noServer && goal ? `no server of ${goal.action} seen` : "running";
-}
 function write(shown, text2) {
   if (shown.text === text2) return;
   shown.text = text2;
   shown.element.textContent = text2;
 }
-function elapsed(node, state, now) {
-  const since = (ns) => Math.max(0, now - (ms(ns) ?? now)) / 1e3;
-  const attempt = state.attempt ?? 1;
-  const tidies2 = isInCleanup(node);
-  if (since(state.since) * 1e3 < BRIEF_MS && !state.preempt && attempt < 2) return "";
-  const parts = [];
-  if (tidies2) parts.push("tidying up");
-  if (state.item != null) parts.push(`#${state.item + 1}`);
-  if (attempt > 1) parts.push(`attempt ${attempt}`);
-  if (!state.preempt) parts.push(duration(since(state.since)));
-  else if (state.serviced) parts.push(`cleans up ${duration(since(state.serviced))}`);
-  else {
-    const grace = state.asked?.grace;
-    parts.push(`asked to stop ${duration(since(state.preempt))}${grace != null ? ` of ${duration(grace)}` : ""}`);
-  }
-  return parts.join(" · ");
-}
 
-// src/drawing/framing.ts
+// src/drawing/follow.ts
 var SETTLED_MS = 450;
 var PAUSE_MS = 900;
 var READABLE2 = 0.84;
-var lastOpen = "";
-var rearrangedAt = -Infinity;
-function containersToOpen(now) {
-  const model = store.data.model.value;
-  const moment = performance.now();
-  if (!model || moment - rearrangedAt < PAUSE_MS) return null;
-  const states2 = store.playback.shown().states;
-  const open = /* @__PURE__ */ new Set([model.root.path]);
-  const ended = store.status.activePaths.value.length === 0;
-  for (const path of ended ? store.status.lastLeaves.value.flatMap(around2) : store.status.activePaths.value) {
-    const since = ended ? 0 : states2[path]?.since;
-    const node = model.get(path);
-    if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
-      open.add(path);
+var Follow = class {
+  #lastOpen = "";
+  #rearrangedAt = -Infinity;
+  // [ms]
+  /** Paths of the containers that should be open; null if nothing is to change. @param now [ms] */
+  containersToOpen(now) {
+    const model = store.data.model.value;
+    const moment = performance.now();
+    if (!model || moment - this.#rearrangedAt < PAUSE_MS) return null;
+    const states2 = store.playback.shown().states;
+    const open = /* @__PURE__ */ new Set([model.root.path]);
+    const active = store.status.activePaths.value;
+    const ended = active.length === 0;
+    for (const path of ended ? store.status.lastLeaves.value.flatMap(around2) : active) {
+      const since = ended ? 0 : states2[path]?.since;
+      const node = model.get(path);
+      if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
+        open.add(path);
+    }
+    const key = [...open].sort().join("\n");
+    if (key === this.#lastOpen) return null;
+    this.#lastOpen = key;
+    this.#rearrangedAt = moment;
+    return open;
   }
-  const key = [...open].sort().join("\n");
-  if (key === lastOpen) return null;
-  lastOpen = key;
-  rearrangedAt = moment;
-  return open;
-}
+  /** Forget the open containers, so that the next call answers at once. */
+  restart() {
+    this.#lastOpen = "";
+    this.#rearrangedAt = -Infinity;
+  }
+};
 var around2 = (path) => store.data.model.value?.ancestors(path).map((node) => node.path) ?? [];
-function restart() {
-  lastOpen = "";
-  rearrangedAt = -Infinity;
-}
 function boxOfActive(boxes) {
   const found = store.status.lastLeaves.value.flatMap((path) => {
     let at = path;
@@ -4914,7 +4904,7 @@ function oneLevelLess(open) {
 function boxToFrame(diagram, view2, whole2) {
   const leaves = store.status.lastLeaves.value;
   const model = store.data.model.value;
-  const active = boxOfActive(diagram.boxes);
+  const active = boxOfActive(diagram.picture.boxes);
   if (!active || !model) return whole2;
   const shared = model.ancestors(leaves[0]).filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
   for (const { path } of shared) {
@@ -4951,7 +4941,7 @@ var ARM = 5;
 var PILL_H = 15;
 var ENTRY = 10;
 var MOST_COLUMNS = 12;
-var pillWidth = (outcome) => measure(shorten(outcome), 9, true) + 15;
+var pillWidth2 = (outcome) => measure(shorten(outcome), 9, true) + 15;
 function waysOf(node) {
   const ways = node.joins.map((join2) => ({
     ...{ join: join2, source: node.path, outcomes: [join2.outcome], outcome: join2.outcome },
@@ -4994,29 +4984,29 @@ function cards(node, outer, aspect) {
   const outcomes = [...new Set(ways.map((way) => way.outcome))];
   let w5 = from + SIDE;
   const h5 = HEAD2 + grid2.h + (outer === "DOWN" ? 34 : 20);
-  const heightOf = (i4) => HEAD2 + (i4 + 0.5) * grid2.h / ways.length;
+  const heightOf2 = (i4) => HEAD2 + (i4 + 0.5) * grid2.h / ways.length;
   const lanes = /* @__PURE__ */ new Map();
   for (const [i4, way] of ways.entries()) {
     const known2 = lanes.get(way.outcome);
     if (known2) known2.ways.push(i4);
-    else lanes.set(way.outcome, { x: 0, y: heightOf(i4), ways: [i4] });
+    else lanes.set(way.outcome, { x: 0, y: heightOf2(i4), ways: [i4] });
   }
   let lane = from + longest2 + 24;
   for (const outcome of outcomes) {
     const at = lanes.get(outcome);
     if (!at) continue;
-    const wide = pillWidth(outcome);
+    const wide = pillWidth2(outcome);
     at.x = outer === "DOWN" ? lane + wide / 2 : lane;
     lane += outer === "DOWN" ? wide + 12 : 10;
   }
   if (ways.length)
-    w5 = outer === "DOWN" ? lane : lane + 14 + (outer === null ? Math.max(...outcomes.map(pillWidth)) : 0);
+    w5 = outer === "DOWN" ? lane : lane + 14 + (outer === null ? Math.max(...outcomes.map(pillWidth2)) : 0);
   for (const [outcome, at] of lanes) {
-    const wide = pillWidth(outcome) + (outer === null ? 4 : 0);
+    const wide = pillWidth2(outcome) + (outer === null ? 4 : 0);
     const pill = outer === "DOWN" ? { x: at.x - wide / 2, y: h5 - PILL_H / 2, w: wide, h: PILL_H } : { x: outer === null ? w5 - wide - SIDE / 2 : w5 - wide / 2, y: at.y - PILL_H / 2, w: wide, h: PILL_H };
     pills.push({ ...pill, outcome });
     for (const i4 of at.ways) {
-      const y5 = heightOf(i4);
+      const y5 = heightOf2(i4);
       const corner = { x: at.x, y: y5 };
       const end = outer === "DOWN" ? { x: at.x, y: pill.y } : { x: pill.x, y: at.y };
       const points2 = outer !== "DOWN" && y5 !== at.y ? [corner, { x: at.x, y: at.y }] : outer === "DOWN" ? [corner] : [];
@@ -5073,24 +5063,6 @@ var Elk = class {
   }
 };
 
-// src/drawing/placed.ts
-var SEP2 = "";
-var LEAF_H = 26;
-var DIRECTIONS = ["DOWN", "RIGHT"];
-var pillWidth2 = (outcome) => measure(shorten(outcome), 9, true) + 15;
-function leafWidth(node) {
-  const closed = node.children.length ? 20 + measure(String(node.total - 1), 9) : 0;
-  return Math.max(56, 44 + measure(node.shown, 11, true) + closed);
-}
-function boxesOf(layout, x3 = 0, y5 = 0, found = /* @__PURE__ */ new Map()) {
-  found.set(layout.node.path, { x: x3, y: y5, w: layout.w, h: layout.h });
-  for (const { node, inner, ...box } of layout.boxes)
-    if (inner) boxesOf(inner, x3 + box.x, y5 + box.y, found);
-    else found.set(node.path, { x: x3 + box.x, y: y5 + box.y, w: box.w, h: box.h });
-  return found;
-}
-var isOpen = (node, open) => node.children.length > 0 && open.has(node.path);
-
 // src/drawing/shapes.ts
 var GRID_FROM = 4;
 var FOLD_FROM = 7;
@@ -5129,7 +5101,7 @@ function bundlesOf({ kind, links, children }) {
   const groups = /* @__PURE__ */ new Map();
   for (const link2 of links) {
     if (!link2.to_outcome || link2.join !== null || link2.change || link2.note) continue;
-    const key = [link2.target, ...link2.outcomes].join(SEP2);
+    const key = [link2.target, ...link2.outcomes].join(SEP);
     groups.set(key, [...groups.get(key) ?? [], link2]);
   }
   const bundles = [...groups.values()].filter((group) => group.length >= BUNDLE_FROM);
@@ -5264,7 +5236,7 @@ var Plan = class {
   #frame() {
     const { node, dir, outer } = this;
     const tag = { concurrence: 66, iterator: 52, sequence: 60 }[node.kind] ?? 8;
-    const pill = Math.max(0, ...this.outcomes.map(pillWidth2));
+    const pill = Math.max(0, ...this.outcomes.map(pillWidth));
     const name = measure(node.shown, 11, true) + tag + 30;
     const title = outer === "DOWN" ? 2 * name - 20 : name;
     const right = outer === "RIGHT" ? 14 + pill / 2 : 14;
@@ -5383,7 +5355,7 @@ var Plan = class {
   }
   #outcome(outcome) {
     const from = [...this.bundled].find(([link2]) => link2.target === outcome)?.[1];
-    const w5 = pillWidth2(from ? `${outcome}, from ${from}` : outcome) + (this.outer === null ? 4 : 0);
+    const w5 = pillWidth(from ? `${outcome}, from ${from}` : outcome) + (this.outer === null ? 4 : 0);
     const id = this.#next({ kind: "pill", outcome, from });
     if (this.outer === null)
       this.graph.children.push({
@@ -5617,7 +5589,7 @@ var Layout = class {
       const known2 = keys2.get(node) ?? "";
       if (areCards(node, open)) {
         for (const outer of node === root ? [null] : DIRECTIONS)
-          this.cache.set(known2 + SEP2 + CARDS + SEP2 + outer, cards(node, outer, this.aspect));
+          this.cache.set(known2 + SEP + CARDS + SEP + outer, cards(node, outer, this.aspect));
         this.tried.set(known2, [CARDS]);
         continue;
       }
@@ -5628,7 +5600,7 @@ var Layout = class {
           const name = nameOf(shape);
           if (chosen2 !== void 0 && chosen2 !== name) continue;
           names.add(name);
-          const key = known2 + SEP2 + name + SEP2 + outer;
+          const key = known2 + SEP + name + SEP + outer;
           if (this.cache.has(key)) continue;
           const inner = this.#inside(node, open, keys2, shape.dir);
           plans.push({ key, plan: new Plan(node, shape, outer, `g${plans.length}`, inner, this.aspect) });
@@ -5681,7 +5653,7 @@ var Layout = class {
     const names = this.tried.get(known2) ?? [];
     const aspect = outer === null ? this.aspect : this.aspect * this.inner;
     for (const name of chosen2 !== void 0 && names.includes(chosen2) ? [chosen2] : names) {
-      const one = this.cache.get(known2 + SEP2 + name + SEP2 + outer);
+      const one = this.cache.get(known2 + SEP + name + SEP + outer);
       if (one && (!best || badness(one, aspect) < badness(best, aspect))) best = one;
     }
     return best;
@@ -5698,8 +5670,204 @@ var CARDS = "cards";
 var areCards = (node, open) => hasManyBranches(node) && !node.children.some((child) => isOpen(child, open) || child.change);
 function keyOf2(node, open, keys2, inner) {
   const inside = node.children.filter((child) => isOpen(child, open)).map((child) => keys2.get(child));
-  return `${node.path}(${inside.join(SEP2)})${inside.length && inner !== 1 ? inner : ""}`;
+  return `${node.path}(${inside.join(SEP)})${inside.length && inner !== 1 ? inner : ""}`;
 }
+
+// src/drawing/layout_controller.ts
+var OPENING_MS = 15e3;
+var READABLE3 = 0.55;
+var SLOW_MS = 300;
+var LARGEST = 1.5;
+var LayoutController = class {
+  diagram;
+  minimap;
+  view;
+  painter;
+  layout = null;
+  running = null;
+  ms = 0;
+  // duration of the last layout
+  openedAt = 0;
+  // time of the machine's arrival [ms]
+  fitted = null;
+  // the view that showed everything
+  #again = false;
+  /** What to show after it. */
+  #after = { frame: false, focus: null };
+  #toggled = null;
+  // path of the container that is being opened or closed
+  #follow = new Follow();
+  constructor(diagram, minimap2, view2, painter) {
+    this.diagram = diagram;
+    this.minimap = minimap2;
+    this.view = view2;
+    this.painter = painter;
+  }
+  /** @param worker of ELK */
+  start(worker) {
+    this.layout = new Layout(worker);
+  }
+  /** Another machine has come. */
+  restart() {
+    this.openedAt = performance.now();
+    this.#follow.restart();
+    this.layout?.clear();
+  }
+  /** Lay out and draw the machine; then show all of it, the running states, or one state. */
+  relayout({ frame = false, focus = null } = {}) {
+    if (frame) this.#after.frame = frame;
+    this.#after.focus = focus ?? this.#after.focus;
+    if (this.running) this.#again = true;
+    else this.running = this.#loop();
+    return this.running;
+  }
+  async #loop() {
+    try {
+      do {
+        this.#again = false;
+        await this.#once();
+        if (this.#after.frame === true && this.isOtherShape()) this.#again = true;
+      } while (this.#again);
+      this.#show();
+      const { dataset } = document.documentElement;
+      dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
+      store.data.failure.value = null;
+    } catch (error) {
+      const text2 = `This machine could not be laid out: ${messageOf(error)}`;
+      if (this.diagram.size)
+        store.view.notify(text2, "error");
+      else store.data.failure.value = text2;
+      console.error(error);
+    } finally {
+      this.running = null;
+    }
+  }
+  async #once() {
+    const model = store.data.model.value;
+    if (!model || !this.layout) return;
+    const begun = performance.now();
+    if (this.#after.frame) this.layout.choose(this.view.width / this.view.height);
+    const progress = (done, all) => {
+      if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
+    };
+    let open = new Set(store.view.opened.value).add(model.root.path);
+    let result = await this.layout.run(model.root, open, progress);
+    if (this.#after.frame === "follow")
+      while (result && !isLegible(boxesOf(result), this.view)) {
+        const less = oneLevelLess(open);
+        if (!less) break;
+        open = less;
+        store.view.opened.value = less;
+        result = await this.layout.run(model.root, less, progress);
+      }
+    store.view.laidOut.value = null;
+    store.view.overview.value = Boolean(result?.isOverview);
+    this.ms = performance.now() - begun;
+    if (!result || model !== store.data.model.value) return;
+    const anchor = this.#anchor();
+    this.diagram.draw(result, model, store.data.problems.value);
+    this.minimap.draw(this.diagram.picture);
+    this.#hold(anchor);
+    this.painter.paintAll();
+    const size = this.diagram.size;
+    const tooSmall = size !== null && this.view.scaleFor(size) < READABLE3;
+    if (this.#after.frame === true && tooSmall && store.view.openOneLevelLess()) this.#again = true;
+  }
+  /** Bring into view what was asked for. */
+  #show() {
+    const { frame, focus } = this.#after;
+    const { size } = this.diagram;
+    this.#after = { frame: false, focus: null };
+    if (focus) this.focus(focus);
+    else if (frame === "follow" && size) this.view.frame(boxToFrame(this.diagram, this.view, size), { most: LARGEST });
+    else if (frame) this.fit({ animate: false });
+  }
+  /** The state in the middle of the view, and its place: it keeps it while a layout moves the others. */
+  #anchor() {
+    const { view: view2, diagram } = this;
+    if (!diagram.size) return null;
+    const x3 = (view2.width / 2 - view2.x) / view2.k;
+    const y5 = (view2.height / 2 - view2.y) / view2.k;
+    const inside = (b3) => x3 >= b3.x && x3 <= b3.x + b3.w && y5 >= b3.y && y5 <= b3.y + b3.h;
+    const path = this.#toggled ?? [...diagram.picture.boxes].findLast(([, box2]) => inside(box2))?.[0] ?? null;
+    this.#toggled = null;
+    const box = diagram.boxOf(path);
+    return path !== null && box ? { path, x: box.x, y: box.y } : null;
+  }
+  #hold(anchor) {
+    const box = anchor && this.diagram.boxOf(anchor.path);
+    if (!box) return;
+    const { x: x3, y: y5, k: k4 } = this.view;
+    this.view.set(x3 - (box.x - anchor.x) * k4, y5 - (box.y - anchor.y) * k4, k4);
+  }
+  // -- what is in view --------------------------------------------------------------------------
+  focus(path) {
+    const box = this.diagram.boxOf(path);
+    if (box) this.view.frame(box, { margin: 110, most: Math.max(1, Math.min(this.view.k, LARGEST)) });
+  }
+  fit({ animate = true } = {}) {
+    if (this.diagram.size) this.fitted = this.view.frame(this.diagram.size, { animate, most: LARGEST });
+  }
+  /** Show everything, with a layout for the present size of the view. */
+  refit() {
+    this.relayout({ frame: true });
+  }
+  /**
+   * Show everything again after the view was resized, if it did before. Panels that appear while the page opens change
+   * its aspect, so the machine is laid out for the new one.
+   */
+  resized() {
+    if (this.fitted && this.view.is(this.fitted)) {
+      if (this.isOtherShape()) this.refit();
+      else this.fit({ animate: false });
+    }
+    this.minimap.showWindow(this.view);
+  }
+  /** Whether the page is just opening and the aspect of its view has changed much since the layout. */
+  isOtherShape() {
+    const isOpening = performance.now() - this.openedAt < OPENING_MS;
+    return isOpening && this.layout !== null && !this.layout.suits(this.view.width / this.view.height);
+  }
+  // -- the open containers ----------------------------------------------------------------------
+  /** Open or close a container, unless it is the root. */
+  toggle(path) {
+    const node = store.data.model.value?.get(path);
+    if (store.view.overview.value && node) {
+      store.view.openAround(node);
+      this.relayout({ focus: node.path });
+      return;
+    }
+    if (!node?.children.length || !node.parent) return;
+    this.#toggled = node.path;
+    store.view.toggle(node.path);
+    this.relayout();
+  }
+  setDepth(levels) {
+    const model = store.data.model.value;
+    if (!model) return;
+    store.view.follow.value = false;
+    store.view.setOpened(model.toDepth(levels));
+    this.relayout({ frame: true });
+  }
+  setImplicit(on2) {
+    store.view.setImplicit(on2);
+    this.layout?.clear();
+    this.relayout();
+  }
+  setFollow(on2) {
+    store.view.follow.value = on2;
+    this.#follow.restart();
+    this.follow();
+  }
+  /** In follow mode, open the containers that run and frame what runs in them. */
+  follow() {
+    if (!store.view.follow.value || this.running) return;
+    const open = this.#follow.containersToOpen(store.playback.nowMs());
+    if (!open) return;
+    store.view.opened.value = open;
+    this.relayout({ frame: "follow" });
+  }
+};
 
 // src/drawing/theme.ts
 var systemIsDark = matchMedia("(prefers-color-scheme: dark)");
@@ -6299,6 +6467,388 @@ function describe(scene, now) {
 }
 var placeText = ({ x: x3, y: y5 }) => `(${x3.toFixed(1)}, ${y5.toFixed(1)})`;
 
+// src/drawing/minimap.ts
+var SHOWN_BELOW = 0.6;
+var CORNERS = ["bottom-right", "bottom-left", "top-right", "top-left"];
+var Minimap = class {
+  svg;
+  #size = null;
+  // of the machine
+  #rects = /* @__PURE__ */ new Map();
+  // by path
+  #leaves = [];
+  // of the states that are not opened
+  #due = /* @__PURE__ */ new Map();
+  // changes to paint: path -> whether the state is active
+  #window = el("rect", { class: "window" });
+  // the part in view
+  /** @param onCentre called with the place in the diagram that was pressed */
+  constructor(svg2, onCentre) {
+    this.svg = svg2;
+    const move = (e4) => {
+      const matrix = svg2.getScreenCTM();
+      if (!matrix) return;
+      const { x: x3, y: y5 } = new DOMPoint(e4.clientX, e4.clientY).matrixTransform(matrix.inverse());
+      onCentre(x3, y5);
+    };
+    svg2.addEventListener("pointerdown", (pressed) => {
+      drag(move);
+      move(pressed);
+    });
+  }
+  draw({ size, boxes, states: states2 }) {
+    if (!size) return;
+    this.#size = size;
+    this.#rects.clear();
+    this.#due.clear();
+    this.#leaves = [];
+    this.svg.setAttribute("viewBox", `0 0 ${size.w} ${size.h}`);
+    for (const [path, box] of boxes) {
+      const isOpen2 = states2.get(path)?.group.classList.contains("box");
+      const place = { x: box.x, y: box.y, width: box.w, height: box.h, rx: 6 };
+      this.#rects.set(path, el("rect", { class: isOpen2 ? "area" : "spot", ...place }));
+      if (!isOpen2) this.#leaves.push(box);
+    }
+    this.svg.replaceChildren(...this.#rects.values(), this.#window);
+  }
+  /** Light a state, or not, at the next painting. */
+  light(path, active) {
+    this.#due.set(path, active);
+  }
+  /** Paint what has changed; a few times a second, as doing it at every event costs as much as the rest. */
+  paint() {
+    for (const [path, active] of this.#due) this.#rects.get(path)?.classList.toggle("active", active);
+    this.#due.clear();
+  }
+  /** Show which part is in view; if it is most of the machine, there is no minimap. */
+  showWindow(view2) {
+    if (!this.#size) return;
+    const { x: x3, y: y5, k: k4, width, height } = view2;
+    const { w: w5, h: h5 } = this.#size;
+    const place = { x: -x3 / k4, y: -y5 / k4, width: width / k4, height: height / k4 };
+    for (const [name, value] of Object.entries(place)) this.#window.setAttribute(name, String(value));
+    this.#window.style.strokeWidth = `${Math.max(w5, h5) / 70}px`;
+    const seen2 = (from, size, room) => Math.max(0, Math.min(room, from + size * k4) - Math.max(0, from)) / (size * k4);
+    const isIdle = seen2(x3, w5, width) * seen2(y5, h5, height) > SHOWN_BELOW;
+    this.svg.classList.toggle("idle", isIdle);
+    if (!isIdle) this.svg.setAttribute("data-corner", this.#freeCorner(view2));
+  }
+  /** The corner of the view where the minimap covers the fewest states. */
+  #freeCorner({ x: x3, y: y5, k: k4, width, height }) {
+    const [w5, h5] = [this.svg.clientWidth + 20, this.svg.clientHeight + 20];
+    const covered = Object.fromEntries(CORNERS.map((corner) => [corner, 0]));
+    for (const box of this.#leaves) {
+      const [left, top] = [box.x * k4 + x3, box.y * k4 + y5];
+      const [right, bottom] = [left + box.w * k4, top + box.h * k4];
+      for (const corner of CORNERS) {
+        const atX = corner.endsWith("right") ? right > width - w5 && left < width : left < w5 && right > 0;
+        const atY = corner.startsWith("bottom") ? bottom > height - h5 && top < height : top < h5 && bottom > 0;
+        if (atX && atY) covered[corner] += 1;
+      }
+    }
+    const now = this.svg.getAttribute("data-corner") ?? CORNERS[0];
+    return CORNERS.reduce((best, one) => covered[one] < covered[best] ? one : best, now);
+  }
+};
+
+// src/core/statistics.ts
+var MODES = [
+  ["none", "No numbers"],
+  ["counts", "Counts of this run"],
+  ["time", "Time in this run"],
+  ["runs", "Recorded runs"],
+  ["failures", "Failures in recorded runs"],
+  ["compare", "This run against recorded runs"]
+];
+var OF_RECORDED_RUNS = ["runs", "failures", "compare"];
+var total = (outcomes) => Object.values(outcomes ?? {}).reduce((a5, b3) => a5 + b3, 0);
+function numbersFor(mode, run, statistics, model) {
+  const recorded = statistics?.states ?? {};
+  const counts = (states2) => (path, outcome) => {
+    const outcomes = own(states2, path)?.outcomes;
+    const count = own(outcomes, outcome);
+    return count ? { count, share: count / total(outcomes) } : null;
+  };
+  switch (mode) {
+    case "counts":
+      return { countOf: counts(run), heatOf: null };
+    case "time": {
+      const most = mostSeconds(run, model);
+      return { countOf: counts(run), heatOf: (path) => Math.min(1, (own(run, path)?.seconds ?? 0) / most) };
+    }
+    case "runs":
+      return { countOf: counts(recorded), heatOf: null };
+    case "failures":
+      return { countOf: counts(recorded), heatOf: (path) => own(recorded, path)?.failures ?? 0 };
+    case "compare":
+      return { countOf: counts(run), heatOf: (path) => slower(own(run, path), own(recorded, path)) };
+    default:
+      return { countOf: null, heatOf: null };
+  }
+}
+function mostSeconds(run, model) {
+  const leaves = Object.entries(run).filter(([path]) => !model?.get(path)?.children.length);
+  return Math.max(1e-3, ...leaves.map(([, state]) => state.seconds));
+}
+function heatScale(mode, run, model) {
+  switch (mode) {
+    case "time":
+      return ["0 s", duration(mostSeconds(run, model))];
+    case "failures":
+      return ["none failed", "all failed"];
+    case "compare":
+      return ["as usual", "twice as long"];
+    default:
+      return null;
+  }
+}
+function slower(state, recorded) {
+  if (!state || !recorded?.median) return 0;
+  const ended = total(state.outcomes);
+  return ended ? Math.min(1, Math.max(0, state.seconds / ended / recorded.median - 1)) : 0;
+}
+function coverage(model, run) {
+  let taken = 0;
+  let all = 0;
+  for (const node of model?.order ?? [])
+    for (const edge of node.edges) {
+      if (edge.implicit) continue;
+      for (const outcome of edge.outcomes) {
+        all += 1;
+        if (own(own(run, `${node.path}/${edge.source}`)?.outcomes, outcome)) taken += 1;
+      }
+    }
+  return { taken, all };
+}
+
+// src/drawing/painter.ts
+var Painter = class {
+  diagram;
+  constructor(diagram) {
+    this.diagram = diagram;
+  }
+  /** Paint the states with these paths, and what their containers show of them, as they are now. */
+  paintChanged(paths) {
+    const { diagram } = this;
+    const data = store.data.run.now;
+    const now = store.playback.nowMs();
+    for (const path of paths) {
+      diagram.paintJoins(path, data.states);
+      diagram.paintJoins(containerOf(path), data.states);
+      diagram.paintNet(path, data.states[path]);
+      if (!diagram.picture.states.has(path)) continue;
+      const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
+      diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
+    }
+  }
+  /** Paint everything, as it was at the instant shown. */
+  paintAll() {
+    const { diagram } = this;
+    if (!diagram.size) return;
+    const data = store.playback.shown();
+    const now = store.playback.nowMs();
+    const running = Object.values(data.goals).filter((goal) => goal.ended == null);
+    const goals = new Map(running.map((goal) => [goal.path, goal]));
+    for (const path of diagram.picture.boxes.keys()) {
+      const goal = goals.get(path);
+      diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
+    }
+    for (const path of diagram.picture.joins.keys()) diagram.paintJoins(path, data.states);
+    diagram.paintCards(insideText);
+    for (const path of diagram.picture.boxes.keys()) diagram.paintNet(path, data.states[path]);
+    const stops = store.data.facts.value?.control?.breakpoints ?? [];
+    const pathsOf = (some) => some.map(([path]) => path);
+    diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
+    diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
+    diagram.mark(store.view.selected.value ? [store.view.selected.value] : [], "selected");
+    const differing = reproduction()?.found?.difference?.path;
+    diagram.mark(differing ? [differing] : [], "differs");
+    diagram.showWay(store.data.wayShown.value);
+    this.showNumbers();
+  }
+  /** Flash the transitions that were just taken. @param moment [ms] */
+  flash(events, moment) {
+    for (const e4 of events)
+      if (e4.kind === "Fired") this.diagram.flashFired(e4.path, e4.transition, moment);
+      else this.diagram.flash(e4.path, e4.kind === "Left" ? e4.outcome : RAISED, moment);
+  }
+  /** Paint what changes without events: the clocks of running states, closed containers, numbers. */
+  paintBeat() {
+    if (store.playback.cursor.value === null) {
+      const { states: states2 } = store.data.run.now;
+      const now = store.playback.nowMs();
+      for (const path of store.status.activePaths.value)
+        if (states2[path]) this.diagram.updateBadge(path, states2[path], now);
+      this.diagram.paintCards(insideText);
+    }
+    if (store.view.numbers.value !== "none") this.showNumbers();
+  }
+  showNumbers() {
+    const { statistics, model } = store.data;
+    const { states: states2 } = store.playback.shown();
+    const { countOf: countOf2, heatOf } = numbersFor(store.view.numbers.value, states2, statistics.value, model.value);
+    this.diagram.showNumbers(countOf2, heatOf);
+  }
+};
+
+// src/drawing/scheduler.ts
+var PANELS_MS = 160;
+var SLOWEST_PANELS_MS = 800;
+var IN_TIME_MS = 25;
+var PANELS_PER_LATE = 8;
+var LATE_PART = 0.1;
+var TEXT_MS = 400;
+var BEAT_MS = 200;
+var BUSY = 15;
+var ANNOUNCE_MS = 1e3;
+var PLAY_MS = 45;
+var BURST = 500;
+var FLASHING = ["Left", "Failed", "Fired"];
+var Scheduler = class {
+  frame = 0;
+  // the requested animation frame
+  changed = /* @__PURE__ */ new Set();
+  // paths to paint in it
+  flashes = [];
+  // transitions to flash in it
+  latency = new Latency();
+  #drawn;
+  #askedAt = 0;
+  // time of the request [ms]
+  #late = 0;
+  // average lateness of frames [ms]
+  #playFrame = 0;
+  // the requested animation frame while playing
+  #playedAt = 0;
+  // [ms]
+  #panelsAt = 0;
+  // time of their last update [ms]
+  #panelsDue = 0;
+  #textAt = 0;
+  #drawDue = 0;
+  #announcedAt = 0;
+  #newestSeq = 0;
+  constructor(drawn) {
+    this.#drawn = drawn;
+    store.playback.playing.subscribe((playing) => {
+      if (playing && !this.#playFrame) this.#playFrame = requestAnimationFrame((moment) => this.#play(moment));
+    });
+  }
+  start() {
+    setInterval(() => {
+      this.#drawn.painter.paintBeat();
+      this.#panels(performance.now());
+    }, BEAT_MS);
+  }
+  takeEvents(events) {
+    const live = store.playback.cursor.value === null && !document.hidden;
+    for (const e4 of events) {
+      this.changed.add(e4.path);
+      if (live && FLASHING.includes(e4.kind)) this.flashes.push(e4);
+      if (live && events.length < BURST) this.latency.arrived.push(e4.stamp_ns / 1e6);
+    }
+    store.addEvents(events);
+    if (!events.length) this.#drawn.painter.paintAll();
+    this.#schedule();
+  }
+  takeObserved(records) {
+    store.data.addObserved(records);
+    this.#schedule();
+  }
+  #schedule() {
+    if (this.frame) return;
+    this.#askedAt = performance.now();
+    this.frame = requestAnimationFrame(() => this.#draw());
+  }
+  #draw() {
+    this.frame = 0;
+    const moment = performance.now();
+    this.#late += LATE_PART * (moment - this.#askedAt - this.#late);
+    const flashes = this.flashes.splice(0);
+    const arrived = this.latency.arrived.splice(0);
+    if (store.playback.cursor.value === null) {
+      this.#drawn.painter.paintChanged(this.changed);
+      this.changed.clear();
+      this.#drawn.painter.flash(flashes, moment);
+      this.latency.painting(arrived);
+    }
+    if (this.#drawn.painter.diagram.endFlashes(moment)) this.#schedule();
+    const pause = this.#panelsPause;
+    if (moment - this.#panelsAt > pause) this.#panels(moment);
+    else this.#panelsDue ||= setTimeout(() => this.#panels(performance.now()), pause);
+  }
+  /** Time between two updates of the panels [ms]; longer on a slow browser, as the diagram has priority. */
+  get #panelsPause() {
+    return Math.min(SLOWEST_PANELS_MS, PANELS_MS + PANELS_PER_LATE * Math.max(0, this.#late - IN_TIME_MS));
+  }
+  #panels(moment) {
+    clearTimeout(this.#panelsDue);
+    this.#panelsDue = 0;
+    this.#panelsAt = moment;
+    store.playback.tick.value += 1;
+    store.panels.hasMap.value = !store.data.scene.isEmpty;
+    if (moment - this.#textAt > TEXT_MS) {
+      this.#textAt = moment;
+      store.playback.slowTick.value += 1;
+      const newest3 = store.data.run.events.at(-1)?.seq ?? 0;
+      const isBusy = newest3 - this.#newestSeq > 3 * BUSY * (TEXT_MS / 1e3);
+      this.#newestSeq = newest3;
+      this.#drawn.painter.diagram.svg.classList.toggle("busy", isBusy);
+      this.#drawn.timeline.tellInstant();
+    }
+    this.#drawDue ||= setTimeout(() => {
+      this.#drawDue = 0;
+      this.#drawn.timeline.draw();
+      this.#drawn.map.draw();
+      this.#drawn.minimap.paint();
+    }, PANELS_MS / 2);
+    this.#announce(moment);
+    this.#drawn.onPanels();
+  }
+  /** Announce the running states to screen readers. */
+  #announce(moment) {
+    const region = document.getElementById("announced");
+    if (!region || moment - this.#announcedAt < ANNOUNCE_MS) return;
+    const leaves = store.status.activeLeaves.value.slice(0, 6);
+    const names = leaves.map((path) => store.data.nameOf(path)).join(", ");
+    const text2 = [store.status.runStatus.value.word, names].filter(Boolean).join(": ");
+    if (region.textContent === text2) return;
+    region.textContent = text2;
+    this.#announcedAt = moment;
+  }
+  #play(moment) {
+    this.#playFrame = 0;
+    if (!store.playback.playing.value) return;
+    this.#playFrame = requestAnimationFrame((next) => this.#play(next));
+    if (moment - this.#playedAt < PLAY_MS) return;
+    this.#playedAt = moment;
+    store.playback.playOn(performance.now());
+  }
+};
+var Latency = class {
+  arrived = [];
+  // stamps of events to paint
+  measured = [];
+  // [ms]
+  #painting = [];
+  // stamps of events in the frame that is being painted
+  #port = new MessageChannel();
+  // its message comes after the paint
+  constructor() {
+    this.#port.port1.onmessage = () => {
+      const now = performance.timeOrigin + performance.now();
+      for (const stamp of this.#painting.splice(0)) this.measured.push(now - stamp);
+      if (this.measured.length > 2e4) this.measured.splice(0, 1e4);
+    };
+  }
+  /** @param stamps of the events that are painted in this frame */
+  painting(stamps) {
+    if (!stamps.length) return;
+    this.#painting.push(...stamps);
+    this.#port.port2.postMessage(0);
+  }
+};
+
 // src/core/density.ts
 function densityOf(events, { from, to }, columns, model = null) {
   const found = { counts: new Array(columns).fill(0), failures: [], preempts: [], starts: [] };
@@ -6450,55 +7000,392 @@ var Strip = class {
   }
 };
 
+// src/drawing/lanes.ts
+var LANE = 19;
+var ROW = 13;
+var MOST_ROWS = 8;
+var Lanes = class {
+  all = [];
+  // in the order of the tree
+  #spansOf = /* @__PURE__ */ new Map();
+  // by path of the lane
+  #model = null;
+  #spans = null;
+  #sorted = 0;
+  // number of spans that are in lanes
+  forget() {
+    this.#model = null;
+  }
+  /** Put new spans into lanes; a container gets a lane when a state in it has run. */
+  update(model, spans) {
+    if (this.#model !== model || this.#spans !== spans) {
+      this.#spansOf.clear();
+      this.#sorted = 0;
+      this.all = [];
+    }
+    this.#model = model;
+    this.#spans = spans;
+    const before = this.#spansOf.size;
+    for (; this.#sorted < spans.length; this.#sorted++) {
+      const span = spans[this.#sorted];
+      const lane = model.get(span.path)?.parent?.path;
+      if (lane === void 0) continue;
+      const known2 = this.#spansOf.get(lane);
+      if (known2) known2.push(span);
+      else this.#spansOf.set(lane, [span]);
+    }
+    if (this.#spansOf.size !== before) this.all = model.order.filter((node) => this.#spansOf.has(node.path));
+  }
+  /**
+   * The spans of a lane in a range [ms], in order of their beginnings. Ends are only roughly in that order, so a few
+   * that ended before the range are among them.
+   */
+  spansIn(lane, from, to) {
+    const spans = this.#spansOf.get(lane.path) ?? [];
+    const ended = countWhile(spans, (span) => (span.to ?? Infinity) < from);
+    const begun = countWhile(spans, (span) => span.from <= to);
+    return spans.slice(Math.max(0, ended - 16), begun);
+  }
+  /**
+   * The lanes to show: of those with one of some words in a name, all if there is room, otherwise those with spans in a
+   * range [ms].
+   * @param words separated by spaces or commas; without any, all lanes count
+   * @param room [px]
+   */
+  shown({ from, to }, words2, room) {
+    const wanted = words2.toLowerCase().split(/[\s,]+/).filter(Boolean);
+    const isWanted = (lane) => [lane, ...lane.children].some(({ path }) => isNamed(path, wanted));
+    const lanes = wanted.length ? this.all.filter(isWanted) : this.all;
+    if (heightOf(lanes) <= room) return lanes;
+    return lanes.filter((lane) => this.spansIn(lane, from, to).some((span) => (span.to ?? Infinity) >= from));
+  }
+};
+var isNamed = (path, words2) => {
+  const name = path.slice(path.lastIndexOf("/") + 1).toLowerCase();
+  return words2.some((word) => name.includes(word));
+};
+var rowsOf = (lane) => lane.kind === "concurrence" ? lane.children.length : 1;
+var laneHeight = (lane) => lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(lane.children.length, MOST_ROWS) + 3) : LANE;
+var heightOf = (lanes) => lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
+
+// src/drawing/bars.ts
+var THINNEST = 0.5;
+var FAILED = 3;
+var MOST_WIDTHS = 4e3;
+var FONT2 = "11px Inter, Arial, sans-serif";
+var Bars = class {
+  context;
+  colours;
+  hits = [];
+  // the bars of visits that were drawn since they were forgotten
+  #widths = /* @__PURE__ */ new Map();
+  // of texts in bars [px]
+  constructor(context2, colours) {
+    this.context = context2;
+    this.colours = colours;
+  }
+  forget() {
+    this.hits = [];
+  }
+  /** Draw a lane's name, bars and waits. */
+  lane(lane, y5, lanes, model, scale) {
+    const g5 = this.context;
+    const h5 = laneHeight(lane);
+    g5.fillStyle = this.colours.of("muted");
+    g5.textAlign = "left";
+    const indent = 10 + Math.min(lane.depth, 6) * 9;
+    clipped(g5, 0, y5, scale.left - 8, h5, () => g5.fillText(lane.name, indent, y5 + h5 / 2));
+    this.#visits(lane, y5, lanes.spansIn(lane, scale.from, scale.to), model, scale);
+    this.#waits(lane, y5, model, scale);
+  }
+  #visits(lane, y5, spans, model, { from, left, right, x: x3 }) {
+    const g5 = this.context;
+    const now = store.playback.nowMs();
+    const isOneRow = rowsOf(lane) === 1;
+    let lastPx = -10;
+    const failures = [];
+    for (const span of spans) {
+      const later = span.from > now;
+      const ended = span.to !== null && (later || span.to <= now);
+      const until = span.to ?? Math.max(now, store.data.run.last() ?? now);
+      const node = model.get(span.path);
+      if (until < from || !node) continue;
+      const begin = Math.max(left, x3(span.from));
+      const end = Math.min(right + 2, x3(until));
+      const isFailure2 = ended && endClass(node, span.outcome) === "failure";
+      if (isOneRow && end - lastPx < THINNEST && ended && !isFailure2) continue;
+      lastPx = Math.max(lastPx, end);
+      const wide = Math.max(isFailure2 ? FAILED : 2, end - begin);
+      const hit = { left: begin, right: begin + wide, ...rowOf(lane, node, y5), span };
+      const paint2 = () => {
+        g5.globalAlpha = later ? 0.35 : 1;
+        this.#visit(hit, node, ended, x3, later ? Infinity : now);
+        g5.globalAlpha = 1;
+        this.hits.push(hit);
+      };
+      if (isFailure2) failures.push(paint2);
+      else paint2();
+    }
+    for (const paint2 of failures) paint2();
+  }
+  /** @param now the instant shown [ms]; later parts are pale */
+  #visit({ span, ...bar }, node, ended, x3, now) {
+    const g5 = this.context;
+    const { left, right, top, bottom } = bar;
+    const [wide, tall] = [right - left, bottom - top];
+    const asked2 = span.preempt !== null && span.preempt <= now ? span.preempt : null;
+    const kind = ended ? endClass(node, span.outcome) : asked2 !== null ? "preempted" : "active";
+    g5.fillStyle = this.colours.of(`${kind}-fill`);
+    g5.strokeStyle = this.colours.of(kind);
+    g5.lineWidth = 1.1;
+    this.#outline(bar);
+    g5.fill();
+    if (asked2 !== null) {
+      g5.save();
+      g5.clip();
+      g5.fillStyle = this.colours.of("preempted");
+      g5.globalAlpha *= 0.55;
+      for (let px = Math.max(left, x3(asked2)); px < right; px += 5) g5.fillRect(px, top, 2.5, tall);
+      g5.restore();
+    }
+    g5.stroke();
+    if (store.view.selected.value === span.path) {
+      g5.strokeStyle = this.colours.of("ink");
+      g5.lineWidth = 2;
+      g5.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
+    }
+    const driver = store.data.scene.colourOf(span.path);
+    if (driver >= 0) {
+      g5.fillStyle = this.colours.of(`s${1 + driver % COLOURS}`);
+      g5.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
+    }
+    const lit = store.pointer.hovered.value;
+    if (lit?.path === span.path && lit.from === span.from) this.#halo(bar);
+    if (span.serviced !== null && span.serviced <= now) this.#mark(Math.min(x3(span.serviced), right), bar, "preempted");
+    if (span.abandoned !== null && span.abandoned <= now)
+      this.#mark(Math.min(x3(span.abandoned), right), bar, "failure");
+    const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? store.playback.nowMs() : now);
+    this.#text(words2, `${kind}-text`, bar);
+  }
+  /** Draw the times in which the lane's states were paused before they began, or asked. */
+  #waits(lane, y5, model, { from, to, left, right, x: x3 }) {
+    const now = store.playback.nowMs();
+    for (const wait of store.data.run.waits) {
+      const until = Math.min(wait.to ?? now, now);
+      if (until < from || wait.from > Math.min(to, now)) continue;
+      const node = model.get(wait.path);
+      if (!node || node.parent?.path !== lane.path) continue;
+      const begin = Math.max(left, x3(wait.from));
+      const end = Math.max(Math.min(right + 2, x3(until)), begin + 2);
+      const bar = { left: begin, right: end, ...rowOf(lane, node, y5) };
+      const asks2 = wait.kind === "asks";
+      this.#wait(bar, asks2);
+      const words2 = asks2 ? `${node.name} ?` : wait.text;
+      const took = duration(Math.max(0, until - wait.from) / 1e3);
+      this.#text([`${words2} ${took}`, words2, asks2 ? "?" : ""], asks2 ? "waiting-text" : "other-text", bar);
+    }
+  }
+  /** Draw a wait: dotted for a question, hatched for a pause. */
+  #wait(bar, asks2) {
+    const g5 = this.context;
+    const colour = asks2 ? "waiting" : "other";
+    const tall = bar.bottom - bar.top;
+    g5.save();
+    this.#outline(bar);
+    g5.fillStyle = this.colours.of(`${colour}-fill`);
+    g5.fill();
+    g5.clip();
+    g5.strokeStyle = this.colours.of(colour);
+    if (!asks2) {
+      g5.globalAlpha = 0.35;
+      g5.lineWidth = 2;
+      for (let px = bar.left - tall; px < bar.right; px += 7) {
+        g5.beginPath();
+        g5.moveTo(px, bar.bottom);
+        g5.lineTo(px + tall, bar.top);
+        g5.stroke();
+      }
+    }
+    g5.restore();
+    this.#outline(bar);
+    g5.strokeStyle = this.colours.of(colour);
+    g5.setLineDash(asks2 ? [1.5, 2.5] : []);
+    g5.lineWidth = 1.4;
+    g5.stroke();
+    g5.setLineDash([]);
+  }
+  #outline({ left, right, top, bottom }) {
+    const [wide, tall] = [right - left, bottom - top];
+    this.context.beginPath();
+    this.context.roundRect(left, top, wide, tall, Math.min(4, tall / 2, wide / 2));
+  }
+  /** Draw a ring around the visit that the pointer is on here or in the map. */
+  #halo({ left, right, top, bottom }) {
+    const g5 = this.context;
+    for (const [name, wide] of [
+      ["ink", 4.5],
+      ["halo", 2.5]
+    ]) {
+      g5.strokeStyle = this.colours.of(name);
+      g5.lineWidth = wide;
+      g5.beginPath();
+      g5.roundRect(left - 1, top - 1, right - left + 2, bottom - top + 2, 4);
+      g5.stroke();
+    }
+  }
+  /** Mark the place at which a preempt was serviced or the state was abandoned. */
+  #mark(px, { top, bottom }, colour) {
+    const g5 = this.context;
+    g5.fillStyle = this.colours.of(colour);
+    g5.beginPath();
+    g5.moveTo(px - 3.5, top - 1);
+    g5.lineTo(px + 3.5, top - 1);
+    g5.lineTo(px, top + 5);
+    g5.fill();
+    g5.fillRect(px - 0.75, top, 1.5, bottom - top);
+  }
+  /**
+   * Write the longest of several texts that fits into a bar; of a running state its beginning.
+   * @param texts the longest first
+   */
+  #text(texts, colour, { left, right, top, bottom }) {
+    const [wide, tall] = [right - left, bottom - top];
+    if (wide <= 14 || tall <= 9) return;
+    const g5 = this.context;
+    const size = tall > 13 ? 11 : 9.5;
+    g5.font = `${size}px Inter, Arial, sans-serif`;
+    const text2 = texts.find((one) => this.#widthOf(one, size) <= wide - 8) ?? "";
+    const shown = text2 || (wide > 26 ? texts.at(-1) ?? "" : "");
+    g5.fillStyle = this.colours.of(colour);
+    g5.textAlign = "left";
+    if (shown) clipped(g5, left, top, wide - 3, tall, () => g5.fillText(shown, left + 4, top + tall / 2 + 0.5));
+    g5.font = FONT2;
+  }
+  /** @param size of the font, which is set [px] */
+  #widthOf(text2, size) {
+    const key = `${size} ${text2}`;
+    let width = this.#widths.get(key);
+    if (width === void 0) {
+      width = this.context.measureText(text2).width;
+      if (this.#widths.size > MOST_WIDTHS) this.#widths.clear();
+      this.#widths.set(key, width);
+    }
+    return width;
+  }
+};
+function rowOf(lane, node, y5) {
+  const rows = rowsOf(lane);
+  const pitch = (laneHeight(lane) - 3) / rows;
+  const top = y5 + 1.5 + (rows > 1 ? lane.children.indexOf(node) : 0) * pitch;
+  return { top, bottom: top + Math.max(1, pitch - (rows > 1 ? Math.min(1.5, pitch / 4) : 0)) };
+}
+function clipped(g5, x3, y5, w5, h5, paint2) {
+  g5.save();
+  g5.beginPath();
+  g5.rect(x3, y5, w5, h5);
+  g5.clip();
+  paint2();
+  g5.restore();
+}
+
+// src/drawing/time_window.ts
+var LIVE_MS = 3e4;
+var SHORTEST_MS3 = 200;
+var LONGEST_MS = 30 * 864e5;
+var TimeWindow = class {
+  length = LIVE_MS;
+  // [ms]
+  end = null;
+  // [ms]; null: now
+  reset() {
+    this.end = null;
+    this.length = LIVE_MS;
+  }
+  /** Show the whole run. */
+  fitAll() {
+    const first = store.data.run.first();
+    const last = store.playback.nowMs();
+    if (first == null) return;
+    this.length = Math.max(500, (last - first) * 1.04);
+    this.end = last + this.length * 0.02;
+  }
+  /** Show a visit with some time around it. @param to [ms] */
+  fit(from, to) {
+    this.length = Math.max(SHORTEST_MS3, (to - from) * 1.1);
+    this.end = (from + to) / 2 + this.length / 2;
+  }
+  /** Show a range [ms]; one that reaches the present of a running machine moves on with it. */
+  show({ from, to }) {
+    const { playback, data } = store;
+    const isLive = playback.cursor.value === null && playback.goes.value && to >= data.liveMs();
+    this.length = Math.max(SHORTEST_MS3, to - from);
+    this.end = isLive ? null : to;
+  }
+  /** The range [ms]. */
+  range() {
+    const now = store.playback.nowMs();
+    const isPast = store.playback.cursor.value !== null;
+    let end = this.end ?? now + this.length * 0.01;
+    if (this.end === null && isPast) end = now + this.length / 2;
+    const first = store.data.run.first();
+    if (this.end === null && !isPast && first != null) end = Math.max(end, first + this.length * 0.98);
+    return [end - this.length, end];
+  }
+  /** Let the range stay where it is. */
+  hold() {
+    this.end ??= this.range()[1];
+  }
+  /** Move the range. @param time [ms] */
+  move(time2) {
+    this.end = this.range()[1] + time2;
+  }
+  /** Make the range longer by a factor, around an instant [ms]. */
+  zoom(factor, at) {
+    const [, to] = this.range();
+    const length = Math.max(SHORTEST_MS3, Math.min(this.length * factor, LONGEST_MS));
+    if (this.end !== null || store.playback.cursor.value !== null) this.end = at + (to - at) * length / this.length;
+    this.length = length;
+  }
+  /** Keep the played instant in view. */
+  keepInView() {
+    const at = store.playback.cursor.value;
+    if (this.end === null || at === null || !store.playback.playing.value) return;
+    if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
+    else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
+  }
+};
+
 // src/drawing/timeline.ts
 var NAMES2 = 168;
 var NAMES_NARROW = 84;
 var RIGHT2 = 14;
+var TOP = 3;
 var FOOT = 26;
-var LANE = 19;
-var ROW = 13;
-var MOST_ROWS = 8;
 var NOTE = 130;
-var THINNEST = 0.5;
-var FAILED = 3;
-var MOST_WIDTHS = 4e3;
-var LIVE_MS = 3e4;
-var SHORTEST_MS3 = 200;
-var LONGEST_MS = 30 * 864e5;
 var STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400];
 var Timeline = class {
   canvas;
   context;
   onPick;
   onDraw;
-  length = LIVE_MS;
-  // shown [ms]
-  end = null;
-  // of the range shown [ms]; null: now
+  window = new TimeWindow();
+  lanes = new Lanes();
+  bars;
   top = 0;
   // vertical scroll [px]
   names = NAMES2;
+  // width of the lanes' names [px]
   scale = null;
   // of the last drawing
   tallest = 0;
   // height of all lanes and the axis [px]
-  lanes = [];
-  // in the order of the tree
-  spansOf = /* @__PURE__ */ new Map();
-  // by path of the lane
-  model = null;
-  spans = null;
-  sorted = 0;
-  // number of spans that are in lanes
-  hits = [];
   gaps = [];
   // outages [px]
-  #widths = /* @__PURE__ */ new Map();
-  // of texts in bars [px]
   #colours = new Colours();
   constructor(canvas2, { onPick, onDraw }) {
     this.canvas = canvas2;
     this.context = canvas2.getContext("2d");
+    this.bars = new Bars(this.context, this.#colours);
     this.onPick = onPick;
     this.onDraw = onDraw;
     canvas2.addEventListener("pointerdown", (e4) => this.#down(e4));
@@ -6516,7 +7403,9 @@ var Timeline = class {
     canvas2.addEventListener("keydown", (e4) => this.#key(e4));
     canvas2.addEventListener("dblclick", (e4) => {
       const span = this.#spanAt(e4);
-      if (span) this.#show(span.from, span.to ?? store.playback.nowMs());
+      if (!span) return;
+      this.window.fit(span.from, span.to ?? store.playback.nowMs());
+      this.draw();
     });
   }
   /** Read the colours again. */
@@ -6524,78 +7413,14 @@ var Timeline = class {
     this.#colours.forget();
   }
   reset() {
-    this.end = null;
-    this.length = LIVE_MS;
+    this.window.reset();
+    this.lanes.forget();
     this.top = 0;
-    this.model = null;
-  }
-  /** Show the whole run. */
-  fitAll() {
-    const first = store.data.run.first();
-    const last = store.playback.nowMs();
-    if (first == null) return;
-    this.length = Math.max(500, (last - first) * 1.04);
-    this.end = last + this.length * 0.02;
-  }
-  /** Show a visit with some time around it. @param to [ms] */
-  #show(from, to) {
-    const length = Math.max(SHORTEST_MS3, (to - from) * 1.1);
-    this.end = (from + to) / 2 + length / 2;
-    this.length = length;
-    this.draw();
-  }
-  /** Show a range [ms]; one that reaches the present of a running machine moves on with it. */
-  showRange({ from, to }) {
-    const isLive = store.playback.cursor.value === null && store.playback.goes.value && to >= store.data.liveMs();
-    this.length = Math.max(SHORTEST_MS3, to - from);
-    this.end = isLive ? null : to;
-    this.draw();
   }
   /** Follow the present. */
   live() {
-    this.end = null;
+    this.window.end = null;
     store.playback.seek(null);
-  }
-  /** The range shown [ms]. */
-  #range() {
-    const now = store.playback.nowMs();
-    let end = this.end ?? now + this.length * 0.01;
-    if (this.end === null && store.playback.cursor.value !== null) end = now + this.length / 2;
-    const first = store.data.run.first();
-    if (this.end === null && store.playback.cursor.value === null && first != null)
-      end = Math.max(end, first + this.length * 0.98);
-    return [end - this.length, end];
-  }
-  /** Keep the played instant in view. */
-  #keepInView() {
-    const at = store.playback.cursor.value;
-    if (this.end === null || at === null || !store.playback.playing.value) return;
-    if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
-    else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
-  }
-  #timeAt(px) {
-    const [from, to] = this.#range();
-    return from + (px - this.names) / (this.canvas.clientWidth - this.names - RIGHT2) * (to - from);
-  }
-  /** Put new spans into lanes; a container gets a lane when a state in it has run. */
-  #makeLanes(model, spans) {
-    if (this.model !== model || this.spans !== spans) {
-      this.spansOf.clear();
-      this.sorted = 0;
-      this.lanes = [];
-    }
-    this.model = model;
-    this.spans = spans;
-    const before = this.spansOf.size;
-    for (; this.sorted < spans.length; this.sorted++) {
-      const span = spans[this.sorted];
-      const lane = model.get(span.path)?.parent?.path;
-      if (lane === void 0) continue;
-      const known2 = this.spansOf.get(lane);
-      if (known2) known2.push(span);
-      else this.spansOf.set(lane, [span]);
-    }
-    if (this.spansOf.size !== before) this.lanes = model.order.filter((node) => this.spansOf.has(node.path));
   }
   /** Tell screen readers the instant shown, as the value of a slider [s]. */
   tellInstant() {
@@ -6606,53 +7431,76 @@ var Timeline = class {
     this.canvas.setAttribute("aria-valuenow", seconds(store.playback.nowMs()));
     this.canvas.setAttribute("aria-valuetext", store.clock.instantText(store.playback.nowMs()));
   }
+  // -- drawing ----------------------------------------------------------------------------------
   draw() {
     const g5 = this.context;
     const model = store.data.model.value;
     const size = fitted(g5);
     if (!size || !model) return;
     const { width, height } = size;
+    const room = height - FOOT;
     this.names = width < 640 ? NAMES_NARROW : NAMES2;
     g5.clearRect(0, 0, width, height);
-    g5.font = "11px Inter, Arial, sans-serif";
+    g5.font = FONT2;
     g5.textBaseline = "middle";
-    this.#makeLanes(model, store.data.run.spans);
-    this.#keepInView();
-    const [from, to] = this.#range();
-    const x3 = (t4) => this.names + (t4 - from) / (to - from) * (width - this.names - RIGHT2);
-    const scale = { from, to, x: x3 };
+    this.window.keepInView();
+    const [from, to] = this.window.range();
+    const [left, right] = [this.names, width - RIGHT2];
+    const x3 = (t4) => left + (t4 - from) / (to - from) * (right - left);
+    const scale = { from, to, left, right, x: x3 };
     this.scale = scale;
     this.#grid(scale, width, height);
-    const tallest = this.lanes.reduce((sum, lane) => sum + laneHeight(lane), 3) + FOOT;
-    if (tallest !== this.tallest) {
-      this.tallest = tallest;
-      document.documentElement.style.setProperty("--lanes", `${tallest}px`);
-    }
-    const room = height - FOOT;
-    const lanes = this.#lanesToShow(scale, room);
-    const all = lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
-    this.top = Math.max(0, Math.min(this.top, all - room));
-    let y5 = 3 - this.top;
-    this.hits = [];
-    this.#clipped(0, 0, width, room, () => {
+    this.lanes.update(model, store.data.run.spans);
+    this.#fitHeight();
+    const lanes = this.lanes.shown(scale, store.view.laneFilter.value, room);
+    this.top = Math.max(0, Math.min(this.top, heightOf(lanes) - room));
+    let y5 = TOP - this.top;
+    this.bars.forget();
+    clipped(g5, 0, 0, width, room, () => {
       for (const lane of lanes) {
         const tall = laneHeight(lane);
-        if (y5 + tall > 0 && y5 < room) this.#lane(lane, y5, tall, scale, width);
+        if (y5 + tall > 0 && y5 < room) this.bars.lane(lane, y5, this.lanes, model, scale);
         y5 += tall;
       }
     });
-    this.#outages(scale, width, room);
-    this.#stretch(x3, height);
-    this.#notes(x3, width, height);
-    this.#cursor(x3, height);
+    this.#outages(scale, room);
+    this.#stretch(scale, height);
+    this.#notes(scale, height);
+    this.#cursor(scale, height);
     this.onDraw({ from, to });
   }
+  /** Tell the page the height of all lanes and the axis: more is left to the plots. */
+  #fitHeight() {
+    const tallest = TOP + heightOf(this.lanes.all) + FOOT;
+    if (tallest === this.tallest) return;
+    this.tallest = tallest;
+    document.documentElement.style.setProperty("--lanes", `${tallest}px`);
+  }
+  #grid({ from, to, x: x3 }, width, height) {
+    const g5 = this.context;
+    const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
+    const widthOf = (s4) => s4 * 1e3 / (to - from) * (width - this.names);
+    const step = 1e3 * (STEPS_S.find((s4) => widthOf(s4) > 74) ?? 86400 * Math.ceil((to - from) / 864e5 / 8));
+    g5.fillStyle = this.#colours.of("muted");
+    g5.strokeStyle = this.#colours.of("hair");
+    g5.textAlign = "left";
+    g5.lineWidth = 1;
+    for (let t4 = begun + Math.ceil((from - begun) / step) * step; t4 < to; t4 += step) {
+      const px = Math.round(x3(t4)) + 0.5;
+      g5.beginPath();
+      g5.moveTo(px, 0);
+      g5.lineTo(px, height - FOOT);
+      g5.stroke();
+      const text2 = store.clock.instantText(t4, step < 1e3 ? 1 : 0);
+      if (px + 3 + g5.measureText(text2).width < width) g5.fillText(text2, px + 3, height - FOOT / 2);
+    }
+  }
   /** Draw the selected stretch. */
-  #stretch(x3, height) {
+  #stretch({ left: begin, x: x3 }, height) {
     const found = store.playback.stretch.value;
     if (!found) return;
     const g5 = this.context;
-    const [left, right] = [found.from, found.to].map((t4) => Math.max(this.names, x3(t4)));
+    const [left, right] = [found.from, found.to].map((t4) => Math.max(begin, x3(t4)));
     g5.fillStyle = this.#colours.of("ink");
     g5.globalAlpha = 0.1;
     g5.fillRect(left, 0, right - left, height - FOOT);
@@ -6661,13 +7509,13 @@ var Timeline = class {
     g5.fillRect(left, height - FOOT, right - left, store.playback.looping.value ? 4 : 2);
   }
   /** Draw the outages. */
-  #outages({ from, to, x: x3 }, width, height) {
+  #outages({ from, to, x: x3, ...edge }, height) {
     const g5 = this.context;
     this.gaps = [];
     for (const [begin, end] of store.data.run.now.outages ?? []) {
       if (end / 1e6 < from || begin / 1e6 > to) continue;
-      const left = Math.max(this.names, x3(begin / 1e6));
-      const right = Math.min(width - RIGHT2, Math.max(x3(end / 1e6), left + 3));
+      const left = Math.max(edge.left, x3(begin / 1e6));
+      const right = Math.min(edge.right, Math.max(x3(end / 1e6), left + 3));
       if (right <= left) continue;
       this.gaps.push([left, right]);
       g5.fillStyle = this.#colours.of("background");
@@ -6690,255 +7538,31 @@ var Timeline = class {
     }
   }
   /** Draw a pin at each note, with its text. */
-  #notes(x3, width, height) {
+  #notes({ left: first, right: last, x: x3 }, height) {
     const g5 = this.context;
     for (const { at, text: text2 } of pins()) {
       const px = x3(at);
-      if (px < this.names || px > width - RIGHT2) continue;
+      if (px < first || px > last) continue;
       g5.fillStyle = this.#colours.of("ink");
       g5.fillRect(px - 0.5, 0, 1, height - FOOT);
       const wide = Math.min(NOTE, g5.measureText(text2).width + 10);
-      const left = px + wide > width - RIGHT2 ? px - wide : px;
+      const left = px + wide > last ? px - wide : px;
       const top = height - FOOT - 16;
       g5.beginPath();
       g5.roundRect(left, top, wide, 15, 3);
       g5.fill();
       g5.fillStyle = this.#colours.of("background");
       g5.textAlign = "left";
-      this.#clipped(left, top, wide - 4, 15, () => g5.fillText(text2, left + 5, top + 8));
+      clipped(g5, left, top, wide - 4, 15, () => g5.fillText(text2, left + 5, top + 8));
     }
-  }
-  #clipped(x3, y5, w5, h5, paint2) {
-    const g5 = this.context;
-    g5.save();
-    g5.beginPath();
-    g5.rect(x3, y5, w5, h5);
-    g5.clip();
-    paint2();
-    g5.restore();
-  }
-  /** The lanes of the names that are looked for; all if there is room, otherwise those with spans in the range. */
-  #lanesToShow({ from, to }, room) {
-    const wanted = store.view.laneFilter.value.toLowerCase().split(/[\s,]+/).filter(Boolean);
-    const named = (lane) => [lane, ...lane.children].some(({ path }) => isNamed(path, wanted));
-    const lanes = wanted.length ? this.lanes.filter(named) : this.lanes;
-    const tall = lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
-    if (tall <= room) return lanes;
-    return lanes.filter((lane) => {
-      const spans = this.spansOf.get(lane.path) ?? [];
-      for (let i4 = firstAfter(spans, from); i4 < spans.length && spans[i4].from <= to; i4++)
-        if ((spans[i4].to ?? Infinity) >= from) return true;
-      return false;
-    });
-  }
-  #grid({ from, to, x: x3 }, width, height) {
-    const g5 = this.context;
-    const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
-    const widthOf = (s4) => s4 * 1e3 / (to - from) * (width - this.names);
-    const step = 1e3 * (STEPS_S.find((s4) => widthOf(s4) > 74) ?? 86400 * Math.ceil((to - from) / 864e5 / 8));
-    g5.fillStyle = this.#colours.of("muted");
-    g5.strokeStyle = this.#colours.of("hair");
-    g5.textAlign = "left";
-    g5.lineWidth = 1;
-    for (let t4 = begun + Math.ceil((from - begun) / step) * step; t4 < to; t4 += step) {
-      const px = Math.round(x3(t4)) + 0.5;
-      g5.beginPath();
-      g5.moveTo(px, 0);
-      g5.lineTo(px, height - FOOT);
-      g5.stroke();
-      const text2 = store.clock.instantText(t4, step < 1e3 ? 1 : 0);
-      if (px + 3 + g5.measureText(text2).width < width) g5.fillText(text2, px + 3, height - FOOT / 2);
-    }
-  }
-  #lane(lane, y5, h5, { from, to, x: x3 }, width) {
-    const g5 = this.context;
-    g5.fillStyle = this.#colours.of("muted");
-    g5.textAlign = "left";
-    const indent = 10 + Math.min(lane.depth, 6) * 9;
-    this.#clipped(0, y5, this.names - 8, h5, () => g5.fillText(lane.name, indent, y5 + h5 / 2));
-    const rows = lane.kind === "concurrence" ? lane.children.length : 1;
-    const spans = this.spansOf.get(lane.path) ?? [];
-    const now = store.playback.nowMs();
-    let lastPx = -10;
-    const failures = [];
-    for (let i4 = firstAfter(spans, from); i4 < spans.length; i4++) {
-      const span = spans[i4];
-      if (span.from > to) break;
-      const later = span.from > now;
-      const ended = span.to !== null && (later || span.to <= now);
-      const until = span.to ?? Math.max(now, store.data.run.last() ?? now);
-      const node = this.model?.get(span.path);
-      if (until < from || !node) continue;
-      const left = Math.max(this.names, x3(span.from));
-      const right = Math.min(width - RIGHT2 + 2, x3(until));
-      const isFailure2 = ended && endClass(node, span.outcome) === "failure";
-      if (rows === 1 && right - lastPx < THINNEST && ended && !isFailure2) continue;
-      lastPx = Math.max(lastPx, right);
-      const row = rows > 1 ? lane.children.indexOf(node) : 0;
-      const pitch = (h5 - 3) / rows;
-      const top = y5 + 1.5 + row * pitch;
-      const tall = Math.max(1, pitch - (rows > 1 ? Math.min(1.5, pitch / 4) : 0));
-      const wide = Math.max(isFailure2 ? FAILED : 2, right - left);
-      const hit = { left, right: left + wide, top, bottom: top + tall, span };
-      const paint2 = () => {
-        g5.globalAlpha = later ? 0.35 : 1;
-        this.#bar(hit, node, ended, x3, later ? Infinity : now);
-        g5.globalAlpha = 1;
-        this.hits.push(hit);
-      };
-      if (isFailure2) failures.push(paint2);
-      else paint2();
-    }
-    for (const paint2 of failures) paint2();
-    this.#waits(lane, y5, h5, rows, { from, to, x: x3 }, width);
-  }
-  /** Draw the times in which the lane's states were paused before they began, or asked. */
-  #waits(lane, y5, h5, rows, { from, to, x: x3 }, width) {
-    const g5 = this.context;
-    const now = store.playback.nowMs();
-    for (const wait of store.data.run.waits) {
-      const until = Math.min(wait.to ?? now, now);
-      if (until < from || wait.from > Math.min(to, now)) continue;
-      const node = this.model?.get(wait.path);
-      if (!node || node.parent?.path !== lane.path) continue;
-      const [left, right] = [Math.max(this.names, x3(wait.from)), Math.min(width - RIGHT2 + 2, x3(until))];
-      const row = rows > 1 ? lane.children.indexOf(node) : 0;
-      const pitch = (h5 - 3) / rows;
-      const [top, tall] = [y5 + 1.5 + row * pitch, Math.max(1, pitch - (rows > 1 ? Math.min(1.5, pitch / 4) : 0))];
-      const wide = Math.max(2, right - left);
-      const asks2 = wait.kind === "asks";
-      const colour = asks2 ? "waiting" : "other";
-      g5.save();
-      g5.beginPath();
-      g5.roundRect(left, top, wide, tall, Math.min(4, tall / 2, wide / 2));
-      g5.fillStyle = this.#colours.of(`${colour}-fill`);
-      g5.fill();
-      g5.clip();
-      g5.strokeStyle = this.#colours.of(colour);
-      if (!asks2) {
-        g5.globalAlpha = 0.35;
-        g5.lineWidth = 2;
-        for (let px = left - tall; px < right; px += 7) {
-          g5.beginPath();
-          g5.moveTo(px, top + tall);
-          g5.lineTo(px + tall, top);
-          g5.stroke();
-        }
-      }
-      g5.restore();
-      g5.strokeStyle = this.#colours.of(colour);
-      g5.setLineDash(asks2 ? [1.5, 2.5] : []);
-      g5.lineWidth = 1.4;
-      g5.stroke();
-      g5.setLineDash([]);
-      const took = duration(Math.max(0, until - wait.from) / 1e3);
-      const words2 = asks2 ? `${node.name} ?` : wait.text;
-      this.#text([`${words2} ${took}`, words2, asks2 ? "?" : ""], `${colour}-text`, left, top, wide, tall);
-    }
-  }
-  /**
-   * Write the longest of several texts that fits into a bar; of a running state its beginning.
-   * @param texts the longest first
-   */
-  #text(texts, colour, left, top, wide, tall) {
-    if (wide <= 14 || tall <= 9) return;
-    const g5 = this.context;
-    const size = tall > 13 ? 11 : 9.5;
-    g5.font = `${size}px Inter, Arial, sans-serif`;
-    const text2 = texts.find((one) => this.#widthOf(one, size) <= wide - 8) ?? "";
-    const shown = text2 || (wide > 26 ? texts.at(-1) ?? "" : "");
-    g5.fillStyle = this.#colours.of(colour);
-    g5.textAlign = "left";
-    if (shown) this.#clipped(left, top, wide - 3, tall, () => g5.fillText(shown, left + 4, top + tall / 2 + 0.5));
-    g5.font = "11px Inter, Arial, sans-serif";
-  }
-  /** @param size of the font, which is set [px] */
-  #widthOf(text2, size) {
-    const key = `${size} ${text2}`;
-    let width = this.#widths.get(key);
-    if (width === void 0) {
-      width = this.context.measureText(text2).width;
-      if (this.#widths.size > MOST_WIDTHS) this.#widths.clear();
-      this.#widths.set(key, width);
-    }
-    return width;
-  }
-  /** @param now the instant shown [ms]; later parts are pale */
-  #bar({ left, right, top, bottom, span }, node, ended, x3, now) {
-    const g5 = this.context;
-    const [wide, tall] = [right - left, bottom - top];
-    const asked2 = span.preempt !== null && span.preempt <= now ? span.preempt : null;
-    const kind = ended ? endClass(node, span.outcome) : asked2 !== null ? "preempted" : "active";
-    g5.fillStyle = this.#colours.of(`${kind}-fill`);
-    g5.strokeStyle = this.#colours.of(kind);
-    g5.lineWidth = 1.1;
-    g5.beginPath();
-    g5.roundRect(left, top, wide, tall, Math.min(4, tall / 2, wide / 2));
-    g5.fill();
-    if (asked2 !== null) {
-      g5.save();
-      g5.clip();
-      g5.fillStyle = this.#colours.of("preempted");
-      g5.globalAlpha *= 0.55;
-      for (let px = Math.max(left, x3(asked2)); px < right; px += 5) g5.fillRect(px, top, 2.5, tall);
-      g5.restore();
-    }
-    g5.stroke();
-    if (store.view.selected.value === span.path) {
-      g5.strokeStyle = this.#colours.of("ink");
-      g5.lineWidth = 2;
-      g5.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
-    }
-    const driver = store.data.scene.colourOf(span.path);
-    if (driver >= 0) {
-      g5.fillStyle = this.#colours.of(`s${1 + driver % COLOURS}`);
-      g5.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
-    }
-    const lit = store.pointer.hovered.value;
-    if (lit?.path === span.path && lit.from === span.from) this.#halo({ left, right, top, bottom });
-    this.#mark(span.serviced, "preempted", x3, now, { right, top, tall });
-    this.#mark(span.abandoned, "failure", x3, now, { right, top, tall });
-    const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? store.playback.nowMs() : now);
-    this.#text(words2, `${kind}-text`, left, top, wide, tall);
-  }
-  /** Draw a ring around the visit that the pointer is on here or in the map. */
-  #halo({ left, right, top, bottom }) {
-    const g5 = this.context;
-    for (const [name, wide] of [
-      ["ink", 4.5],
-      ["halo", 2.5]
-    ]) {
-      g5.strokeStyle = this.#colours.of(name);
-      g5.lineWidth = wide;
-      g5.beginPath();
-      g5.roundRect(left - 1, top - 1, right - left + 2, bottom - top + 2, 4);
-      g5.stroke();
-    }
-  }
-  /** Mark the instant at which a preempt was serviced or the state was abandoned. */
-  #mark(t4, colour, x3, now, { right, top, tall }) {
-    if (t4 === null || t4 > now) return;
-    const g5 = this.context;
-    const px = Math.min(x3(t4), right);
-    g5.fillStyle = this.#colours.of(colour);
-    g5.beginPath();
-    g5.moveTo(px - 3.5, top - 1);
-    g5.lineTo(px + 3.5, top - 1);
-    g5.lineTo(px, top + 5);
-    g5.fill();
-    g5.fillRect(px - 0.75, top, 1.5, tall);
-  }
-  #hover(px) {
-    store.pointer.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
   }
   /** Draw the instants at the pointer and shown. */
-  #cursor(x3, height) {
+  #cursor({ left, right, x: x3 }, height) {
     const at = store.playback.cursor.value;
     const pointed = store.pointer.pointed.value;
-    if (pointed !== null && x3(pointed) >= this.names) this.#flag(x3(pointed), pointed, height, "muted", 1);
+    if (pointed !== null && x3(pointed) >= left) this.#flag(x3(pointed), pointed, height, "muted", 1);
     if (at === null) return;
-    const last = this.canvas.clientWidth - RIGHT2;
-    const px = Math.max(this.names, Math.min(last, x3(at)));
+    const px = Math.max(left, Math.min(right, x3(at)));
     this.#flag(px, at, height, "active", 2);
   }
   /** Draw a line through the lanes, with its instant at the axis. */
@@ -6956,12 +7580,20 @@ var Timeline = class {
     g5.fillStyle = this.#colours.of("background");
     g5.textAlign = "center";
     g5.fillText(text2, middle, height - FOOT / 2 + 0.5);
-    g5.font = "11px Inter, Arial, sans-serif";
+    g5.font = FONT2;
+  }
+  // -- input ------------------------------------------------------------------------------------
+  #timeAt(px) {
+    const [from, to] = this.window.range();
+    return from + (px - this.names) / (this.canvas.clientWidth - this.names - RIGHT2) * (to - from);
+  }
+  #hover(px) {
+    store.pointer.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
   }
   #spanAt(e4) {
     const box = this.canvas.getBoundingClientRect();
     const [px, py] = [e4.clientX - box.left, e4.clientY - box.top];
-    const hit = this.hits.findLast((h5) => px >= h5.left - 1 && px <= h5.right + 1 && py >= h5.top && py <= h5.bottom);
+    const hit = this.bars.hits.findLast((h5) => px >= h5.left - 1 && px <= h5.right + 1 && py >= h5.top && py <= h5.bottom);
     return hit?.span ?? null;
   }
   #down(e4) {
@@ -6972,9 +7604,8 @@ var Timeline = class {
     const begin = this.#timeAt(from);
     const span = this.#spanAt(e4);
     let dragged = false;
-    const [, stop] = this.#range();
-    this.end ??= stop;
-    const seek = (m5) => store.playback.seek(Math.min(this.#timeAt(m5.clientX - left), store.data.run.last() ?? stop));
+    this.window.hold();
+    const seek = (m5) => store.playback.seek(Math.min(this.#timeAt(m5.clientX - left), store.data.run.last() ?? Infinity));
     const move = (m5) => {
       if (Math.abs(m5.clientX - left - from) > 3) dragged = true;
       if (dragged && selects) store.playback.selectStretch(begin, this.#timeAt(m5.clientX - left));
@@ -6993,15 +7624,9 @@ var Timeline = class {
     this.draw();
   }
   #zoom(e4) {
-    const [, to] = this.#range();
-    if (Math.abs(e4.deltaX) > Math.abs(e4.deltaY)) {
-      this.end = to + e4.deltaX / this.canvas.clientWidth * this.length;
-      return;
-    }
-    const at = this.#timeAt(e4.offsetX);
-    const length = Math.max(SHORTEST_MS3, Math.min(this.length * Math.exp(e4.deltaY * 16e-4), LONGEST_MS));
-    if (this.end !== null || store.playback.cursor.value !== null) this.end = at + (to - at) * length / this.length;
-    this.length = length;
+    if (Math.abs(e4.deltaX) > Math.abs(e4.deltaY))
+      this.window.move(e4.deltaX / this.canvas.clientWidth * this.window.length);
+    else this.window.zoom(Math.exp(e4.deltaY * 16e-4), this.#timeAt(e4.offsetX));
   }
   #key(e4) {
     const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20 }[e4.key];
@@ -7014,12 +7639,6 @@ var Timeline = class {
     e4.preventDefault();
   }
 };
-var isNamed = (path, words2) => {
-  const name = path.slice(path.lastIndexOf("/") + 1).toLowerCase();
-  return words2.some((word) => name.includes(word));
-};
-var laneHeight = (lane) => lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(lane.children.length, MOST_ROWS) + 3) : LANE;
-var firstAfter = (spans, t4) => Math.max(0, countWhile(spans, (span) => (span.to ?? Infinity) < t4) - 16);
 function describe2(span) {
   const { from, to, preempt, serviced, abandoned } = span;
   const purpose = purposeOfVisit(span);
@@ -7038,83 +7657,34 @@ function describe2(span) {
 }
 
 // src/drawing/page.ts
-var PANELS_MS = 160;
-var SLOWEST_PANELS_MS = 800;
-var IN_TIME_MS = 25;
-var PANELS_PER_LATE = 8;
-var LATE_PART = 0.1;
-var TEXT_MS = 400;
-var BEAT_MS = 200;
-var BUSY = 15;
-var ANNOUNCE_MS = 1e3;
-var OPENING_MS = 15e3;
-var READABLE3 = 0.55;
-var SLOW_MS = 300;
-var PLAY_MS = 45;
-var ADDRESS_MS = 300;
-var BURST = 500;
 var Page = class {
   map;
   diagram;
+  minimap;
   view;
   timeline;
   strip;
-  changed = /* @__PURE__ */ new Set();
-  // paths to paint
-  flashes = [];
-  // transitions to flash
-  frame = 0;
-  // the requested animation frame
-  askedAt = 0;
-  // time of that request [ms]
-  late = 0;
-  // average lateness of frames [ms]
-  playFrame = 0;
-  // the requested animation frame while playing
-  playedAt = 0;
-  // [ms]
-  drawing = null;
-  // the running layout
-  drawAgain = false;
-  /** What to show after it. */
-  afterLayout = { frame: false, focus: null };
-  toggled = null;
-  // path of the container that is being opened or closed
-  fitted = null;
-  // the view that showed everything
-  hovered = null;
-  // path of the state in the diagram that the pointer is on
-  followIsSet = false;
-  linked = viewOf(location.hash);
-  // the view in the address, until it is shown
-  addressDue;
-  panelsAt = 0;
-  // time of their last update [ms]
-  textAt = 0;
-  announcedAt = 0;
-  newestSeq = 0;
-  panelsDue = 0;
-  mapsDue = 0;
-  openedAt = 0;
-  // time of the machine's arrival [ms]
-  layoutMs = 0;
-  // duration of the last layout
-  latencies = [];
-  // from the event to the paint [ms], for benchmarks
-  arrived = [];
-  // stamps of events to paint
-  painting = [];
-  // stamps of events in the frame that is being painted
-  paintPort = new MessageChannel();
   plots = /* @__PURE__ */ new Set();
-  layout = null;
+  painter;
+  layouts;
+  scheduler;
+  address = new Address();
+  #hovered = null;
+  // path of the state in the diagram that the pointer is on
+  #followIsSet = false;
   /**
    * @param canvas of the timeline
+   * @param floor of the map
+   * @param whole of the strip over the whole run
    */
   constructor(svg2, minimap2, canvas2, floor3, whole2) {
     this.map = new MapView(floor3);
-    this.diagram = new Diagram(svg2, minimap2);
-    this.view = new Viewport(svg2, this.diagram.world, () => this.diagram.showWindow(this.view));
+    this.minimap = new Minimap(minimap2, (x3, y5) => this.view.centre(x3, y5));
+    this.diagram = new Diagram(svg2, (path, active) => this.minimap.light(path, active));
+    this.view = new Viewport(svg2, this.diagram.world, () => {
+      this.diagram.showScale(this.view.k);
+      this.minimap.showWindow(this.view);
+    });
     this.timeline = new Timeline(canvas2, {
       onPick: (path) => this.goTo(path),
       onDraw: (range) => {
@@ -7125,110 +7695,106 @@ var Page = class {
       }
     });
     this.strip = new Strip(whole2, (range) => {
-      if (range) this.timeline.showRange(range);
-      else {
-        this.timeline.fitAll();
-        this.timeline.draw();
-      }
+      if (range) this.timeline.window.show(range);
+      else this.timeline.window.fitAll();
+      this.timeline.draw();
     });
-    this.paintPort.port1.onmessage = () => this.#measureLatency();
+    this.painter = new Painter(this.diagram);
+    this.layouts = new LayoutController(this.diagram, this.minimap, this.view, this.painter);
+    this.scheduler = new Scheduler({
+      painter: this.painter,
+      timeline: this.timeline,
+      map: this.map,
+      minimap: this.minimap,
+      onPanels: () => this.layouts.follow()
+    });
+    this.#listen(svg2, canvas2);
+    this.#subscribe();
+  }
+  /** Listen to the user and to the browser. */
+  #listen(svg2, canvas2) {
     svg2.addEventListener("click", (e4) => {
       if (!this.view.moved) this.select(pathOf(e4));
     });
     svg2.addEventListener("pointermove", (e4) => e4.buttons || this.#hover(pathOf(e4)));
     svg2.addEventListener("pointerleave", () => this.#hover(null));
-    svg2.addEventListener("dblclick", (e4) => this.#toggle(store.data.model.value?.get(pathOf(e4))));
-    minimap2.addEventListener("pointerdown", (e4) => this.#jump(e4));
+    svg2.addEventListener("dblclick", (e4) => this.layouts.toggle(pathOf(e4)));
     new ResizeObserver(() => {
-      if (this.fitted && this.view.is(this.fitted)) {
-        if (this.#isOtherShape()) this.refit();
-        else this.fit({ animate: false });
-      }
-      this.diagram.showWindow(this.view);
+      this.layouts.resized();
       this.timeline.draw();
     }).observe(svg2);
+    new ResizeObserver(() => this.timeline.draw()).observe(canvas2);
     const phone = matchMedia("(max-width: 720px), (max-height: 480px)");
     const look = () => {
       store.view.isPhone.value = phone.matches;
     };
     phone.addEventListener("change", look);
     look();
-    new ResizeObserver(() => this.timeline.draw()).observe(canvas2);
-    const { view: view2, playback, panels: panels2, notes } = store;
-    const chosen2 = [view2.selected, view2.opened, notes.all, playback.stretch, panels2.arrangement, panels2.plotsChosen];
-    for (const one of [...chosen2, playback.instant]) one.subscribe(() => this.#writeAddress());
-    for (const one of [store.notes.all, store.clock.chosen, store.view.laneFilter])
-      one.subscribe(() => this.timeline.draw());
     addEventListener("hashchange", () => {
       readToken();
-      this.linked = viewOf(location.hash);
-      this.#showLinked();
-      this.relayout({ frame: true });
+      this.address.read();
+      this.address.show(() => this.timeline.window.fitAll());
+      this.layouts.refit();
     });
     systemIsDark.addEventListener("change", () => this.#restyle());
-    store.playback.instant.subscribe(() => {
-      this.paintAll();
+  }
+  /** Draw what changes in the store. */
+  #subscribe() {
+    const { data, view: view2, playback, pointer, clock, notes } = store;
+    for (const one of [notes.all, clock.chosen, view2.laneFilter, pointer.pointed, playback.stretch])
+      one.subscribe(() => this.timeline.draw());
+    playback.instant.subscribe(() => {
+      this.painter.paintAll();
       this.timeline.draw();
       this.map.draw();
     });
-    store.playback.playing.subscribe((playing) => {
-      if (playing && !this.playFrame) this.playFrame = requestAnimationFrame((moment) => this.#play(moment));
-    });
-    store.pointer.hovered.subscribe((visit) => {
+    pointer.hovered.subscribe((visit) => {
       this.diagram.mark(visit ? [visit.path] : [], "linked");
       this.timeline.draw();
       this.map.draw();
     });
-    store.pointer.pointed.subscribe(() => this.timeline.draw());
-    store.playback.stretch.subscribe(() => this.timeline.draw());
-    store.data.serversSeen.subscribe(() => this.paintAll());
-    store.data.facts.subscribe(() => this.paintAll());
-    store.data.wayShown.subscribe(() => this.#showWay());
+    for (const one of [data.serversSeen, data.facts]) one.subscribe(() => this.painter.paintAll());
+    data.wayShown.subscribe(() => this.#showWay());
     newest2.subscribe(() => {
       const path = reproduction()?.found?.difference?.path;
-      if (path && store.view.reveal(path)) this.relayout({ frame: true });
-      this.paintAll();
+      if (path && view2.reveal(path)) this.layouts.refit();
+      this.painter.paintAll();
       this.timeline.draw();
     });
   }
   /** Begin; the elements must be in the document, so that the browser loads their fonts. */
   async start() {
-    setInterval(() => this.#beat(), BEAT_MS);
-    this.layout = new Layout(await makeWorker("elk"));
+    this.scheduler.start();
+    this.layouts.start(await makeWorker("elk"));
     await document.fonts.ready;
     await connect({
-      onEvents: (events) => this.takeEvents(events),
+      onEvents: (events) => this.scheduler.takeEvents(events),
       onMachine: () => this.showMachine(),
-      onObserved: (records) => this.takeObserved(records)
+      onObserved: (records) => this.scheduler.takeObserved(records)
     });
   }
-  // -- events -------------------------------------------------------------------------------------
   /** Show the machine in the store. */
   showMachine() {
-    this.openedAt = performance.now();
     store.view.selected.value = null;
-    restart();
-    this.layout?.clear();
+    this.layouts.restart();
     this.timeline.reset();
     store.notes.load();
     store.panels.loadPlots();
     this.map.reset();
-    if (isFile() || store.data.facts.value?.recorded || store.data.run.now.ended != null) this.timeline.fitAll();
-    if (store.data.settings.value.follow && !this.followIsSet) {
+    if (isFile() || store.data.facts.value?.recorded || store.data.run.now.ended != null) this.timeline.window.fitAll();
+    if (store.data.settings.value.follow && !this.#followIsSet) {
       store.view.follow.value = true;
-      this.followIsSet = true;
+      this.#followIsSet = true;
     }
-    this.#showLinked();
-    this.relayout({ frame: true });
+    this.address.show(() => this.timeline.window.fitAll());
+    this.layouts.refit();
   }
-  // -- the address ------------------------------------------------------------------------------
-  /** The address of the view. */
-  address() {
-    const address = new URL(location.href);
-    const name = store.data.facts.value?.name;
-    if (name && !isFile()) address.searchParams.set("machine", name);
-    address.hash = this.#fragment();
-    return String(address);
+  /** Open the containers on the way to the end of the run, and highlight that way. */
+  #showWay() {
+    const way = store.data.wayShown.value;
+    const closed = way.map(({ path }) => store.view.reveal(path)).some(Boolean);
+    if (closed) this.layouts.refit();
+    else if (this.diagram.size) this.diagram.showWay(way);
   }
   /** The title of the view, for a picture. */
   title() {
@@ -7238,317 +7804,11 @@ var Page = class {
   fileName() {
     return `${this.title()} ${store.clock.instantText(store.playback.nowMs())}`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
   }
-  #fragment() {
-    const { view: view2, playback, panels: panels2, notes } = store;
-    const stretch = playback.stretch.value;
-    return fragmentOf({
-      at: playback.cursor.value,
-      selected: view2.selected.value,
-      opened: [...view2.opened.value],
-      notes: notes.all.value,
-      stretch: stretch && [stretch.from, stretch.to],
-      panels: panels2.arrangement.value,
-      plots: panels2.plotsChosen.value
-    });
-  }
-  /** Write the view into the address, a moment after the last change. */
-  #writeAddress() {
-    clearTimeout(this.addressDue);
-    this.addressDue = setTimeout(() => {
-      if (store.data.model.value && !this.linked && store.view.pageShown.value === "machine")
-        history.replaceState(null, "", `#${this.#fragment()}`);
-    }, ADDRESS_MS);
-  }
-  /** Show the view of the address, as far as it exists. */
-  #showLinked() {
-    const model = store.data.model.value;
-    const view2 = this.linked;
-    this.linked = null;
-    if (!view2 || !model) return;
-    const known2 = view2.opened?.filter((path) => model.get(path)?.children.length);
-    if (known2?.length) store.view.keepOpened(new Set(known2));
-    if (view2.notes.length) store.notes.add(view2.notes);
-    if (view2.panels) store.panels.arrangement.value = view2.panels;
-    if (view2.stretch) store.playback.selectStretch(...view2.stretch);
-    if (view2.plots) store.panels.plotsChosen.value = view2.plots;
-    const first = store.data.run.first();
-    const isKept = first !== null && view2.at !== null && view2.at >= first && view2.at <= (store.data.run.last() ?? first) + 1;
-    if (isKept) {
-      this.timeline.fitAll();
-      store.playback.seek(view2.at);
-    } else if (view2.at !== null) store.view.notify("The instant of this link is not in this run", "error");
-    if (view2.selected === null) return;
-    if (model.get(view2.selected)) {
-      store.view.selected.value = view2.selected;
-      store.view.reveal(view2.selected);
-    } else store.view.notify("The state of this link is not in this machine", "error");
-  }
-  takeEvents(events) {
-    const live = store.playback.cursor.value === null && !document.hidden;
-    for (const e4 of events) {
-      this.changed.add(e4.path);
-      if (live && ["Left", "Failed", "Fired"].includes(e4.kind)) this.flashes.push(e4);
-      if (live && events.length < BURST) this.arrived.push(e4.stamp_ns / 1e6);
-    }
-    store.addEvents(events);
-    if (!events.length) this.paintAll();
-    this.#schedule();
-  }
-  takeObserved(records) {
-    store.data.addObserved(records);
-    this.#schedule();
-  }
-  #schedule() {
-    if (this.frame) return;
-    this.askedAt = performance.now();
-    this.frame = requestAnimationFrame(() => this.#draw());
-  }
-  /** Time between two updates of the panels [ms]; longer on a slow browser, as the diagram has priority. */
-  get #panelsPause() {
-    return Math.min(SLOWEST_PANELS_MS, PANELS_MS + PANELS_PER_LATE * Math.max(0, this.late - IN_TIME_MS));
-  }
-  #draw() {
-    this.frame = 0;
-    const moment = performance.now();
-    this.late += LATE_PART * (moment - this.askedAt - this.late);
-    const flashes = this.flashes.splice(0);
-    const arrived = this.arrived.splice(0);
-    if (store.playback.cursor.value === null) {
-      const now = store.playback.nowMs();
-      for (const path of this.changed) this.#paint(path, store.data.run.now, now);
-      this.changed.clear();
-      for (const e4 of flashes)
-        if (e4.kind === "Fired") this.diagram.flashFired(e4.path, e4.transition, moment);
-        else this.diagram.flash(e4.path, e4.kind === "Left" ? e4.outcome : RAISED, moment);
-      if (arrived.length) {
-        this.painting.push(...arrived);
-        this.paintPort.port2.postMessage(0);
-      }
-    }
-    if (this.diagram.endFlashes(moment)) this.#schedule();
-    const pause = this.#panelsPause;
-    if (moment - this.panelsAt > pause) this.#panels(moment);
-    else this.panelsDue ||= setTimeout(() => this.#panels(performance.now()), pause);
-  }
-  #play(moment) {
-    this.playFrame = 0;
-    if (!store.playback.playing.value) return;
-    this.playFrame = requestAnimationFrame((next) => this.#play(next));
-    if (moment - this.playedAt < PLAY_MS) return;
-    this.playedAt = moment;
-    store.playback.playOn(performance.now());
-  }
-  #measureLatency() {
-    const now = performance.timeOrigin + performance.now();
-    for (const stamp of this.painting.splice(0)) this.latencies.push(now - stamp);
-    if (this.latencies.length > 2e4) this.latencies.splice(0, 1e4);
-  }
-  #panels(moment) {
-    clearTimeout(this.panelsDue);
-    this.panelsDue = 0;
-    this.panelsAt = moment;
-    store.playback.tick.value += 1;
-    store.panels.hasMap.value = !store.data.scene.isEmpty;
-    if (moment - this.textAt > TEXT_MS) {
-      this.textAt = moment;
-      store.playback.slowTick.value += 1;
-      const newest3 = store.data.run.events.at(-1)?.seq ?? 0;
-      const isBusy = newest3 - this.newestSeq > 3 * BUSY * (TEXT_MS / 1e3);
-      this.newestSeq = newest3;
-      this.diagram.svg.classList.toggle("busy", isBusy);
-      this.timeline.tellInstant();
-    }
-    this.mapsDue ||= setTimeout(() => {
-      this.mapsDue = 0;
-      this.timeline.draw();
-      this.map.draw();
-      this.diagram.paintMinimap();
-    }, PANELS_MS / 2);
-    this.#announce(moment);
-    this.#follow();
-  }
-  /** Update what changes without events: clocks, the stale badge, closed containers. */
-  #beat() {
-    const data = store.playback.shown();
-    const now = store.playback.nowMs();
-    if (store.playback.cursor.value === null)
-      for (const path of store.status.activePaths.value) {
-        const state = data.states[path];
-        if (state) this.diagram.updateBadge(path, state, now);
-      }
-    if (store.playback.cursor.value === null) this.diagram.paintCards(insideText);
-    if (store.view.numbers.value !== "none") this.#showNumbers();
-    this.#panels(performance.now());
-  }
-  /** Announce the running states to screen readers. */
-  #announce(moment) {
-    const region = document.getElementById("announced");
-    if (!region || moment - this.announcedAt < ANNOUNCE_MS) return;
-    const names = store.status.activeLeaves.value.slice(0, 6).map((path) => store.data.nameOf(path)).join(", ");
-    const text2 = [store.status.runStatus.value.word, names].filter(Boolean).join(": ");
-    if (region.textContent === text2) return;
-    region.textContent = text2;
-    this.announcedAt = moment;
-  }
-  #paint(path, data, now) {
-    this.diagram.paintJoins(path, data.states);
-    this.diagram.paintJoins(containerOf(path), data.states);
-    this.diagram.paintNet(path, data.states[path]);
-    if (!this.diagram.states.has(path)) return;
-    const goal = Object.values(data.goals).findLast((one) => one.path === path && one.ended == null);
-    this.diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
-  }
-  paintAll() {
-    if (!this.diagram.size) return;
-    const data = store.playback.shown();
-    const now = store.playback.nowMs();
-    const running = Object.values(data.goals).filter((goal) => goal.ended == null);
-    const goals = new Map(running.map((goal) => [goal.path, goal]));
-    for (const path of this.diagram.boxes.keys()) {
-      const goal = goals.get(path);
-      this.diagram.paint(path, data.states[path], now, goal, store.status.hasNoServer(goal));
-    }
-    for (const path of this.diagram.joins.keys()) this.diagram.paintJoins(path, data.states);
-    this.diagram.paintCards(insideText);
-    for (const path of this.diagram.boxes.keys()) this.diagram.paintNet(path, data.states[path]);
-    const stops = store.data.facts.value?.control?.breakpoints ?? [];
-    const pathsOf = (some) => some.map(([path]) => path);
-    this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome === null)), "stopped");
-    this.diagram.mark(pathsOf(stops.filter(([, outcome]) => outcome !== null)), "stopped-after");
-    this.diagram.mark(store.view.selected.value ? [store.view.selected.value] : [], "selected");
-    const differing = reproduction()?.found?.difference?.path;
-    this.diagram.mark(differing ? [differing] : [], "differs");
-    this.diagram.showWay(store.data.wayShown.value);
-    this.#showNumbers();
-  }
-  /** Open the containers on the way to the end of the run, and highlight that way. */
-  #showWay() {
-    const closed = store.data.wayShown.value.map(({ path }) => store.view.reveal(path)).some(Boolean);
-    if (closed) this.relayout({ frame: true });
-    else if (this.diagram.size) this.diagram.showWay(store.data.wayShown.value);
-  }
-  #showNumbers() {
-    const { statistics, model } = store.data;
-    const { countOf: countOf2, heatOf } = numbersFor(
-      store.view.numbers.value,
-      store.playback.shown().states,
-      statistics.value,
-      model.value
-    );
-    this.diagram.showNumbers(countOf2, heatOf);
-  }
-  // -- layout -------------------------------------------------------------------------------------
-  /** Lay out and draw the machine; then show all of it, the running states, or one state. */
-  relayout({ frame = false, focus = null } = {}) {
-    if (frame) this.afterLayout.frame = frame;
-    this.afterLayout.focus = focus ?? this.afterLayout.focus;
-    if (this.drawing) this.drawAgain = true;
-    else this.drawing = this.#layoutLoop();
-    return this.drawing;
-  }
-  async #layoutLoop() {
-    try {
-      do {
-        this.drawAgain = false;
-        await this.#layoutOnce();
-        if (this.afterLayout.frame === true && this.#isOtherShape()) this.drawAgain = true;
-      } while (this.drawAgain);
-      const { frame, focus } = this.afterLayout;
-      this.afterLayout = { frame: false, focus: null };
-      const size = this.diagram.size;
-      if (focus) this.#focus(focus);
-      else if (frame === "follow" && size)
-        this.view.frame(boxToFrame(this.diagram, this.view, size), { most: 1.5 });
-      else if (frame) this.fit({ animate: false });
-      const { dataset } = document.documentElement;
-      dataset.drawn = String(Number(dataset.drawn ?? 0) + 1);
-      store.data.failure.value = null;
-    } catch (error) {
-      const text2 = `This machine could not be laid out: ${messageOf(error)}`;
-      if (this.diagram.size)
-        store.view.notify(text2, "error");
-      else store.data.failure.value = text2;
-      console.error(error);
-    } finally {
-      this.drawing = null;
-    }
-  }
-  async #layoutOnce() {
-    const model = store.data.model.value;
-    if (!model || !this.layout) return;
-    const begun = performance.now();
-    if (this.afterLayout.frame) this.layout.choose(this.view.width / this.view.height);
-    const progress = (done, all) => {
-      if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
-    };
-    let open = new Set(store.view.opened.value).add(model.root.path);
-    let result = await this.layout.run(model.root, open, progress);
-    if (this.afterLayout.frame === "follow")
-      while (result && !isLegible(boxesOf(result), this.view)) {
-        const less = oneLevelLess(open);
-        if (!less) break;
-        open = less;
-        store.view.opened.value = less;
-        result = await this.layout.run(model.root, less, progress);
-      }
-    store.view.laidOut.value = null;
-    store.view.overview.value = Boolean(result?.isOverview);
-    this.layoutMs = performance.now() - begun;
-    if (!result || model !== store.data.model.value) return;
-    const anchor = this.#anchor();
-    this.diagram.draw(result, model, store.data.problems.value);
-    this.#hold(anchor);
-    this.paintAll();
-    const size = this.diagram.size;
-    const tooSmall = size !== null && this.view.scaleFor(size) < READABLE3;
-    if (this.afterLayout.frame === true && tooSmall && store.view.openOneLevelLess()) this.drawAgain = true;
-  }
-  /** Keep the state in the middle of the view at its place while a layout moves the others. */
-  #anchor() {
-    const { view: view2, diagram } = this;
-    if (!diagram.size) return null;
-    const x3 = (view2.width / 2 - view2.x) / view2.k;
-    const y5 = (view2.height / 2 - view2.y) / view2.k;
-    const inside = (b3) => x3 >= b3.x && x3 <= b3.x + b3.w && y5 >= b3.y && y5 <= b3.y + b3.h;
-    const path = this.toggled ?? [...diagram.boxes].findLast(([, box2]) => inside(box2))?.[0] ?? null;
-    this.toggled = null;
-    const box = diagram.boxOf(path);
-    return path !== null && box ? { path, x: box.x, y: box.y } : null;
-  }
-  #hold(anchor) {
-    const box = anchor && this.diagram.boxOf(anchor.path);
-    if (!box) return;
-    const { x: x3, y: y5, k: k4 } = this.view;
-    this.view.set(x3 - (box.x - anchor.x) * k4, y5 - (box.y - anchor.y) * k4, k4);
-  }
-  #focus(path) {
-    const box = this.diagram.boxOf(path);
-    if (box) this.view.frame(box, { margin: 110, most: Math.max(1, Math.min(this.view.k, 1.5)) });
-  }
-  #follow() {
-    if (!store.view.follow.value || this.drawing) return;
-    const open = containersToOpen(store.playback.nowMs());
-    if (!open) return;
-    store.view.opened.value = open;
-    this.relayout({ frame: "follow" });
-  }
-  /** Whether the page is just opening and the aspect of its view has changed much since the layout. */
-  #isOtherShape() {
-    const isOpening = performance.now() - this.openedAt < OPENING_MS;
-    return isOpening && this.layout !== null && !this.layout.suits(this.view.width / this.view.height);
-  }
-  /** Show everything, with a layout for the present size of the view. */
-  refit() {
-    this.relayout({ frame: true });
-  }
-  fit({ animate = true } = {}) {
-    if (this.diagram.size) this.fitted = this.view.frame(this.diagram.size, { animate, most: 1.5 });
-  }
-  // -- input --------------------------------------------------------------------------------------
+  // -- states -----------------------------------------------------------------------------------
   /** Set the state of the diagram that the pointer is on: its visit is highlighted everywhere. */
   #hover(path) {
-    if (path !== this.hovered) store.pointer.hoverAt(path);
-    this.hovered = path;
+    if (path !== this.#hovered) store.pointer.hoverAt(path);
+    this.#hovered = path;
   }
   select(path) {
     store.view.selected.value = path;
@@ -7560,8 +7820,8 @@ var Page = class {
     showPage("machine");
     this.select(path);
     store.view.part.value = "machine";
-    if (store.view.reveal(path)) this.relayout({ focus: path });
-    else this.#focus(path);
+    if (store.view.reveal(path)) this.layouts.relayout({ focus: path });
+    else this.layouts.focus(path);
   }
   /** Select the neighbour of the selected state in a direction. */
   selectNeighbour(dx, dy) {
@@ -7570,7 +7830,7 @@ var Page = class {
     const centre = (b3) => ({ x: b3.x + b3.w / 2, y: b3.y + Math.min(b3.h, 30) / 2 });
     const here = centre(from);
     let best = null;
-    for (const [path, box] of this.diagram.boxes) {
+    for (const [path, box] of this.diagram.picture.boxes) {
       if (path === store.view.selected.value) continue;
       const there = centre(box);
       const along = (there.x - here.x) * dx + (there.y - here.y) * dy;
@@ -7580,42 +7840,14 @@ var Page = class {
     }
     if (best) this.select(best.path);
   }
-  toggleSelected() {
-    this.#toggle(store.data.model.value?.get(store.view.selected.value));
+  markHits(paths) {
+    this.diagram.mark(paths, "hit");
   }
-  /** Open or close a container, unless it is the root. */
-  #toggle(node) {
-    if (store.view.overview.value && node) {
-      store.view.openAround(node);
-      this.relayout({ focus: node.path });
-      return;
-    }
-    if (!node?.children.length || !node.parent) return;
-    this.toggled = node.path;
-    store.view.toggle(node.path);
-    this.relayout();
-  }
-  setFollow(on2) {
-    store.view.follow.value = on2;
-    restart();
-    if (on2) this.#follow();
-  }
-  setDepth(levels) {
-    const model = store.data.model.value;
-    if (!model) return;
-    store.view.follow.value = false;
-    store.view.setOpened(model.toDepth(levels));
-    this.relayout({ frame: true });
-  }
-  setImplicit(on2) {
-    store.view.setImplicit(on2);
-    this.layout?.clear();
-    this.relayout();
-  }
+  // -- how it looks -----------------------------------------------------------------------------
   /** @param mode a key of statistics.MODES */
   setNumbers(mode) {
     store.view.numbers.value = mode;
-    this.#showNumbers();
+    this.painter.showNumbers();
   }
   setTheme(name) {
     store.view.theme.value = name;
@@ -7637,20 +7869,6 @@ var Page = class {
   removePlot(plot) {
     this.plots.delete(plot);
     plot.destroy();
-  }
-  markHits(paths) {
-    this.diagram.mark(paths, "hit");
-  }
-  /** Show the place in the minimap that is pressed. */
-  #jump(pressed) {
-    const move = (e4) => {
-      const matrix = this.diagram.minimap.getScreenCTM();
-      if (!matrix) return;
-      const point = new DOMPoint(e4.clientX, e4.clientY).matrixTransform(matrix.inverse());
-      this.view.centre(point.x, point.y);
-    };
-    drag(move);
-    move(pressed);
   }
 };
 var pathOf = (e4) => e4.target instanceof Element ? e4.target.closest("[data-path]")?.getAttribute("data-path") ?? null : null;
@@ -8333,7 +8551,7 @@ function togglePage(name) {
 function listenToKeys(page2) {
   const actions = {
     "/": () => document.getElementById("search")?.focus(),
-    0: () => page2.refit(),
+    0: () => page2.layouts.refit(),
     f: () => store.playback.jump("kind failure", 1),
     F: () => store.playback.jump("kind failure", -1),
     p: () => store.playback.jump("kind preempt", 1),
@@ -8357,21 +8575,21 @@ function listenToKeys(page2) {
     t: () => {
       store.view.treeOpen.value = !store.view.treeOpen.value;
     },
-    o: () => page2.setFollow(!store.view.follow.value),
+    o: () => page2.layouts.setFollow(!store.view.follow.value),
     "+": () => page2.view.zoom(1.25),
     "=": () => page2.view.zoom(1.25),
     "-": () => page2.view.zoom(0.8),
     ",": () => store.playback.seekEvent(-1),
     ".": () => store.playback.seekEvent(1),
     l: () => page2.timeline.live(),
-    i: () => page2.setImplicit(!store.view.implicit.value),
+    i: () => page2.layouts.setImplicit(!store.view.implicit.value),
     h: () => isFile() || togglePage("runs"),
     a: () => isFile() || togglePage("actions"),
     d: () => page2.setTheme(isDark() ? "light" : "dark"),
     "?": () => {
       store.view.help.value = !store.view.help.value;
     },
-    Enter: () => page2.toggleSelected(),
+    Enter: () => page2.layouts.toggle(store.view.selected.value),
     Escape: () => {
       if (confirmation.value) confirmation.value = null;
       else if (store.view.help.value) store.view.help.value = false;
@@ -8414,7 +8632,7 @@ function listenToKeys(page2) {
       const [dx, dy] = ARROWS[e4.key];
       if (store.view.selected.value && !e4.shiftKey) page2.selectNeighbour(dx, dy);
       else page2.view.pan(-dx * STEP, -dy * STEP);
-    } else if (/^[1-9]$/.test(e4.key)) page2.setDepth(Number(e4.key));
+    } else if (/^[1-9]$/.test(e4.key)) page2.layouts.setDepth(Number(e4.key));
     else if (Object.hasOwn(actions, e4.key)) actions[e4.key]();
     else return;
     e4.preventDefault();
@@ -9572,8 +9790,8 @@ function show(page2, payload) {
   store.view.setModel(payload);
   store.view.keepOpened(new Set([...opened2].filter((path) => store.data.model.value?.get(path)?.children.length)));
   page2.select(null);
-  page2.layout?.forget();
-  page2.relayout({ frame: true });
+  page2.layouts.layout?.forget();
+  page2.layouts.relayout({ frame: true });
 }
 function CompareLine({ page: page2, onDone }) {
   const others = store.data.machines.value.filter((machine) => machine.name !== store.data.facts.value?.name);
@@ -9917,7 +10135,7 @@ function save2(content, name) {
 // src/panels/notes.tsx
 function ShareButtons({ page: page2 }) {
   const copy2 = async () => {
-    const address = page2.address();
+    const address = page2.address.text;
     try {
       await navigator.clipboard.writeText(address);
       store.view.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
@@ -11259,12 +11477,12 @@ function commands(page2) {
     item(
       store.view.follow.value ? "Do not follow" : "Follow",
       "o",
-      () => page2.setFollow(!store.view.follow.value),
+      () => page2.layouts.setFollow(!store.view.follow.value),
       "what runs"
     ),
     item("Live", "l", () => page2.timeline.live(), "the present, or the end"),
-    item("Show everything", "0", () => page2.refit()),
-    item("Whole run", "", () => page2.timeline.fitAll(), "in the timeline"),
+    item("Show everything", "0", () => page2.layouts.refit()),
+    item("Whole run", "", () => page2.timeline.window.fitAll(), "in the timeline"),
     item("Next failure", "f", () => store.playback.jump("kind failure", 1)),
     item("Next preempt", "p", () => store.playback.jump("kind preempt", 1)),
     item("Next goal", "g", () => store.playback.jump("kind goal", 1)),
@@ -11274,7 +11492,7 @@ function commands(page2) {
       item("Make a test of this run", "", () => reproduce("test"), "for pytest")
     ] : [],
     item("Note", "n", () => store.notes.begin(), "at the instant shown"),
-    item("Implicit transitions", "i", () => page2.setImplicit(!store.view.implicit.value), "show or hide")
+    item("Implicit transitions", "i", () => page2.layouts.setImplicit(!store.view.implicit.value), "show or hide")
   );
   return found;
 }
@@ -11584,7 +11802,7 @@ var LEGEND_LABEL = pre + "label";
 var LEGEND_VALUE = pre + "value";
 var WIDTH2 = "width";
 var HEIGHT = "height";
-var TOP = "top";
+var TOP2 = "top";
 var BOTTOM = "bottom";
 var LEFT = "left";
 var RIGHT3 = "right";
@@ -14755,7 +14973,7 @@ function uPlot(opts, data, then) {
       if (axis.label != null) {
         let shiftAmt2 = axis.labelGap * shiftDir;
         let baseLpos = round((axis._lpos + shiftAmt2) * pxRatio);
-        setFontStyle(axis.labelFont[0], fillStyle, "center", side == 2 ? TOP : BOTTOM);
+        setFontStyle(axis.labelFont[0], fillStyle, "center", side == 2 ? TOP2 : BOTTOM);
         ctx.save();
         if (ori == 1) {
           x3 = y5 = 0;
@@ -14793,7 +15011,7 @@ function uPlot(opts, data, then) {
       x3 = ori == 1 ? finalPos : 0;
       let font2 = axis.font[0];
       let textAlign = axis.align == 1 ? LEFT : axis.align == 2 ? RIGHT3 : angle > 0 ? LEFT : angle < 0 ? RIGHT3 : ori == 0 ? "center" : side == 3 ? RIGHT3 : LEFT;
-      let textBaseline = angle || ori == 1 ? "middle" : side == 2 ? TOP : BOTTOM;
+      let textBaseline = angle || ori == 1 ? "middle" : side == 2 ? TOP2 : BOTTOM;
       setFontStyle(font2, fillStyle, textAlign, textBaseline);
       let lineHeight = axis.font[1] * axis.lineGap;
       let canOffs = _splits.map((val) => pxRound(getPos(val, scale, plotDim, plotOff)));
@@ -14919,11 +15137,11 @@ function uPlot(opts, data, then) {
     }
     if (shouldSetSize) {
       setStylePx(under, LEFT, plotLftCss);
-      setStylePx(under, TOP, plotTopCss);
+      setStylePx(under, TOP2, plotTopCss);
       setStylePx(under, WIDTH2, plotWidCss);
       setStylePx(under, HEIGHT, plotHgtCss);
       setStylePx(over, LEFT, plotLftCss);
-      setStylePx(over, TOP, plotTopCss);
+      setStylePx(over, TOP2, plotTopCss);
       setStylePx(over, WIDTH2, plotWidCss);
       setStylePx(over, HEIGHT, plotHgtCss);
       setStylePx(wrap, WIDTH2, fullWidCss);
@@ -15227,7 +15445,7 @@ function uPlot(opts, data, then) {
     setStylePx(selectDiv, WIDTH2, select.width = dim);
   }
   function setSelV(off2, dim) {
-    setStylePx(selectDiv, TOP, select.top = off2);
+    setStylePx(selectDiv, TOP2, select.top = off2);
     setStylePx(selectDiv, HEIGHT, select.height = dim);
   }
   let setSelX = scaleX.ori == 0 ? setSelH : setSelV;
@@ -15866,7 +16084,7 @@ uPlot.sync = _sync;
 
 // src/drawing/plot.ts
 var SCALE = 44;
-var FONT2 = "11px Inter, Arial, sans-serif";
+var FONT3 = "11px Inter, Arial, sans-serif";
 var RIGHT4 = 14;
 var Plot = class {
   element;
@@ -15901,7 +16119,7 @@ var Plot = class {
           {
             size: SCALE,
             gap: 4,
-            font: FONT2,
+            font: FONT3,
             space: 24,
             stroke: colour("muted"),
             grid: { stroke: colour("hair"), width: 1 },
@@ -16206,7 +16424,7 @@ function Card({ one, page: page2 }) {
       ] }),
       one.isOpen && /* @__PURE__ */ a4(Ring, { one })
     ] }),
-    one.isOpen && one.has_picture && !isFile() && /* @__PURE__ */ a4(Picture, { one }),
+    one.isOpen && one.has_picture && !isFile() && /* @__PURE__ */ a4(Picture2, { one }),
     one.isOpen ? /* @__PURE__ */ a4(Buttons, { one, sent: sent2, give, page: page2 }) : null,
     /* @__PURE__ */ a4("p", { class: "hint", role: one.isOpen ? void 0 : "status", children: one.isOpen ? /* @__PURE__ */ a4($, { children: [
       "No answer in ",
@@ -16260,7 +16478,7 @@ var Ring = ({ one }) => /* @__PURE__ */ a4("svg", { class: `ring ${isUrgent(one)
   ),
   /* @__PURE__ */ a4("text", { x: "22", y: "27", children: Math.ceil(one.left) })
 ] });
-function Picture({ one }) {
+function Picture2({ one }) {
   const [gone, setGone] = d2(false);
   if (gone) return null;
   const source = link("question", `&path=${encoded2(one.path)}&asked=${one.asked}`);
@@ -16454,7 +16672,7 @@ var FollowButton = ({ page: page2 }) => /* @__PURE__ */ a4(
     class: store.view.follow.value ? "on" : "",
     "aria-pressed": store.view.follow.value,
     title: "follow the running states (o)",
-    onClick: () => page2.setFollow(!store.view.follow.value),
+    onClick: () => page2.layouts.setFollow(!store.view.follow.value),
     children: "Follow"
   }
 );
@@ -16498,7 +16716,7 @@ function ViewMenu({ page: page2 }) {
     setOpen(false);
   };
   const onMachine2 = store.view.pageShown.value === "machine";
-  const onImplicit = (e4) => page2.setImplicit(e4.target.checked);
+  const onImplicit = (e4) => page2.layouts.setImplicit(e4.target.checked);
   const onTheme = (e4) => page2.setTheme(fieldValue(e4));
   return /* @__PURE__ */ a4("div", { class: "menu", ref: box, onFocusOut, children: [
     /* @__PURE__ */ a4("button", { "aria-expanded": open, onClick: () => setOpen(!open), children: "View" }),
@@ -16575,8 +16793,8 @@ function Levels({ page: page2 }) {
   return /* @__PURE__ */ a4("div", { class: "line", children: [
     /* @__PURE__ */ a4("span", { children: "Levels" }),
     /* @__PURE__ */ a4("span", { class: "group", children: [
-      levels.map((level) => /* @__PURE__ */ a4("button", { onClick: () => page2.setDepth(level), children: level })),
-      /* @__PURE__ */ a4("button", { onClick: () => page2.setDepth(ALL_LEVELS), children: "all" })
+      levels.map((level) => /* @__PURE__ */ a4("button", { onClick: () => page2.layouts.setDepth(level), children: level })),
+      /* @__PURE__ */ a4("button", { onClick: () => page2.layouts.setDepth(ALL_LEVELS), children: "all" })
     ] })
   ] });
 }
@@ -16987,7 +17205,7 @@ function StripTools() {
 function TimeTools() {
   const { timeline } = page;
   const showAll = () => {
-    timeline.fitAll();
+    timeline.window.fitAll();
     timeline.draw();
   };
   const addPlot = (id) => store.panels.setPlots([...store.panels.plotsShown.value, [id]]);
@@ -17000,7 +17218,7 @@ function ZoomButtons() {
   return /* @__PURE__ */ a4("span", { class: "zoom", children: [
     /* @__PURE__ */ a4("button", { title: "smaller (-)", "aria-label": "zoom out", onClick: () => page.view.zoom(0.8), children: "−" }),
     /* @__PURE__ */ a4("button", { title: "larger (+)", "aria-label": "zoom in", onClick: () => page.view.zoom(1.25), children: "+" }),
-    /* @__PURE__ */ a4("button", { title: "show everything (0)", onClick: () => page.refit(), children: "Fit" })
+    /* @__PURE__ */ a4("button", { title: "show everything (0)", onClick: () => page.layouts.refit(), children: "Fit" })
   ] });
 }
 var panels = {

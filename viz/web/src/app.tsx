@@ -84,7 +84,7 @@ function StripTools() {
 function TimeTools() {
   const { timeline } = page;
   const showAll = () => {
-    timeline.fitAll();
+    timeline.window.fitAll();
     timeline.draw();
   };
   const addPlot = (id: string) => store.panels.setPlots([...store.panels.plotsShown.value, [id]]);
@@ -107,7 +107,7 @@ function ZoomButtons() {
       <button title="larger (+)" aria-label="zoom in" onClick={() => page.view.zoom(1.25)}>
         +
       </button>
-      <button title="show everything (0)" onClick={() => page.refit()}>
+      <button title="show everything (0)" onClick={() => page.layouts.refit()}>
         Fit
       </button>
     </span>

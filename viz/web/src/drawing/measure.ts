@@ -14,3 +14,10 @@ export function measure(text: string, size: number = 11, bold: boolean = false) 
   widths.set(key, width);
   return width;
 }
+
+/** The beginning of a text that fits into a width. */
+export function fitting(text: string, width: number) {
+  let short = text;
+  while (short.length > 1 && measure(short, 10) > width) short = `${short.slice(0, -2)}\u2026`;
+  return short;
+}

@@ -40,8 +40,8 @@ function show(page: Page, payload: MachinePayload) {
   store.view.setModel(payload);
   store.view.keepOpened(new Set([...opened].filter((path) => store.data.model.value?.get(path)?.children.length)));
   page.select(null);
-  page.layout?.forget();
-  page.relayout({ frame: true });
+  page.layouts.layout?.forget();
+  page.layouts.relayout({ frame: true });
 }
 
 export function CompareLine({ page, onDone }: { page: Page; onDone: () => void }) {

@@ -34,7 +34,7 @@ export function togglePage(name: PageName) {
 export function listenToKeys(page: Page) {
   const actions: Record<string, () => unknown> = {
     "/": () => document.getElementById("search")?.focus(),
-    0: () => page.refit(),
+    0: () => page.layouts.refit(),
     f: () => store.playback.jump("kind failure", 1),
     F: () => store.playback.jump("kind failure", -1),
     p: () => store.playback.jump("kind preempt", 1),
@@ -58,21 +58,21 @@ export function listenToKeys(page: Page) {
     t: () => {
       store.view.treeOpen.value = !store.view.treeOpen.value;
     },
-    o: () => page.setFollow(!store.view.follow.value),
+    o: () => page.layouts.setFollow(!store.view.follow.value),
     "+": () => page.view.zoom(1.25),
     "=": () => page.view.zoom(1.25),
     "-": () => page.view.zoom(0.8),
     ",": () => store.playback.seekEvent(-1),
     ".": () => store.playback.seekEvent(1),
     l: () => page.timeline.live(),
-    i: () => page.setImplicit(!store.view.implicit.value),
+    i: () => page.layouts.setImplicit(!store.view.implicit.value),
     h: () => isFile() || togglePage("runs"),
     a: () => isFile() || togglePage("actions"),
     d: () => page.setTheme(isDark() ? "light" : "dark"),
     "?": () => {
       store.view.help.value = !store.view.help.value;
     },
-    Enter: () => page.toggleSelected(),
+    Enter: () => page.layouts.toggle(store.view.selected.value),
     Escape: () => {
       if (confirmation.value) confirmation.value = null;
       else if (store.view.help.value) store.view.help.value = false;
@@ -117,7 +117,7 @@ export function listenToKeys(page: Page) {
       const [dx, dy] = ARROWS[e.key];
       if (store.view.selected.value && !e.shiftKey) page.selectNeighbour(dx, dy);
       else page.view.pan(-dx * STEP, -dy * STEP);
-    } else if (/^[1-9]$/.test(e.key)) page.setDepth(Number(e.key));
+    } else if (/^[1-9]$/.test(e.key)) page.layouts.setDepth(Number(e.key));
     else if (Object.hasOwn(actions, e.key)) actions[e.key]();
     else return;
     e.preventDefault();

@@ -9,7 +9,7 @@ import { Dialog, fieldValue, Section } from "#panels/components.tsx";
 
 export function ShareButtons({ page }: { page: Page }) {
   const copy = async () => {
-    const address = page.address();
+    const address = page.address.text;
     try {
       await navigator.clipboard.writeText(address);
       store.view.notify(isFile() ? "Link copied, for who has this file" : "Link copied");

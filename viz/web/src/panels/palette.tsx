@@ -58,12 +58,12 @@ function commands(page: Page): Item[] {
     item(
       store.view.follow.value ? "Do not follow" : "Follow",
       "o",
-      () => page.setFollow(!store.view.follow.value),
+      () => page.layouts.setFollow(!store.view.follow.value),
       "what runs",
     ),
     item("Live", "l", () => page.timeline.live(), "the present, or the end"),
-    item("Show everything", "0", () => page.refit()),
-    item("Whole run", "", () => page.timeline.fitAll(), "in the timeline"),
+    item("Show everything", "0", () => page.layouts.refit()),
+    item("Whole run", "", () => page.timeline.window.fitAll(), "in the timeline"),
     item("Next failure", "f", () => store.playback.jump("kind failure", 1)),
     item("Next preempt", "p", () => store.playback.jump("kind preempt", 1)),
     item("Next goal", "g", () => store.playback.jump("kind goal", 1)),
@@ -75,7 +75,7 @@ function commands(page: Page): Item[] {
         ]
       : []),
     item("Note", "n", () => store.notes.begin(), "at the instant shown"),
-    item("Implicit transitions", "i", () => page.setImplicit(!store.view.implicit.value), "show or hide"),
+    item("Implicit transitions", "i", () => page.layouts.setImplicit(!store.view.implicit.value), "show or hide"),
   );
   return found;
 }

@@ -24,7 +24,7 @@ export const FollowButton = ({ page }: { page: Page }) => (
     class={store.view.follow.value ? "on" : ""}
     aria-pressed={store.view.follow.value}
     title="follow the running states (o)"
-    onClick={() => page.setFollow(!store.view.follow.value)}
+    onClick={() => page.layouts.setFollow(!store.view.follow.value)}
   >
     Follow
   </button>
@@ -72,7 +72,7 @@ export function ViewMenu({ page }: { page: Page }) {
     setOpen(false);
   };
   const onMachine = store.view.pageShown.value === "machine";
-  const onImplicit = (e: Event) => page.setImplicit((e.target as HTMLInputElement).checked);
+  const onImplicit = (e: Event) => page.layouts.setImplicit((e.target as HTMLInputElement).checked);
   const onTheme = (e: Event) => page.setTheme(fieldValue(e) as Theme);
   return (
     <div class="menu" ref={box} onFocusOut={onFocusOut}>
@@ -171,9 +171,9 @@ function Levels({ page }: { page: Page }) {
       <span>Levels</span>
       <span class="group">
         {levels.map((level) => (
-          <button onClick={() => page.setDepth(level)}>{level}</button>
+          <button onClick={() => page.layouts.setDepth(level)}>{level}</button>
         ))}
-        <button onClick={() => page.setDepth(ALL_LEVELS)}>all</button>
+        <button onClick={() => page.layouts.setDepth(ALL_LEVELS)}>all</button>
       </span>
     </div>
   );

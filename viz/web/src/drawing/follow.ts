@@ -9,38 +9,42 @@ import type { Viewport } from "#drawing/viewport.ts";
 const SETTLED_MS = 450; // a container is opened after running for this time: brief ones would only flicker
 const PAUSE_MS = 900; // shortest time between two rearrangements
 const READABLE = 0.84; // a little above the scale at which names have 9 px
-let lastOpen = "";
-let rearrangedAt = -Infinity; // [ms]
 
-/** Paths of the containers that should be open; null if nothing is to change. @param now [ms] */
-export function containersToOpen(now: number) {
-  const model = store.data.model.value;
-  const moment = performance.now();
-  if (!model || moment - rearrangedAt < PAUSE_MS) return null;
-  const states = store.playback.shown().states;
-  const open = new Set([model.root.path]);
-  const ended = store.status.activePaths.value.length === 0; // then the containers in which it ended are open
-  for (const path of ended ? store.status.lastLeaves.value.flatMap(around) : store.status.activePaths.value) {
-    const since = ended ? 0 : states[path]?.since;
-    const node = model.get(path);
-    if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
-      open.add(path);
+export class Follow {
+  #lastOpen = "";
+  #rearrangedAt = -Infinity; // [ms]
+
+  /** Paths of the containers that should be open; null if nothing is to change. @param now [ms] */
+  containersToOpen(now: number) {
+    const model = store.data.model.value;
+    const moment = performance.now();
+    if (!model || moment - this.#rearrangedAt < PAUSE_MS) return null;
+    const states = store.playback.shown().states;
+    const open = new Set([model.root.path]);
+    const active = store.status.activePaths.value;
+    const ended = active.length === 0; // then the containers in which it ended are open
+    for (const path of ended ? store.status.lastLeaves.value.flatMap(around) : active) {
+      const since = ended ? 0 : states[path]?.since;
+      const node = model.get(path);
+      if (node?.children.length && !model.isBranch(node) && since != null && now - since / 1e6 > SETTLED_MS)
+        open.add(path);
+    }
+    const key = [...open].sort().join("\n");
+    if (key === this.#lastOpen) return null;
+    this.#lastOpen = key;
+    this.#rearrangedAt = moment;
+    return open;
   }
-  const key = [...open].sort().join("\n");
-  if (key === lastOpen) return null;
-  lastOpen = key;
-  rearrangedAt = moment;
-  return open;
+
+  /** Forget the open containers, so that the next call answers at once. */
+  restart() {
+    this.#lastOpen = "";
+    this.#rearrangedAt = -Infinity;
+  }
 }
 
 /** The containers around a state. */
 const around = (path: string) => store.data.model.value?.ancestors(path).map((node) => node.path) ?? [];
-
-/** Forget the open containers, so that the next call answers at once. */
-export function restart() {
-  lastOpen = "";
-  rearrangedAt = -Infinity;
-}
 
 /** The box around all running states; a state in a closed container counts as that container. */
 function boxOfActive(boxes: Map<string, Box>): Box | null {
@@ -78,7 +82,7 @@ export function oneLevelLess(open: Set<string>) {
 export function boxToFrame(diagram: Diagram, view: Viewport, whole: Box) {
   const leaves = store.status.lastLeaves.value;
   const model = store.data.model.value;
-  const active = boxOfActive(diagram.boxes);
+  const active = boxOfActive(diagram.picture.boxes);
   if (!active || !model) return whole;
   const shared = model.ancestors(leaves[0]).filter((node) => leaves.every((leaf) => leaf.startsWith(`${node.path}/`)));
   for (const { path } of shared) {
