@@ -1,8 +1,24 @@
 // Data that Python's tests share (tests/viz/live/test_page_fixtures.py).
 import { readFileSync } from "node:fs";
-import type { RunEvent } from "#core/types.ts";
+import type { MachineFacts, RunEvent } from "#core/types.ts";
 
 export const fixture = (name: string): any => JSON.parse(readFileSync(`../../tests/data/${name}`, "utf-8"));
+
+export const FACTS: MachineFacts = {
+  name: "one",
+  label: "PATROL",
+  epoch: "1",
+  revision: 1,
+  stale: null,
+  control: null,
+  recorded: false,
+  node: "",
+  behind: null,
+  before: null,
+  after: null,
+  refused: 0,
+  refusal: "",
+};
 
 let seq = 0;
 /** An event, a second after the one before. */

@@ -1,24 +1,8 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
-import { store } from "#core/store.ts";
-import type { MachineFacts, RunEvent } from "#core/types.ts";
-import { event, fixture } from "./fixtures.ts";
-
-const FACTS: MachineFacts = {
-  name: "one",
-  label: "PATROL",
-  epoch: "1",
-  revision: 1,
-  stale: null,
-  control: null,
-  recorded: false,
-  node: "",
-  behind: null,
-  before: null,
-  after: null,
-  refused: 0,
-  refusal: "",
-};
+import { createStore, store } from "#core/store.ts";
+import type { RunEvent } from "#core/types.ts";
+import { event, FACTS, fixture } from "./fixtures.ts";
 
 let events: RunEvent[] = [];
 
@@ -133,4 +117,13 @@ test("where a run ended is in the state that was left last, not in one whose nam
   store.startRun(null, [...began, ...ends]);
   store.playback.tick.value += 1;
   assert.deepEqual(store.status.lastLeaves.value, ["/JOB/A"]);
+});
+
+test("a store knows nothing of another one", () => {
+  const other = createStore();
+  other.startRun(null, [event("Started", "/OTHER")]);
+  other.view.selected.value = "/OTHER";
+  assert.deepEqual(other.status.activePaths.value, ["/OTHER"]);
+  assert.equal(store.view.selected.value, null);
+  assert.ok(!store.data.run.events.some((one) => one.path === "/OTHER"));
 });

@@ -1,0 +1,94 @@
+import "./browser.ts";
+import assert from "node:assert/strict";
+import { beforeEach, test } from "node:test";
+import { store } from "#core/store.ts";
+import { MapView } from "#drawing/map.ts";
+import { Timeline } from "#drawing/timeline.ts";
+import { canvasOf, Paper } from "./browser.ts";
+import { event, FACTS, fixture } from "./fixtures.ts";
+
+const A = "/PATROL/ROUND/DRIVE";
+
+beforeEach(() => {
+  store.data.facts.value = { ...FACTS, recorded: true };
+  store.view.setModel(fixture("page_model.json"));
+  store.startRun(null, [
+    event("Started", "/PATROL"),
+    event("Entered", "/PATROL/ROUND"),
+    event("Entered", A),
+    event("Left", A, { outcome: "aborted" }),
+    event("Left", "/PATROL/ROUND", { outcome: "aborted" }),
+    event("Entered", "/PATROL/DOCK"),
+    event("QuestionAsked", "/PATROL/DOCK", { text: "Dock?" }),
+    event("QuestionAnswered", "/PATROL/DOCK", { answer: "yes", by: "ann" }),
+    event("Noted", "/PATROL/DOCK", { text: "bay 2" }),
+    event("Left", "/PATROL/DOCK", { outcome: "succeeded" }),
+  ]);
+});
+
+/** A timeline of the whole run, after it was drawn. */
+function drawn() {
+  const paper = new Paper();
+  const timeline = new Timeline(canvasOf(paper, 1000, 200), { onPick: () => {}, onDraw: () => {} });
+  timeline.window.fitAll();
+  timeline.draw();
+  return { timeline, paper };
+}
+
+test("the timeline names its lanes, and each bar what it is for and how long it took", () => {
+  const { texts } = drawn().paper;
+  for (const text of ["PATROL", "ROUND", "DRIVE 1.0 s", "DOCK \u2192 bay 2 4.0 s", "DOCK ? 1.0 s"])
+    assert.ok(texts.includes(text), `${text} in ${texts.join(", ")}`);
+});
+
+test("bars have the colours of their outcomes and the width of their time", () => {
+  const { timeline, paper } = drawn();
+  const [failed, docked] = [A, "/PATROL/DOCK"].map((path) => timeline.bars.hits.find((hit) => hit.span.path === path));
+  assert.ok(failed && docked);
+  assert.ok(Math.abs((docked.right - docked.left) / (failed.right - failed.left) - 4) < 0.01);
+  const colourOf = (x: number) => paper.bars.find((bar) => bar.x === x && bar.h > 10)?.colour;
+  assert.equal(colourOf(failed.left), "failure-fill");
+  assert.equal(colourOf(docked.left), "success-fill");
+});
+
+test("the axis tells instants since the begin, and the instant shown has a flag", () => {
+  assert.ok(drawn().paper.texts.includes("00:02"));
+  store.playback.seek((store.data.run.first() ?? 0) + 2500);
+  assert.ok(drawn().paper.texts.includes("00:02.5"));
+});
+
+test("notes stand where they were made", () => {
+  store.notes.add([{ at: (store.data.run.first() ?? 0) + 1000, text: "hit a chair" }]);
+  assert.ok(drawn().paper.texts.includes("hit a chair"));
+  store.notes.remove(store.notes.all.value[0]);
+});
+
+test("a wheel zooms around the instant below it", () => {
+  const { timeline } = drawn();
+  const { window } = timeline;
+  const [from, to] = window.range();
+  const middle = (from + to) / 2;
+  window.zoom(0.5, middle);
+  const [a, b] = window.range();
+  assert.ok(Math.abs((a + b) / 2 - middle) < 1);
+  assert.ok(Math.abs(2 * (b - a) - (to - from)) < 1);
+  for (let i = 0; i < 99; i++) window.zoom(0.1, middle);
+  assert.equal(window.length, 200); // at least
+});
+
+test("the map writes the names of goals beside them", () => {
+  const goal = { target_pose: { pose: { position: { x: 3, y: 1 }, orientation: {} } } };
+  const sent = { action: "/move_base", goal_id: "1", goal };
+  store.addEvents([
+    event("UserdataWritten", A, { key: "places", value: { kitchen: { x: 3, y: 1 } } }),
+    event("Entered", A),
+    event("GoalSent", A, sent),
+  ]);
+  const paper = new Paper();
+  const map = new MapView(canvasOf(paper, 400, 300));
+  map.draw();
+  assert.ok(
+    paper.texts.some((text) => text.includes("kitchen")),
+    paper.texts.join(", "),
+  );
+});
