@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 from smachpy.events.run_state import RAISED
 from smachpy_viz.model.labels import end_class, html_text
 from smachpy_viz.pictures.drawing import picture
-from smachpy_viz.pictures.theme import LIGHT
+from smachpy_viz.pictures.theme import DARK, LIGHT
 from smachpy_viz.runs import charts
+from smachpy_viz.runs import concluding_charts as concluding
 from smachpy_viz.runs.compare import ComparedRun, unite
+from smachpy_viz.runs.conclusion import End, bounds, by_cause, end_of, headline
 from smachpy_viz.runs.statistics import Statistics, marks_of, quantile
 
 if TYPE_CHECKING:
@@ -23,8 +25,8 @@ if TYPE_CHECKING:
     from smachpy.events.recording import Recording
 
 STYLE = f"""
-body {{ font: 13px/20px Inter, system-ui, sans-serif; color: {LIGHT.ink}; margin: 24px auto;
-  max-width: 960px; padding: 0 16px; }}
+body {{ background: {LIGHT.background}; color: {LIGHT.ink}; margin: 24px auto;
+  font: 13px/20px Inter, system-ui, sans-serif; max-width: 960px; padding: 0 16px; }}
 h1 {{ font-size: 20px; }} h2 {{ font-size: 15px; margin-top: 32px; }}
 table {{ border-collapse: collapse; }} th, td {{ padding: 2px 16px 2px 0; text-align: left; }}
 td.n, th.n {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
@@ -32,8 +34,24 @@ td.n, th.n {{ text-align: right; white-space: nowrap; font-variant-numeric: tabu
 .preempted {{ color: {LIGHT.preempted.text}; }} .muted {{ color: {LIGHT.muted}; }}
 .chart {{ width: 100%; font-size: 11px; }} .bars {{ fill: {LIGHT.active.stroke}; }}
 .ribbons path {{ fill: {LIGHT.edge}; opacity: .25; }} .ribbons path:hover {{ opacity: .6; }}
+.headline {{ font-size: 20px; line-height: 28px; font-weight: 660; margin: 8px 0; }}
+.dots circle {{ fill: {LIGHT.success.stroke}; }} .dots text {{ fill: {LIGHT.failure.stroke};
+  font-weight: 700; font-size: 14px; text-anchor: middle; dominant-baseline: middle; }}
+.dots text.axis {{ fill: {LIGHT.muted}; font-weight: 400; font-size: 11px; }}
+.dots line {{ stroke: {LIGHT.border}; opacity: .5; }} .dots .bound {{ fill: {LIGHT.failure.fill}; }}
+a {{ color: inherit; }} :target {{ background: {LIGHT.preempted.fill}; }}
+@media (prefers-color-scheme: dark) {{ body {{ background: {DARK.background}; color: {DARK.ink}; }}
+  .muted {{ color: {DARK.muted}; }} .success {{ color: {DARK.success.text}; }}
+  .failure {{ color: {DARK.failure.text}; }} .preempted {{ color: {DARK.preempted.text}; }}
+  .chart:not(.dots), .machine {{ background: {LIGHT.background}; color: {LIGHT.ink}; }}
+  .dots circle {{ fill: {DARK.success.stroke}; }} .dots text {{ fill: {DARK.failure.stroke}; }}
+  .dots text.axis {{ fill: {DARK.muted}; }} .dots .bound {{ fill: {DARK.failure.fill}; }} }}
 .machine svg {{ max-width: 100%; height: auto; }} .wide {{ overflow-x: auto; }}
 """
+
+
+MOST_LINKS = 12
+"""Runs of a cause that are named."""
 
 
 @dataclass(slots=True)
@@ -45,12 +63,14 @@ class MachineRuns:
         statistics: Statistics of all runs.
         ways: For each run the visited children of the root in order, and the outcome.
         files: For each run the file, the outcome and the duration [s], None if it has not ended.
+        ends: For each run how it ended.
     """
 
     record: StateRecord
     statistics: Statistics = field(default_factory=Statistics)
     ways: list[tuple[list[str], str]] = field(default_factory=list)
     files: list[tuple[str, str, float | None]] = field(default_factory=list)
+    ends: list[End] = field(default_factory=list)
 
 
 def collect(recordings: Iterable[Recording]) -> dict[str, MachineRuns]:
@@ -67,6 +87,7 @@ def collect(recordings: Iterable[Recording]) -> dict[str, MachineRuns]:
                 outcome = event.get("outcome") or RAISED
                 seconds = (event["stamp_ns"] - recording.events[0]["stamp_ns"]) / 1e9
         runs.ways.append((way, outcome))
+        runs.ends.append(end_of(recording.record, recording.events))
         runs.files.append((str(recording.path), outcome, seconds))
     return found
 
@@ -103,7 +124,11 @@ def report(
               ("heat", "the warmer, the longer in all"))  # fmt: skip
     drawn = picture(runs.record, "svg", run=marks, legend=legend).decode()
     seconds = {path: sum(s.durations) for path, s in runs.statistics.states.items()}
+    numbers = _numbers(runs, values or {})
     sections = [
+        ("Failures by first cause", _causes(runs)),
+        ("What decides", _scatter(runs, numbers)),
+        ("Where they ended", concluding.places(runs.ends)),
         ("Outcomes", _outcomes(runs)),
         *([("What varied", _varied(runs, values))] if values else []),
         ("Ways taken", charts.ways(runs.ways)),
@@ -122,8 +147,60 @@ def report(
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
         "style-src 'unsafe-inline'\">"
         f"<title>{name}: {runs.statistics.runs} runs</title><style>{STYLE}</style></head>"
-        f"<body><h1>{name}: {runs.statistics.runs} runs</h1>{body}</body></html>\n"
+        f"<body><h1>{name}: {runs.statistics.runs} runs</h1>{_head(runs, numbers)}{body}"
+        "</body></html>\n"
     )
+
+
+def _numbers(
+    runs: MachineRuns, values: Mapping[str, Mapping[str, object]]
+) -> list[dict[str, float]]:
+    """Return the varied numbers of each run."""
+    return [
+        {
+            key: float(value)
+            for key, value in values.get(file, {}).items()
+            if isinstance(value, int | float) and not isinstance(value, bool)
+        }
+        for file, _, _ in runs.files
+    ]
+
+
+def _head(runs: MachineRuns, numbers: list[dict[str, float]]) -> str:
+    if not runs.ends:
+        return ""
+    good, shared = (html_text(text) for text in headline(runs.ends, numbers))
+    sentence = f'<p class="headline"><b class="success">{good}</b> {shared}</p>'
+    return sentence + concluding.squares(runs.ends)
+
+
+def _causes(runs: MachineRuns) -> str:
+    rows = []
+    for end, failed in by_cause(runs.ends):
+        links = [
+            f'<a href="#run-{number}">{number + 1}</a> {runs.ends[number].at:.1f} s'
+            for number in failed[:MOST_LINKS]
+        ]
+        more = f" and {len(failed) - MOST_LINKS} more" if len(failed) > MOST_LINKS else ""
+        cause = html_text(end.cause or "unknown")
+        place = (
+            f'<span title="{html_text(end.path)}">{html_text(end.path.rpartition("/")[2])}</span>'
+        )
+        rows.append([str(len(failed)), cause, place, ", ".join(links) + more])
+    if not rows:
+        return ""
+    return (
+        f'<div class="wide">{_table(["runs", "first cause", "state", "run, and when"], rows)}</div>'
+    )
+
+
+def _scatter(runs: MachineRuns, numbers: list[dict[str, float]]) -> str:
+    """The two varied values that part good runs and failures best, else the first two."""
+    kinds = by_cause(runs.ends)
+    shared = bounds(runs.ends, kinds[0][1], numbers) if kinds else ()
+    keys = list(dict.fromkeys([*(one.key for one in shared), *(k for n in numbers for k in n)]))
+    there = [key for key in keys if all(key in one for one in numbers)][:2]
+    return concluding.scatter(runs.ends, numbers, there, shared) if there else ""
 
 
 def _outcomes(runs: MachineRuns) -> str:
@@ -201,12 +278,16 @@ def _files(runs: MachineRuns, values: Mapping[str, Mapping[str, object]]) -> str
     # Names are relative to the folder that all files share: whole paths would fill the table.
     places = [Path(file).absolute() for file, _, _ in runs.files]
     common = os.path.commonpath([place.parent for place in places]) if places else ""
-    for place, (file, outcome, seconds) in zip(places, runs.files, strict=True):
+    for number, (place, one) in enumerate(zip(places, runs.files, strict=True)):
+        file, outcome, seconds = one
         name = str(place.relative_to(common))
         chosen = ", ".join(f"{key} {_short(v)}" for key, v in values.get(file, {}).items())
         took = "" if seconds is None else f"{seconds:.1f} s"
-        rows.append([html_text(name), _coloured(outcome, runs.record), took, html_text(chosen)])
-    return _table(["file", "outcome", "time", *(["values"] if values else [])], rows)
+        here = f'<span id="run-{number}">{number + 1}</span>'
+        rows.append(
+            [here, html_text(name), _coloured(outcome, runs.record), took, html_text(chosen)]
+        )
+    return _table(["run", "file", "outcome", "time", *(["values"] if values else [])], rows)
 
 
 def _short(value: object) -> str:
