@@ -183,6 +183,7 @@ class ClientGoalHandle:
         feedback: Feedback that was not taken yet, None before the first; guarded by the manager's
             lock.
         wants_feedback: Feedback reaches code of the program; else it is only shown.
+        cancel_if_lost: The server is to cancel the goal when this client dies.
         keeps_result: The server is to keep the result until `acknowledge` is called.
         calls_back: The goal has callbacks, which `wait` waits for.
         settled: The goal is over and its last callback has returned, or it is no longer followed.
@@ -201,6 +202,7 @@ class ClientGoalHandle:
     on_feedback: Callable[[], object] | None = None
     feedback: Backlog[Any] | None = None
     wants_feedback: bool = True
+    cancel_if_lost: bool = False
     keeps_result: bool = False
     calls_back: bool = False
     settled: bool = False
@@ -692,7 +694,12 @@ class GoalManager:
             self._count(handle.owner, 1)
         if receiver is not None:
             self.port.send_goal(
-                goal.id, goal.stamp_ns, handle.body, receiver.server, age=now - goal.made_at
+                goal.id,
+                goal.stamp_ns,
+                handle.body,
+                receiver.server,
+                age=now - goal.made_at,
+                cancel_if_lost=handle.cancel_if_lost,
             )
         elif duty is Duty.ASK:
             self._fulfil(handle, duty)
@@ -1209,7 +1216,13 @@ class GoalManager:
             if receiver is not None:
                 age = now - goal.made_at
                 self.port.send_goal(
-                    goal.id, goal.stamp_ns, handle.body, receiver.server, age=age, wait=wait
+                    goal.id,
+                    goal.stamp_ns,
+                    handle.body,
+                    receiver.server,
+                    age=age,
+                    wait=wait,
+                    cancel_if_lost=handle.cancel_if_lost,
                 )
         if Duty.ASK in duty and not handle.asking:
             handle.asking = True
@@ -1363,6 +1376,7 @@ class ActionClient(Generic[A_co]):
         feedback_cb: Callable[[ClientGoalHandle, Any], object] | None = None,
         *,
         ack_timeout: float | Duration | None = None,
+        cancel_on_client_lost: bool = False,
     ) -> ClientGoalHandle:
         """Send a goal. Without a server, it is sent when one appears.
 
@@ -1372,6 +1386,9 @@ class ActionClient(Generic[A_co]):
             feedback_cb: Called with the handle and each XFeedback message.
             ack_timeout: Time within which a server must take the goal [s], else it is LOST. None:
                 no limit; 0: it is LOST at once.
+            cancel_on_client_lost: The server cancels the goal if this client dies or is cut off,
+                whatever its own `on_client_lost` says. Servers of other programs, such as those of
+                ROS, do not know this.
 
         Raises:
             ActionException: `goal` is not of the action's type.
@@ -1381,7 +1398,8 @@ class ActionClient(Generic[A_co]):
             TransportError: the client is stopped.
         """
         limit = check_limit(f"action '{self.ns}'", "ack_timeout", ack_timeout)
-        return self._begin(self.make_goal(goal, limit), transition_cb, feedback_cb)
+        handle = self.make_goal(goal, limit, cancel_on_client_lost=cancel_on_client_lost)
+        return self._begin(handle, transition_cb, feedback_cb)
 
     def attach(
         self,
@@ -1426,13 +1444,18 @@ class ActionClient(Generic[A_co]):
         return handle
 
     def send(
-        self: ActionClient[Spec[G, R, F]], goal: G, *, timeout: float | Duration | None = None
+        self: ActionClient[Spec[G, R, F]],
+        goal: G,
+        *,
+        timeout: float | Duration | None = None,
+        cancel_on_client_lost: bool = False,
     ) -> SentGoal[R, F]:
         """Send a goal for use in a `with` or `async with` block, which cancels it when left early.
 
         Args:
             goal: The goal message (XGoal).
             timeout: Longest time to its end [s], the wait for a server included; None: no limit.
+            cancel_on_client_lost: See `send_goal`.
 
         Raises:
             ActionException: `goal` is not of the action's type.
@@ -1441,7 +1464,8 @@ class ActionClient(Generic[A_co]):
             TransportError: the client is stopped.
         """
         limit = check_limit(f"action '{self.ns}'", "timeout", timeout)
-        return self._send(self.make_goal(goal), limit)
+        handle = self.make_goal(goal, cancel_on_client_lost=cancel_on_client_lost)
+        return self._send(handle, limit)
 
     def follow(
         self: ActionClient[Spec[G, R, F]], goal_id: str, *, timeout: float | Duration | None = None
@@ -1468,12 +1492,15 @@ class ActionClient(Generic[A_co]):
         stamp = time if isinstance(time, Time) else Time.from_sec(time)
         self.manager.cancel_many(stamp.to_nsec())
 
-    def make_goal(self, goal: Any, ack_timeout: float | None = None) -> ClientGoalHandle:
+    def make_goal(
+        self, goal: Any, ack_timeout: float | None = None, *, cancel_on_client_lost: bool = False
+    ) -> ClientGoalHandle:
         """Return a handle for a new goal, which `manager.begin` sends.
 
         Args:
             goal: The goal message (XGoal). It is packed here: later changes have no effect.
             ack_timeout: See `send_goal` [s].
+            cancel_on_client_lost: See `send_goal`.
 
         Raises:
             ActionException: `goal` is not of the action's type.
@@ -1489,7 +1516,8 @@ class ActionClient(Generic[A_co]):
         life = ClientGoal(goal_id, stamp_ns, made_at=made_at, ack_timeout=ack_timeout)
         if border.listeners:
             border.tell("goal", self.node, self.ns, self.types.action._type, goal_id, goal)
-        return ClientGoalHandle(self._owner, life, self.manager.port.pack_goal(goal))
+        body = self.manager.port.pack_goal(goal)
+        return ClientGoalHandle(self._owner, life, body, cancel_if_lost=cancel_on_client_lost)
 
     def find_goal(self, goal_id: str, ack_timeout: float | None = None) -> ClientGoalHandle:
         """Return a handle for a goal sent earlier, for which `manager.begin` queries the server.

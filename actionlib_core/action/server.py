@@ -695,7 +695,14 @@ class GoalKeeper:
     # -- messages (on the network's thread) ----------------------------------------------------
 
     def on_goal(
-        self, goal_id: str, stamp_ns: int, content: Any, client: str, age: float = 0.0
+        self,
+        goal_id: str,
+        stamp_ns: int,
+        content: Any,
+        client: str,
+        age: float = 0.0,
+        *,
+        cancel_if_lost: bool = False,
     ) -> bool:
         """Handle a goal: deliver a new one, answer a repetition with its status or result.
 
@@ -714,6 +721,7 @@ class GoalKeeper:
             client=client,
             made_at=now - age,
             age=age,
+            cancel_if_lost=cancel_if_lost,
         )
         with self.lock:
             if self.stopped:
@@ -775,11 +783,11 @@ class GoalKeeper:
 
     def on_client_lost(self, client: str) -> None:
         """Handle the death of a client."""
-        if self._cancels_lost:
-            with self.lock:
-                asked = self.goals.on_client_lost(client)
-                for goal in asked:
-                    goal.text = TEXT_CLIENT_LOST
+        with self.lock:
+            asked = self.goals.on_client_lost(client, every=self._cancels_lost)
+            for goal in asked:
+                goal.text = TEXT_CLIENT_LOST
+        if asked:
             self._cancel(asked)
 
     def _cancel(self, asked: list[ServerGoal]) -> None:

@@ -151,6 +151,7 @@ class SimpleActionClient(Generic[A_co]):
         feedback_cb: Callable[[F], object] | None = None,
         *,
         ack_timeout: float | Duration | None = None,
+        cancel_on_client_lost: bool = False,
     ) -> None:
         """Send a goal; the previous goal is no longer followed, but is not cancelled.
 
@@ -167,6 +168,7 @@ class SimpleActionClient(Generic[A_co]):
                 logged and counted in `dropped_feedback`.
             ack_timeout: Time within which a server must take the goal [s], else it is LOST. None:
                 no limit; 0: it is LOST at once.
+            cancel_on_client_lost: See `ActionClient.send_goal`.
 
         Raises:
             ActionException: `goal` is not of the action's type.
@@ -175,7 +177,7 @@ class SimpleActionClient(Generic[A_co]):
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
-        make = self.action_client.make_goal
+        make = partial(self.action_client.make_goal, cancel_on_client_lost=cancel_on_client_lost)
         self._begin(make, goal, done_cb, active_cb, feedback_cb, ack_timeout)
 
     def attach(

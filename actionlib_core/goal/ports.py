@@ -105,8 +105,11 @@ class ClientPort(Protocol):
         *,
         age: float = 0.0,
         wait: bool = True,
+        cancel_if_lost: bool = False,
     ) -> None:
         """Send a goal, made `age` [s] ago, to one server; None: to a server without a token.
+
+        With `cancel_if_lost` the server is to cancel it when this client dies.
 
         Blocks: with `wait`, while a link is full; without, the goal is then dropped.
         """
@@ -231,7 +234,14 @@ class ServerListener(Protocol):
     """The server's side of the port."""
 
     def on_goal(
-        self, goal_id: str, stamp_ns: int, content: Any, client: str, age: float = 0.0
+        self,
+        goal_id: str,
+        stamp_ns: int,
+        content: Any,
+        client: str,
+        age: float = 0.0,
+        *,
+        cancel_if_lost: bool = False,
     ) -> bool:
         """Handle a goal.
 
@@ -241,6 +251,7 @@ class ServerListener(Protocol):
             content: The goal message.
             client: Identifies its sender, as in `on_client_lost`.
             age: Time from then until this copy was sent, by the client's monotonic clock [s].
+            cancel_if_lost: Its client wants it to be cancelled when it dies.
 
         Returns:
             Whether it is new and has been taken.

@@ -59,6 +59,7 @@ class ServerGoal:
         client: Session id of its sender; "" when unknown.
         made_at: When the client first sent it, as far as known [s, clock].
         age: Time from that until the copy was sent that has arrived first [s].
+        cancel_if_lost: It is cancelled when its client dies.
         arrived: False while only a cancel has come for this id.
         result: The result as it is sent, once there is one.
         listed_until: End of its time in the status list [s, clock]; None: no end yet, or passed.
@@ -73,6 +74,7 @@ class ServerGoal:
     client: str = ""
     made_at: float = 0.0
     age: float = 0.0
+    cancel_if_lost: bool = False
     arrived: bool = True
     result: object = None
     listed_until: float | None = None
@@ -206,12 +208,19 @@ class ServerGoals:
             del self._cancels[:-CANCELS]
         return asked
 
-    def on_client_lost(self, client: str) -> list[ServerGoal]:
-        """Ask the goals of a dead client to stop; return those that were not asked before."""
+    def on_client_lost(self, client: str, *, every: bool = True) -> list[ServerGoal]:
+        """Ask the goals of a dead client to stop; return those that were not asked before.
+
+        Args:
+            client: Session id of the client.
+            every: All its goals; else those that it has sent with `cancel_if_lost`.
+        """
         return [
             goal
             for goal in self.tracked.values()
-            if goal.client == client and self.request_cancel(goal)
+            if goal.client == client
+            and (every or goal.cancel_if_lost)
+            and self.request_cancel(goal)
         ]
 
     def request_cancel(self, goal: ServerGoal) -> bool:

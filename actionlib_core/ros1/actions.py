@@ -13,11 +13,11 @@ from actionlib_core.exceptions import ActionlibError, InterfaceError, Ros1Error,
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.ros1.answers import ACTION_WORDS
-from actionlib_core.ros1.goals import Admission, GoalsOfClients, GoalsOfServer
+from actionlib_core.ros1.goals import REMEMBERED, Admission, GoalsOfClients, GoalsOfServer
 from actionlib_core.ros1.node import ANY
 from actionlib_core.ros1.sides import Typed, type_of
 from actionlib_core.transport import Sample
-from actionlib_core.transport.tokens import Kind, parse_token, token_key
+from actionlib_core.transport.tokens import Kind, parse_token, token_key, token_pattern
 from actionlib_core.wire import in_process
 from actionlib_core.wire.actions import (
     ACK,
@@ -31,6 +31,7 @@ from actionlib_core.wire.actions import (
     pack_goal_id,
     pack_status,
     pack_statuses,
+    unpack_cancel_if_lost,
     unpack_frame,
     unpack_goal,
     unpack_goal_id,
@@ -49,7 +50,14 @@ if TYPE_CHECKING:
     from actionlib_core.ros1.frames import Header
     from actionlib_core.ros1.node import Publication
     from actionlib_core.ros1.sides import Sides
-    from actionlib_core.transport import Closable, PublisherPort, Quality, Query, Reply
+    from actionlib_core.transport import (
+        Closable,
+        Presence,
+        PublisherPort,
+        Quality,
+        Query,
+        Reply,
+    )
     from actionlib_core.transport.tokens import Endpoint
 
 log = logging.getLogger("actionlib_core")
@@ -375,6 +383,9 @@ class _ShownServer:
         self._lock = threading.Lock()
         self._goals = GoalsOfServer()
         self._clients: dict[in_process.ClientInProcess, None] = {}  # those in this process
+        self._sessions: dict[str, str] = {}  # token of a client on our network -> its session
+        # Ids of goals that are to be cancelled with their clients -> the client's session.
+        self._cancel_if_lost: dict[str, str] = {}
         self._keys = keys = action_keys(self._name)
         transport = sides.node.transport
         self.session = transport.session_id
@@ -390,6 +401,7 @@ class _ShownServer:
             transport.subscribe(keys.cancel, self._on_cancel, history=False),
             transport.subscribe(keys.ack, self._on_ack, history=False),
             transport.queryable(keys.result, self._on_query),
+            transport.watch_alive(token_pattern(Kind.ACTION_CLIENT, self._name), self._on_client),
         ]
         # Last, and in this order: clients that see the token may send at once, and look here first.
         in_process.servers[self._own_key] = self
@@ -425,6 +437,7 @@ class _ShownServer:
         entry, _ = unpack_report(payload)
         with self._lock:
             self._goals.on_result(entry, payload, self._clock.now())
+            self._cancel_if_lost.pop(entry.id, None)
         self._send_result(payload)
 
     def _send_result(self, payload: bytes) -> None:
@@ -471,10 +484,33 @@ class _ShownServer:
         with self._lock:
             verdict = decide(goal_id)
             result = self._goals.result(goal_id)
+            if verdict is Admission.PASS and unpack_cancel_if_lost(sample.payload):
+                self._cancel_if_lost[goal_id] = sample.source
+                if len(self._cancel_if_lost) > REMEMBERED:
+                    del self._cancel_if_lost[next(iter(self._cancel_if_lost))]
         if verdict is Admission.PASS:
             self._to_server[0].put(sample.payload)
         elif verdict is Admission.REPEAT_RESULT and result is not None:
             self._send_result(result)
+
+    def _on_client(self, presence: Presence) -> None:
+        """Cancel the goals that a client wants to be cancelled when it dies: ROS 1 cannot."""
+        client = parse_token(presence.key)
+        if client is None:
+            return
+        with self._lock:
+            if presence.alive:
+                self._sessions[presence.key] = client.session
+                return
+            self._sessions.pop(presence.key, None)
+            if client.session in self._sessions.values():
+                return
+            wanted = self._cancel_if_lost
+            lost = [each for each, session in wanted.items() if session == client.session]
+            for goal_id in lost:
+                del wanted[goal_id]
+        for goal_id in lost:
+            self._to_server[1].put(pack_goal_id(goal_id, 0))
 
     def _on_cancel(self, sample: Sample) -> None:
         if not self._sides.is_own(sample) and self._sides.fits(sample, GOAL_ID):

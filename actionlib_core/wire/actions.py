@@ -63,6 +63,7 @@ STATUS = Quality(express=False, block=False)  # repeated every second
 
 _U32 = struct.Struct("<I")
 _HEADER = struct.Struct("<IIII")  # seq, stamp, length of the frame_id
+_SEQ_CANCEL_IF_LOST, _NO_FRAME = _U32.pack(1), _U32.pack(0)
 _ID = struct.Struct("<III")  # stamp, length of the id
 _FRONT = struct.Struct("<IIIIIII")  # a header with an empty frame_id and an `_ID` as one
 _TAIL = struct.Struct("<BI")  # status, length of its text
@@ -99,11 +100,26 @@ def _too_short(what: str, payload: bytes) -> ValueError:
 
 
 def pack_goal(
-    sent_ns: int, goal_id: str, goal_stamp_ns: int, goal: bytes, server: str = ""
+    sent_ns: int,
+    goal_id: str,
+    goal_stamp_ns: int,
+    goal: bytes,
+    server: str = "",
+    *,
+    cancel_if_lost: bool = False,
 ) -> bytes:
-    """Write an XActionGoal: header, goal id, goal. `server` is the receiver's token."""
+    """Write an XActionGoal: header, goal id, goal.
+
+    Args:
+        sent_ns: When it is sent [ns since the epoch].
+        goal_id: Its id.
+        goal_stamp_ns: Its stamp [ns since the epoch].
+        goal: The bytes of the XGoal.
+        server: The receiver's token.
+        cancel_if_lost: The server is to cancel it when its client dies.
+    """
     frame, raw = server.encode(), goal_id.encode()
-    header = _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(frame))
+    header = _HEADER.pack(int(cancel_if_lost), sent_ns // _NS, sent_ns % _NS, len(frame))
     front = _ID.pack(goal_stamp_ns // _NS, goal_stamp_ns % _NS, len(raw))
     return b"".join((header, frame, front, raw, goal))
 
@@ -132,6 +148,14 @@ def unpack_age(payload: bytes, stamp_ns: int) -> float:
     """
     sent_ns = int.from_bytes(payload[4:8], "little") * _NS + int.from_bytes(payload[8:12], "little")
     return max(0.0, (sent_ns - stamp_ns) / _NS) if stamp_ns else 0.0
+
+
+def unpack_cancel_if_lost(payload: bytes) -> bool:
+    """Read from an XActionGoal whether the server is to cancel it when its client dies.
+
+    Only with a receiver's token as `frame_id`: programs for ROS 1 count their messages in `seq`.
+    """
+    return payload[:4] == _SEQ_CANCEL_IF_LOST and payload[12:16] != _NO_FRAME
 
 
 def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
@@ -363,6 +387,7 @@ class ActionClientPort:
         *,
         age: float = 0.0,
         wait: bool = True,
+        cancel_if_lost: bool = False,
     ) -> None:
         """Send an XActionGoal with the receiver's token as its frame_id."""
         token = token_key(server) if server is not None else ""
@@ -371,7 +396,8 @@ class ActionClientPort:
             if wait
             else self._publishers[self._keys.goal, self._types.action_goal, AGAIN]
         )
-        message = pack_goal(stamp_ns + int(age * _NS), goal_id, stamp_ns, body, token)
+        sent_ns = stamp_ns + int(age * _NS)
+        message = pack_goal(sent_ns, goal_id, stamp_ns, body, token, cancel_if_lost=cancel_if_lost)
         goals.put(message)  # first, as it fails when the session is closed: nobody would follow it
         if wait and token in self._in_process and (near := in_process.servers.get(token)):
             near.take_goal(Sample(self._keys.goal, message, self._goal_encoding, self._session))
@@ -630,7 +656,8 @@ class ActionServerPort:
             self._report_unreadable("a goal", sample, error)
             return
         age = unpack_age(sample.payload, stamp_ns)
-        self._listener.on_goal(goal_id, stamp_ns, content, sample.source, age)
+        lost = unpack_cancel_if_lost(sample.payload)
+        self._listener.on_goal(goal_id, stamp_ns, content, sample.source, age, cancel_if_lost=lost)
 
     def _is_of_another(self, frame: str) -> bool:
         """Return whether a goal was sent to another server of this action."""

@@ -284,15 +284,21 @@ class GoalFollower:
         """See the class."""
         return self._client.manager.port.lost_link
 
-    def send(self, goal: Any, *, ack_timeout: float | None) -> None:
+    def send(
+        self, goal: Any, *, ack_timeout: float | None, cancel_on_client_lost: bool = False
+    ) -> None:
         """Send `goal`; it is LOST if no server acknowledges it within `ack_timeout` [s].
+
+        With `cancel_on_client_lost` the server cancels it if this process dies.
 
         Raises:
             ActionException, FieldError: the goal is not of the action's type.
             TypeMismatchError: the server is of another type.
             TransportError: the node is closed.
         """
-        handle = self._client.make_goal(goal, ack_timeout)
+        handle = self._client.make_goal(
+            goal, ack_timeout, cancel_on_client_lost=cancel_on_client_lost
+        )
         if self._frame is not None:
             self._journal.goal_sent(self._frame, self._client.ns, handle.goal.id)
         self._begin(handle, goal)

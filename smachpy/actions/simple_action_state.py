@@ -123,6 +123,8 @@ class SimpleActionState(State):
             at the goal's end are dropped after a call that takes longer than 0.5 s or, if this
             state has cancelled the goal, after 0.2 s. The log says how many.
         feedback_key: Userdata key that gets each XFeedback.
+        cancel_on_client_lost: The server cancels the goal if this program dies or is cut off; see
+            `ActionClient.send_goal`. A durable mission sends a new one when it is resumed.
         node: Node of the client; None for the current node.
         **options: See `smachpy.machines.state.StateOptions`.
 
@@ -163,6 +165,7 @@ class SimpleActionState(State):
         *,
         feedback_cb: Callable[[Any, F], object] | None = None,
         feedback_key: str | None = None,
+        cancel_on_client_lost: bool = False,
         node: Node | None = None,
         **options: Unpack[ActionStateOptions],
     ) -> None:
@@ -200,6 +203,7 @@ class SimpleActionState(State):
             "feedback_cb", feedback_cb, "feedback_cb(userdata, feedback)", 2
         )
         self.__feedback_key = feedback_key
+        self.__cancel_on_client_lost = cancel_on_client_lost
         self.__exec_s = problems.seconds("exec_timeout", exec_timeout)
         self.__server_wait_s = problems.seconds("server_wait_timeout", server_wait_timeout)
         self._smachpy_set_options({"preempt_timeout": preempt_timeout}, problems)
@@ -267,7 +271,8 @@ class SimpleActionState(State):
         exchange = self.__exchange_goal(ud, limit, frame, kept)
         assert exchange is not None
         status = exchange.run.status
-        if kept["stopped"] and status in STOPPED and not self._preempt_requested:
+        ended_with_it = self.__cancel_on_client_lost and not kept["status"]
+        if (kept["stopped"] or ended_with_it) and status in STOPPED and not self._preempt_requested:
             return None  # only the end of that process had stopped it
         # The usual case: a server knows the goal, or its end was recorded, or it must stop anyway.
         if not exchange.unanswered or kept["status"] or self._preempt_requested:
@@ -319,7 +324,11 @@ class SimpleActionState(State):
             forget = on_preempt(self, exchange.hurry)
             try:
                 if kept is None:
-                    exchange.send(goal, ack_timeout=wait_s)
+                    exchange.send(
+                        goal,
+                        ack_timeout=wait_s,
+                        cancel_on_client_lost=self.__cancel_on_client_lost,
+                    )
                 else:
                     exchange.adopt(kept, ack_timeout=wait_s)
                 if not run.status:  # else it had ended in the earlier process

@@ -161,6 +161,7 @@ def action(
     result_key: str | None = None,
     exec_timeout: float | None = None,
     server_wait_timeout: float | None = 60.0,
+    cancel_on_client_lost: bool = False,
 ) -> State:
     """Send a goal to an action server. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
@@ -172,6 +173,7 @@ def action(
         result_key: The userdata key that gets the result.
         exec_timeout: Longest time for the goal [s].
         server_wait_timeout: Longest wait for the server [s].
+        cancel_on_client_lost: The server cancels the goal if this program dies.
     """
     from actionlib_core.wire.action_types import ActionTypes
     from smachpy.actions.simple_action_state import SimpleActionState
@@ -186,6 +188,7 @@ def action(
         result_key=result_key,
         exec_timeout=exec_timeout,
         server_wait_timeout=server_wait_timeout,
+        cancel_on_client_lost=cancel_on_client_lost,
     )
 
 

@@ -228,6 +228,7 @@ class RosClientPort:
         *,
         age: float = 0.0,  # noqa: ARG002  for a ROS 2 server, order is that of arrival
         wait: bool = True,  # noqa: ARG002  a request is not dropped
+        cancel_if_lost: bool = False,
     ) -> None:
         """Send a goal, unless it is already on its way; the client calls this repeatedly.
 
@@ -240,6 +241,13 @@ class RosClientPort:
             goal = self._goals.get(goal_id)
             if goal is None:
                 goal = self._keep(_OpenGoal(goal_id, body, server.session if server else ""))
+                if cancel_if_lost:
+                    log.warning(
+                        "action '%s': goal %s: cancel_on_client_lost has no effect on ROS 2's "
+                        "wire: its servers do not look for the client. Try a server with "
+                        'on_client_lost="cancel".',
+                        *(self._name, goal_id),
+                    )
             step = goal.exchange.want()
         self._do(goal, step)
 

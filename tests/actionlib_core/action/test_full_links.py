@@ -44,7 +44,7 @@ def test_what_the_client_repeats_by_itself_waits_for_no_link(sent, monkeypatch):
     with TwoNodes() as world:
         server = SimpleActionServer("do", msg.TestAction, auto_start=False, node=world.robot)
         server.start()
-        monkeypatch.setattr(server.action_server.keeper, "on_goal", lambda *_: None)
+        monkeypatch.setattr(server.action_server.keeper, "on_goal", lambda *_, **__: None)
         monkeypatch.setattr(server.action_server.keeper, "on_cancel", lambda *_: None)
         client = ActionClient("do", msg.TestAction, node=world.mission)
         assert client.wait_for_server(5.0)

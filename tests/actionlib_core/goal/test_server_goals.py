@@ -194,6 +194,9 @@ def test_client_lost_asks_only_its_goals():
     goals = ServerGoals("demo")
     goals.on_goal(ServerGoal("a", 1, client="one"), 0.0)
     goals.on_goal(ServerGoal("b", 1, client="two"), 0.0)
+    goals.on_goal(ServerGoal("c", 1, client="one", cancel_if_lost=True), 0.0)
+    assert [goal.id for goal in goals.on_client_lost("two", every=False)] == []
+    assert [goal.id for goal in goals.on_client_lost("one", every=False)] == ["c"]
     assert [goal.id for goal in goals.on_client_lost("one")] == ["a"]
 
 

@@ -11,8 +11,9 @@ import pytest
 
 from actionlib_core import SimpleActionClient, SimpleActionServer
 from actionlib_core.interfaces.actionlib import msg
-from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.node import Node
+from actionlib_core.pubsub.topic import Subscriber
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
@@ -108,6 +109,36 @@ def test_a_server_in_ros_that_comes_later_gives_feedback_and_is_cancelled(ros, b
     assert client.wait_for_result(WAIT_S)
     assert client.get_state() == GoalStatus.PREEMPTED
     assert client.get_result() == msg.TestResult(-1)
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_goal_in_ros_is_cancelled_with_its_client_if_that_wants_it(ros, bridge, node, wanted):
+    ros.start("action_server", "left", "left_worker")
+    bridge(actions=["left"])
+    watcher = client_of("left")
+    news = node.clock.event()
+    seen = []
+
+    def see(message):
+        seen.extend(each.status for each in message.status_list)
+        news.set()
+
+    def wait_for(status):
+        while status not in seen:
+            assert news.wait(WAIT_S)
+            news.clear()
+
+    with Subscriber("left/status", GoalStatusArray, see):
+        with Node("mortal", clock=node.clock) as mortal:
+            client = SimpleActionClient("left", msg.TestAction, node=mortal)
+            assert client.wait_for_server(WAIT_S)
+            client.send_goal(msg.TestGoal(-5), cancel_on_client_lost=wanted)
+            wait_for(GoalStatus.ACTIVE)
+        if not wanted:  # it goes on until somebody cancels it
+            seen.clear()
+            wait_for(GoalStatus.ACTIVE)
+            watcher.cancel_all_goals()
+        wait_for(GoalStatus.PREEMPTED)
 
 
 def test_a_killed_server_in_ros_is_lost_with_its_nodes_name(ros, bridge, node):

@@ -150,6 +150,31 @@ def test_the_result_of_one_that_has_ended_is_taken(world: World) -> None:
     assert len(world.ids) == 1
 
 
+def test_one_that_was_cancelled_as_its_mission_died_is_sent_again(
+    world: World, caplog: pytest.LogCaptureFixture
+) -> None:
+    """On ROS 2's wire nobody cancels it, and it is followed."""
+    world.serve()
+    world.kill(cancel_on_client_lost=True)
+    machine = world.machine(cancel_on_client_lost=True)  # the former process is gone now
+    world.clock.sleep(2.0)
+    world.end_soon()
+    assert world.run(machine) == "succeeded"
+    own = not world.config.ros2
+    assert len(world.ids) == (2 if own else 1)
+    assert ("has no effect on ROS 2's wire" in caplog.text) is not own
+
+
+def test_one_whose_mission_was_cancelled_meanwhile_is_not_sent_again(world: World) -> None:
+    world.serve()
+    world.kill(cancel_on_client_lost=True)
+    world.store.request_cancel("m")
+    machine = world.machine(cancel_on_client_lost=True)
+    world.clock.sleep(2.0)
+    assert world.run(machine) == "preempted"
+    assert len(world.ids) == 1
+
+
 def test_a_preempt_cancels_it(world: World) -> None:
     world.serve()
     world.kill()
