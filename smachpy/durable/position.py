@@ -9,7 +9,9 @@ computer does not change it. The other keys are needed to resume:
                        keep running; `number`: the index of the iterator's item; `ending`: it is
                        the clean-up, and the fields of the `Ending` after which it runs
     Left               a visit has ended with `outcome`; `next`: path of the child that follows;
-                       `served`: it had serviced the request to stop, which its container is rid of
+                       `stopped`: path of a machine in it, or of itself -> label of the child in
+                       which it was asked to stop; `served`: it had serviced the request to stop,
+                       which its container is rid of
     Retried            attempt `attempt` has ended; the next begins at `at_ns`
     GoalSent, GoalTaken, GoalDone    a goal is about to be sent, is at a server, has ended
     Met                the states at `paths` have met at a barrier
@@ -117,6 +119,7 @@ class _Data(TypedDict):
     userdata: dict[str, dict[str, Any]]
     markings: NotRequired[dict[str, list[str]]]
     conditions: NotRequired[dict[str, _Condition]]
+    stopped: NotRequired[dict[str, str]]
     preempts: list[_Preempt]
     started_ns: Stamp
     last_ns: Stamp
@@ -150,6 +153,8 @@ class Position:
                 stop) and again (it begins once more after that).
             markings: path of a running plan -> ids of the places that hold tokens
             conditions: as in entries
+            stopped: path of a machine that was asked to stop and has ended -> label of the child in
+                which it was
             userdata: path of a container -> key -> encoded value
             preempts: path, source, by and why of the newest requests; on_visit: it is also in the
                 visit of the container (not in journals of old versions)
@@ -279,6 +284,10 @@ class Position:
             facts: {new(path): values for path, values in getattr(self, facts).items()}
             for facts in ("userdata", "markings", "conditions")
         }
+        moved["stopped"] = {
+            new(path): new(f"{path}/{label}").rpartition("/")[2]
+            for path, label in self.data.get("stopped", {}).items()
+        }
         return Position({**self.data, "visits": visits, "preempts": preempts, **moved})
 
     # -- one function for each kind ------------------------------------------------------------
@@ -332,6 +341,10 @@ class Position:
         visit = self.visits[path]
         self._keep_end(path, visit, entry)
         self._end_below(path)
+        stopped = self.data.setdefault("stopped", {})
+        for each in [each for each in stopped if f"{each}/".startswith(f"{path}/")]:
+            del stopped[each]
+        stopped.update(entry.get("stopped", {}))
         if entry.get("served"):
             self._serve(visit["in"])
         if visit.get("stopping"):
@@ -357,7 +370,7 @@ class Position:
         self._end_below(entry["path"])
         visit = self.visits[entry["path"]]
         visit.update(since_ns=entry["at_ns"], attempt=entry["attempt"] + 1, goal=None)
-        for name in ("requests", "served", "recalled", "halted_ns"):
+        for name in ("requests", "served", "recalled", "halted_ns", "met"):
             visit.pop(name, None)
 
     def _on_goal_sent(self, entry: Mapping[str, Any]) -> None:

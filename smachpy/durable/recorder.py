@@ -165,6 +165,9 @@ class Recorder(RunJournal):
         self._containers: dict[str, Container] = {
             path: state for path, state in walk(machine, self._root) if isinstance(state, Container)
         }
+        self._has_history = any(
+            each._smachpy.reenter != "first" for each in self._containers.values()
+        )
         # Two containers may share a userdata object: it is kept once, under the first path.
         self._homes: dict[int, str] = {}
         for path, container in self._containers.items():
@@ -324,6 +327,9 @@ class Recorder(RunJournal):
                     (source, by, why) for source, by, why in visit.get("recalled", ())
                 }
             self._markings = dict(self._journal.position.markings)
+            stopped = self._journal.position.data.get("stopped", {})
+            for path, container in self._containers.items():
+                container._smachpy.live.stopped_at = stopped.get(path, "")
             self._resumed[self._root] = self._unresumed.pop(self._root)
             self._all_back = run.clock.event("the states that were active")
             if self._unresumed and self._machine._preempt_requested:
@@ -529,6 +535,12 @@ class Recorder(RunJournal):
         if frame.path not in self._containers or not isinstance(outcome, str) or overridden:
             return outcome
         facts: dict[str, Any] = {"outcome": outcome}
+        if self._has_history and isinstance(state, Container):
+            facts["stopped"] = {
+                where: each._smachpy.live.stopped_at
+                for where, each in walk(state, path)
+                if isinstance(each, Container) and each._smachpy.live.stopped_at
+            }
         step.decide(frame, outcome)
         target = step.next[outcome].target if outcome in step.next else None
         asked = state._preempt_requested or (visit is not None and visit.is_asked())

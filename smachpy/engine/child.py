@@ -12,7 +12,7 @@ from smachpy.engine.interrupt import Interruption, uninterrupted
 from smachpy.engine.preempt import asking, choose, end_visit, forget_visit, request_soon, start
 from smachpy.engine.shutdown_check import is_shutdown
 from smachpy.engine.stack_text import trace_of
-from smachpy.engine.visit import RUNNING
+from smachpy.engine.visit import RUNNING, Why
 from smachpy.events import Entered, Failed, Left
 from smachpy.exceptions import SmachError, error_text
 
@@ -73,7 +73,7 @@ def _decided(frame: Frame, step: Step, decision: Decision) -> Decision:
     assert step.choices is not None
     choice = step.choices.get(decision.outcome) if isinstance(decision.outcome, str) else None
     step.ask_again()
-    if choice is None or decision.target is not choice:
+    if choice is None or decision.target is not choice or decision.why is Why.STOPPED:
         return decision
     target = call_bounded(frame.container, frame, choice.decide, (frame,))
     return decision._replace(target=target)

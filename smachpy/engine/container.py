@@ -77,9 +77,9 @@ def _run(frame: Frame, parent_ud: Any) -> str:
             run.watched = True
         # A durable run that goes on inside this container has its userdata from the journal.
         has_keys = parent_ud is not None and (data.input_keys or data.output_keys)
+        frame.goes_on, live.goes_on = data.history(), ""
         if (has_keys or data.begins_with) and not run.journal.has_begun(frame.path):
-            _copy_in(container, parent_ud)
-        live.goes_on = False
+            _copy_in(frame, parent_ud)
         try:
             run_children = container._smachpy_run_children
             if data.cleanup:
@@ -141,13 +141,13 @@ def _call_at_end(frame: Frame, outcome: str) -> str:
     return outcome
 
 
-def _copy_in(container: Parent, parent_ud: Any) -> None:
-    data, userdata = container._smachpy, container.userdata
+def _copy_in(frame: Frame, parent_ud: Any) -> None:
+    container, data, userdata = frame.container, frame.data, frame.container.userdata
     keys, values = data.input_keys, data_of(userdata)
     if parent_ud is not None and not accepting():
         # Programs for ROS 1 keep SMACH's way: values of former visits stay.
         begin_visit(userdata, [key for key in keys if key in parent_ud])
-    if data.begins_with and not data.live.goes_on:
+    if data.begins_with and not frame.goes_on:
         write(userdata, copy.deepcopy(data.begins_with))
     for key in keys if parent_ud is not None else ():
         if key in parent_ud:

@@ -125,7 +125,10 @@ class Live:
         runs: Number of its runs that have begun.
         is_passing_on: A request to stop is being passed on to its children.
         end_waiters: Events to set when it stops running.
-        goes_on: Its next run goes on where the last one was interrupted: with its userdata.
+        goes_on: Its next run goes on where the last one was interrupted, with its userdata: "last",
+            or "deep", if the machines below it do so, too; "" begins anew.
+        stopped_at: The label of the child in which its last run was asked to stop, if it has ended
+            'preempted' because of that; else "".
     """
 
     frame: Frame | None = None
@@ -140,7 +143,8 @@ class Live:
     runs: int = 0
     is_passing_on: bool = False
     end_waiters: list[ClockEvent] = field(default_factory=list)
-    goes_on: bool = False
+    goes_on: str = ""
+    stopped_at: str = ""
 
 
 @dataclass(slots=True, eq=False)
@@ -152,6 +156,7 @@ class ContainerData(StateData):
         remappings: Label -> key of the child -> key of the container.
         cleanup: The label of the child that runs at every end of the others; "" for none.
         begins_with: Key -> value of its userdata at the start of each run.
+        reenter: "last" or "deep": it goes on where it was interrupted; "first" begins anew.
         start_cbs: Called at the start of each run; each with its extra arguments.
         transition_cbs: The same, after each transition.
         termination_cbs: The same, at the end.
@@ -166,6 +171,7 @@ class ContainerData(StateData):
     remappings: dict[str, dict[str, str]] = field(default_factory=dict)
     cleanup: str = ""
     begins_with: dict[str, Any] = field(default_factory=dict)
+    reenter: str = "first"
     start_cbs: list[Callback] = field(default_factory=list)
     transition_cbs: list[Callback] = field(default_factory=list)
     termination_cbs: list[Callback] = field(default_factory=list)
@@ -187,11 +193,16 @@ class ContainerData(StateData):
         made = StateData.copy(self)
         made.is_child = self.is_child
         callbacks = ("start_cbs", "transition_cbs", "termination_cbs")
-        kept = ("cleanup", *callbacks, *self._kept)
+        kept = ("cleanup", "reenter", *callbacks, *self._kept)
         for name in ("children", "remappings", "begins_with", *kept):
             value = getattr(self, name)
             setattr(made, name, value.copy() if isinstance(value, (dict, list)) else value)
         return made
+
+    def history(self) -> str:
+        """Return how its next run goes on, as in `Live.goes_on`."""
+        own = self.reenter if self.reenter != "first" and self.live.stopped_at else ""
+        return self.live.goes_on or own
 
     def others(self) -> dict[str, Any]:
         """Return label -> child of all children except the clean-up."""

@@ -219,6 +219,8 @@ class Frame:
         ended: The child of a `Branch` has ended, and was reported.
         is_branch: It runs one of several children; what they raise is raised together.
         tidying: The container's clean-up while that runs.
+        goes_on: The container goes on where its last run was interrupted; as `Live.goes_on`.
+        stopped_at: The child that was to run, or to go on, when the container was asked to stop.
     """
 
     innermost: Frame | None
@@ -229,6 +231,8 @@ class Frame:
     subscribers: Subscribers | None = None
     _path: str | None = None
     timeout: Any = None  # a smachpy.engine.step.Timeout, which imports this module
+    goes_on = ""
+    stopped_at = ""
     tidying: Any = None  # a smachpy.engine.cleanup.Tidying, which imports this module
 
     def __init__(

@@ -294,6 +294,8 @@ class Visit:
                 live = each.live
                 # The steps stay with the thread, so the next run needs new ones.
                 live.plan = None
+                if each.parent is not None:
+                    live.stopped_at = getattr(each.step, "label", "")
                 if live.callback is each:
                     live.callback = None
                 if live.frame is each:
@@ -874,7 +876,7 @@ def _end_asked(frame: Frame, visit: Visit, outcome: Any) -> Decision:
     visit.end()
     if decision.why is Why.JUMPED and decision.target == step.label:
         frame.visit = Visit(frame, step)  # it runs again: a request from here on is for that visit
-    frame.answered = answered or decision is STOPPED
+    frame.answered = answered or decision.why is Why.STOPPED
     if decision.why is Why.ANSWERED:  # the request is spent; a second one starts from here
         container._preempt_requested = frame.answered = False
         _note_spent(frame)

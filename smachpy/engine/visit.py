@@ -280,7 +280,7 @@ class Decision(NamedTuple):
     Attributes:
         why: The reason.
         target: `End` or the next `smachpy.engine.step.Step`; with JUMPED the label of the next
-            child, with UNKNOWN None.
+            child, with UNKNOWN None; with STOPPED the step that would have followed finished work.
         outcome: The outcome that counts: that of the child, or the one that an operator chose.
     """
 
@@ -341,7 +341,9 @@ def after(
     if decision.why is Why.UNKNOWN and outcome == "preempted" and (override is None or run_asked):
         return STOPPED
     if run_asked and decision.why is FOLLOWED and not decision.target.final:
-        return decision._replace(why=Why.ANSWERED) if answered else STOPPED
+        if answered:
+            return decision._replace(why=Why.ANSWERED)
+        return STOPPED if outcome == "preempted" else STOPPED._replace(target=decision.target)
     if not run_asked and override is not None and override.holds(answered=answered):
         if override.label is not None:
             return Decision(Why.JUMPED, override.label)

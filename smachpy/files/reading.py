@@ -10,7 +10,7 @@ import inspect
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Section
 from actionlib_core.inputs.suggest import did_you_mean
@@ -32,7 +32,7 @@ from smachpy.machines.concurrence import Concurrence
 from smachpy.machines.guards import when
 from smachpy.machines.iterator import Iterator
 from smachpy.machines.rules import Rule, all_of, any_of, n_of
-from smachpy.machines.state_machine import Sequence, StateMachine
+from smachpy.machines.state_machine import Reenter, Sequence, StateMachine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -327,6 +327,8 @@ class _Reader:
         for key in ("input_keys", "output_keys"):
             given[key] = section.texts(key, ())
         given["userdata"] = self._mapping(section, "userdata")
+        if issubclass(kind, StateMachine):
+            given["reenter"] = section.text("reenter", "first", get_args(Reenter))
         items = given.get("it")
         if isinstance(items, ItemsOf) and items.key not in given["userdata"]:
             given["input_keys"] = [*dict.fromkeys([*given["input_keys"], items.key])]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 from smachpy.files.reading import KINDS, OPTIONS, TYPES
+from smachpy.machines.state_machine import Reenter
 
 TEXTS: dict[str, Any] = {"type": "array", "items": {"type": "string"}}
 SECONDS: dict[str, Any] = {
@@ -47,6 +48,7 @@ def schema() -> dict[str, Any]:
     machine = {
         **shared,
         "initial": {"type": "string"},
+        "reenter": {"enum": list(get_args(Reenter))},
         "states": states,
         "cleanup": states | {"maxProperties": 1},
     }

@@ -159,6 +159,8 @@ class _Writer:
             found |= self._policy(container, path)
         if isinstance(container, Sequence):
             found["connector"] = data.connector_outcome
+        if data.reenter != "first":
+            found["reenter"] = data.reenter
         return found | self._children(container, path)
 
     def _children(self, container: Container, path: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ def remember(container: Any) -> None:
     frame = container._smachpy.live.frame
     if frame is None or frame.tidying is not None:
         return
-    container._smachpy.live.goes_on = True
+    container._smachpy.live.goes_on = "last"
     for each in frame.running():
         step = each.step
         if step is None:
@@ -29,8 +29,14 @@ def forget(state: Any) -> None:
     """Undo `remember`: the next run begins anew."""
     if not state._smachpy_is_container or not state._smachpy.live.goes_on:
         return
-    state._smachpy.live.goes_on = False
+    state._smachpy.live.goes_on = ""
     if hasattr(state._smachpy, "next_initial"):
         state._smachpy.next_initial = None
     for child in state._smachpy.children.values():
         forget(child)
+
+
+def go_on(state: Any) -> None:
+    """Let the next run of a machine begin where its last one was interrupted, and all below it."""
+    if state._smachpy_is_container and state._smachpy.live.stopped_at:
+        state._smachpy.live.goes_on = "deep"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, get_args
 
 from smachpy.base import log
 from smachpy.base.problems import Problems, plain, unique_names, unknown_name
@@ -22,6 +22,7 @@ from smachpy.exceptions import (
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import NO_STATES, Container
 from smachpy.machines.guards import choices_of, split
+from smachpy.machines.history import go_on
 from smachpy.machines.old_states import adopt_slips
 from smachpy.machines.state import DataOf, Shown
 from smachpy.userdata.user_data import ConstantKey
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
     from smachpy.machines.guards import Cases, Target
     from smachpy.machines.state import State, StateOptions
     from smachpy.userdata.user_data import UserData
+
+Reenter: TypeAlias = Literal["first", "last", "deep"]
 
 __all__ = ["Sequence", "StateMachine"]
 
@@ -86,6 +89,9 @@ class StateMachine(Container):
         userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         userdata: Key -> value with which every run begins; a copy, so no run sees what the one
             before it has made of it.
+        reenter: Where a run begins after one that a request to stop has ended with 'preempted':
+            "first", the initial state; "last", the state that was interrupted, with the userdata of
+            then; "deep", the same also in the machines inside of that state. See docs/reenter.md.
         **options: See `StateOptions`.
     """
 
@@ -105,6 +111,7 @@ class StateMachine(Container):
         name: str | None = None,
         userdata_type: type | None = None,
         userdata: Mapping[str, Any] | None = None,
+        reenter: Reenter = "first",
         **options: Unpack[StateOptions],
     ) -> None:
         super().__init__(
@@ -119,6 +126,11 @@ class StateMachine(Container):
         data = self._smachpy  # reset for a second call of __init__, as in Container
         data.transitions, data.guards = {}, {}
         data.initial = data.next_initial = data.follow_connectors = None
+        problems = Problems(type(self).__name__)
+        if reenter not in get_args(Reenter):
+            problems.add(f"reenter: got {reenter!r}; expected one of {get_args(Reenter)}.")
+        problems.raise_all()
+        data.reenter = reenter
 
     # -- construction --------------------------------------------------------------------------
 
@@ -355,7 +367,8 @@ class StateMachine(Container):
                 (otherwise, ""),
             )
         )
-        return replace(super().describe_structure(), transitions=edges)
+        details = () if self._smachpy.reenter == "first" else (("reenter", self._smachpy.reenter),)
+        return replace(super().describe_structure(), transitions=edges, details=details)
 
     # -- running -------------------------------------------------------------------------------
 
@@ -386,11 +399,18 @@ class StateMachine(Container):
         resumed = frame.run.journal.resumed_label(frame)
         if data.start_cbs and resumed is None:
             self.call_start_cbs()
-        label, data.next_initial = resumed or data.next_initial or data.initial, None
+        stopped_at, data.live.stopped_at = data.live.stopped_at, ""
+        last = stopped_at if frame.goes_on and stopped_at in plan.steps else ""
+        label, data.next_initial = resumed or data.next_initial or last or data.initial, None
         assert label is not None
+        if "deep" in {frame.goes_on, data.reenter} and label == last:
+            go_on(data.children[last])
         if frame.run.logged:
             log.loginfo(f"{frame.path}: starting in {label!r}, keys {self.userdata.keys()}")
         outcome = self.__run_from(plan.steps[label], frame, plan)
+        if outcome == "preempted":
+            here = frame.step.label if frame.answered else ""
+            data.live.stopped_at = frame.stopped_at or here
         if frame.run.logged:
             log.loginfo(f"{frame.path}: {frame.step.label!r} ended it with {outcome!r}")
         return outcome
@@ -401,6 +421,9 @@ class StateMachine(Container):
         while True:
             why, target, outcome = run_child(frame, step)
             if why is not FOLLOWED:
+                if why in {Why.STOPPED, Why.ANSWERED} and not frame.stopped_at:
+                    finished = outcome != "preempted" or why is Why.STOPPED
+                    frame.stopped_at = getattr(target if finished else step, "label", step.label)
                 if why is Why.STOPPED:
                     return frame.end_preempted(step.label)
                 if why is Why.JUMPED:
@@ -429,6 +452,9 @@ class Sequence(StateMachine):
         userdata_type: A dataclass or TypedDict: the userdata has its fields, and their defaults.
         userdata: Key -> value with which every run begins; a copy, so no run sees what the one
             before it has made of it.
+        reenter: Where a run begins after one that a request to stop has ended with 'preempted':
+            "first", the initial state; "last", the state that was interrupted, with the userdata of
+            then; "deep", the same also in the machines inside of that state. See docs/reenter.md.
         **options: See `StateOptions`.
     """
 
@@ -444,6 +470,7 @@ class Sequence(StateMachine):
         name: str | None = None,
         userdata_type: type | None = None,
         userdata: Mapping[str, Any] | None = None,
+        reenter: Reenter = "first",
         **options: Unpack[StateOptions],
     ) -> None:
         problems = Problems(type(self).__name__)
@@ -455,6 +482,7 @@ class Sequence(StateMachine):
                 name=name,
                 userdata_type=userdata_type,
                 userdata=userdata,
+                reenter=reenter,
                 **options,
             )
         self._smachpy.connector_outcome = problems.word("connector_outcome", connector_outcome)

@@ -52,6 +52,13 @@ ENTRIES = [
         "stamp_ns": NOW + 9,
         "conditions": {"/M": {"set": {"a": True}, "events": [["b", NOW]]}},
     },
+    {
+        "kind": "Left",
+        "path": "/M/A",
+        "outcome": "preempted",
+        "stopped": {"/M/A": "B"},
+        "stamp_ns": NOW + 9,
+    },
 ]
 
 

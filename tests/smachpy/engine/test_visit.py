@@ -221,8 +221,10 @@ def plainly(outcome, targets, run_asked, answered, override):
             decided = "FOLLOWED", targets[outcome]
         elif answered:
             decided = "ANSWERED", targets[outcome]
-        else:
+        elif outcome == "preempted":
             decided = "STOPPED", "preempted"
+        else:  # its work is finished: a next run would go on there
+            decided = "STOPPED", targets[outcome]
     elif override is not None and override.label is not None:
         decided = "JUMPED", override.label
     elif override is not None:

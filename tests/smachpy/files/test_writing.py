@@ -58,7 +58,9 @@ def build(tree: Any) -> State:
         concurrence.add("S0", children[0])
         return concurrence
     machine: Any = (
-        StateMachine(outcomes, **KEYS) if kind == "machine" else Sequence(outcomes, "a", **KEYS)
+        StateMachine(outcomes, reenter="last" if extra else "first", **KEYS)
+        if kind == "machine"
+        else Sequence(outcomes, "a", **KEYS)
     )
     last = len(children) - 1
     for number, child in enumerate(children):
@@ -89,6 +91,7 @@ def facts(record: Any) -> Any:
         record.rules,
         record.default_outcome,
         record.cleanup,
+        [pair for pair in record.details if pair[0] == "reenter"],
         [facts(child) for child in record.children],
     )
 
