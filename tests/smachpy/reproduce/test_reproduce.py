@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os as ENVIRONMENT
+import re
 import subprocess
 import sys
 import tempfile
@@ -326,6 +327,75 @@ def test_what_is_wrong_with_a_recording_is_one_line(night, capsys, harm, said):
     assert len(lines) == 1
     assert said in lines[0]
     assert lines[0].count(str(path)) == 1
+
+
+def test_a_recording_of_another_computer_says_what_is_another_there(night, tmp_path, capsys):
+    """Its folder does not exist here, its Python is older; neither makes another run."""
+    file, path = night
+    data = json.loads(path.read_text().partition("\n")[0])["origin"]
+    code = data["code"] | {"versions": {"python": "3.9.1"}, "commit": "1234567890abcdef"}
+    mission = data["mission"] | {"folder": "/home/robot/nowhere"}
+    changed_origin(path, code=code, mission=mission)
+    command = ["runs", "reproduce", str(path), f"--allow={path.parent}"]
+    assert main(command) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 1
+    file.write_text(MISSION.replace("LOW = 0.30", "LOW = 0.25"))
+    assert main(command) == 1
+    changed = [line for line in capsys.readouterr().out.splitlines() if "  changed: " in line]
+    assert "night.LOW is 0.25 now, was 0.3" in changed[0]
+    assert any("python is" in line and "was 3.9.1" in line for line in changed)
+    assert any("was 1234567890" in line for line in changed)
+
+
+def with_much_data(path, megabytes):
+    """Put messages of a topic between the events of a recording."""
+    header, *lines = path.read_text().splitlines(keepends=True)
+    at = next(n for n, line in enumerate(lines) if '"status"' in line)
+    began = json.loads(lines[at])
+    size, count = 9_000, megabytes * 110
+    with path.open("w") as file:
+        file.writelines([header, *lines[: at + 1]])
+        for number in range(count):
+            message = {
+                **began,
+                "t": began["t"] + number / count,
+                "what": "message",
+                "name": "chatter",
+                "type": "std_msgs/String",
+                "key": "a subscriber",
+                "value": {
+                    "$msg": "std_msgs/String",
+                    "fields": {"data": f"{number} {'x' * size}"},
+                },
+            }
+            file.write(json.dumps(message) + "\n")
+        file.writelines(lines[at + 1 :])
+
+
+@pytest.mark.slow
+def test_a_recording_of_100_mb_is_reproduced(night, capsys):
+    _, path = night
+    with_much_data(path, 100)
+    assert path.stat().st_size > 100_000_000
+    command = ["runs", "reproduce", str(path), f"--allow={path.parent}"]
+    assert main(command) == 0
+    assert capsys.readouterr().out.startswith("ROUND: the same 15 of 15 events, 63 s in ")
+    with path.open("rb+") as file:
+        file.truncate(path.stat().st_size // 2)
+    assert main(command) == 0
+    first, note = capsys.readouterr().out.splitlines()
+    assert re.match(r"ROUND: the same (\d+) of \1 events, ", first)
+    assert note.endswith("where the file is cut off")
+    path.unlink()  # pytest keeps the folders of the last tests
+
+
+def test_a_recording_that_is_too_large_is_one_line(night, capsys):
+    _, path = night
+    with path.open("rb+") as file:
+        file.truncate(2_000_000_000)  # a hole, which takes no room on the disk
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}"]) == 2
+    (line,) = capsys.readouterr().out.splitlines()
+    assert "got 2,000,000,000 bytes; expected at most 1,000,000,000" in line
 
 
 def test_a_recording_does_not_say_where_modules_are(night, tmp_path, capsys):
