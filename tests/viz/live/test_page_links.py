@@ -95,3 +95,27 @@ def test_a_run_in_one_file_has_links_too(address, look, tmp_path):
     wait_for(alone, "smachpy.store.view.selected.value === '/JOB/IN'")
     pin(alone, "as a file")
     wait_for(alone, "location.hash.includes('as+a+file')")
+
+
+def test_a_shared_file_opens_at_the_instant_with_the_notes(address, look, tmp_path):
+    page = look(address)
+    page.evaluate("() => smachpy.page.select('/JOB/IN')")
+    pin(page, "here <b>it</b> waits")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 2)")
+    shown = page.evaluate("() => smachpy.store.playback.cursor.value")
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Share").click()
+    file = tmp_path / "shared.html"
+    saved.value.save_as(file)
+    alone = look(file.as_uri())
+    wait_for(alone, "smachpy.store.view.selected.value === '/JOB/IN'")
+    assert alone.evaluate("() => smachpy.store.playback.cursor.value") == pytest.approx(
+        shown, abs=0.01
+    )
+    assert "here <b>it</b> waits" in alone.inner_text(".notes")
+    assert alone.get_by_role("button", name="Share").count() == 0
+    other = look(file.as_uri() + "#state=/JOB")  # an address of the reader's own counts
+    wait_for(other, "smachpy.store.view.selected.value === '/JOB'")
+    assert other.locator(".notes").count() == 0
+    long = page.request.get(f"{address}api/export?machine=one&format=html&view={'x' * 20_001}")
+    assert (long.status, long.json()["text"].partition(":")[0]) == (400, "view")

@@ -36,6 +36,8 @@ PICTURES: Final = {
     "txt": "text/plain",
 }
 _UNAVAILABLE: Final = 503
+LONGEST_VIEW: Final = 20_000
+"""Longest view that an exported page begins with [characters]."""
 
 
 class MachineRoutes:
@@ -138,7 +140,12 @@ class MachineRoutes:
         machine, record = self._asked(request)
         form = _one_of(request, "html", EXPORTS)
         make, media = EXPORTS[form]
-        data = await run_in_threadpool(make, machine, record)
+        view = request.query_params.get("view", "")
+        if len(view) > LONGEST_VIEW:
+            raise RequestError(
+                f"view: got {len(view)} characters; expected at most {LONGEST_VIEW}."
+            )
+        data = await run_in_threadpool(make, machine, record, view)
         name = "run" if form == "jsonl" else file_name(machine)
         return download(data, media, f"{name}.{form}")
 
@@ -155,14 +162,14 @@ def _one_of(request: Request, usual: str, known: dict[str, Any]) -> str:
     return form
 
 
-def _export_page(machine: Machine, record: StateRecord) -> bytes:
+def _export_page(machine: Machine, record: StateRecord, view: str = "") -> bytes:
     """The run as one file that opens without a server."""
     from smachpy_viz.runs.html import page_of
 
-    return page_of(machine, record).encode("utf-8", "replace")
+    return page_of(machine, record, view=view).encode("utf-8", "replace")
 
 
-def _export_recording(machine: Machine, record: StateRecord) -> bytes:
+def _export_recording(machine: Machine, record: StateRecord, _view: str = "") -> bytes:
     """The run as a recording, in the format of `Recorder`."""
     from smachpy.events.recording import recording_lines
 

@@ -39,13 +39,26 @@ def standalone_page(
     return page_of(machine, recording.record, StatisticsOfFiles(runs).of(recording.record))
 
 
-def page_of(machine: Machine, record: StateRecord, statistics: dict[str, Any] | None = None) -> str:
-    """Return the page of a machine as it is now."""
+def page_of(
+    machine: Machine,
+    record: StateRecord,
+    statistics: dict[str, Any] | None = None,
+    view: str = "",
+) -> str:
+    """Return the page of a machine as it is now.
+
+    Args:
+        machine: The machine.
+        record: Its structure.
+        statistics: Those of recorded runs.
+        view: What the page shows at first: the fragment of an address, with instant and notes.
+    """
     run = {
         "model": assets.model(record),
         "snap": json.loads(machine.snapshot()[1]),
         "observed": machine.observed(),
         "statistics": statistics,
+        "view": view,
         "why": why(record, machine.events()).to_json(),
     }
     return assets.standalone(run, record.label)

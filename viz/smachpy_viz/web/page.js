@@ -3601,6 +3601,7 @@ async function connect(handlers) {
   if (isFile()) {
     const run = JSON.parse(await unpack("run-data"));
     store.data.connection.value = "file";
+    if (run.view && location.hash.length < 2) handlers.onView(String(run.view));
     await takeSnapshot(run.snap, run.model);
     onObserved(run.observed ?? []);
     store.data.statistics.value = run.statistics ?? null;
@@ -4189,19 +4190,20 @@ var Address = class {
     const chosen2 = [view2.selected, view2.opened, notes.all, playback.stretch, panels2.arrangement, panels2.plotsChosen];
     for (const one of [...chosen2, playback.instant]) one.subscribe(() => this.#write());
   }
-  /** Take the view of the address again. */
-  read() {
-    this.#linked = viewOf(location.hash);
+  /** Take the view of the address again, or that of another fragment. */
+  read(fragment = location.hash) {
+    this.#linked = viewOf(fragment);
   }
   /** The address of the view. */
   get text() {
     const address = new URL(location.href);
     const name = store.data.facts.value?.name;
     if (name && !isFile()) address.searchParams.set("machine", name);
-    address.hash = this.#fragment();
+    address.hash = this.fragment;
     return String(address);
   }
-  #fragment() {
+  /** The view as the fragment of an address. */
+  get fragment() {
     const { view: view2, playback, panels: panels2, notes } = store;
     const stretch = playback.stretch.value;
     return fragmentOf({
@@ -4218,7 +4220,7 @@ var Address = class {
     clearTimeout(this.#due);
     this.#due = setTimeout(() => {
       if (store.data.model.value && !this.#linked && store.view.pageShown.value === "machine")
-        history.replaceState(null, "", `#${this.#fragment()}`);
+        history.replaceState(null, "", `#${this.fragment}`);
     }, WRITE_MS);
   }
   /**
@@ -7770,7 +7772,8 @@ var Page = class {
     await connect({
       onEvents: (events) => this.scheduler.takeEvents(events),
       onMachine: () => this.showMachine(),
-      onObserved: (records) => this.scheduler.takeObserved(records)
+      onObserved: (records) => this.scheduler.takeObserved(records),
+      onView: (fragment) => this.address.read(fragment)
     });
   }
   /** Show the machine in the store. */
@@ -10143,6 +10146,12 @@ function ShareButtons({ page: page2 }) {
       store.view.notify("This browser lets no page copy here: the address bar shows the link", "error");
     }
   };
+  const share = () => {
+    const saved2 = document.createElement("a");
+    saved2.href = link("export", `&format=html&view=${encoded2(page2.address.fragment)}`);
+    saved2.download = "";
+    saved2.click();
+  };
   const done = store.playback.filmed.value;
   const stop = () => {
     store.playback.filmed.value = null;
@@ -10161,7 +10170,8 @@ function ShareButtons({ page: page2 }) {
       " % ✕"
     ] }),
     /* @__PURE__ */ a4("button", { title: "note at the instant shown (n)", onClick: () => store.notes.begin(), children: "Note" }),
-    /* @__PURE__ */ a4("button", { title: "copy the address of this view: instant, selection, open containers, notes", onClick: copy2, children: "Link" })
+    /* @__PURE__ */ a4("button", { title: "copy the address of this view: instant, selection, open containers, notes", onClick: copy2, children: "Link" }),
+    !isFile() && /* @__PURE__ */ a4("button", { title: "one HTML file that opens at this instant, with the notes, without a server", onClick: share, children: "Share" })
   ] });
 }
 function NoteDialog() {

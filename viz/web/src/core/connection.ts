@@ -66,12 +66,14 @@ export async function connect(handlers: {
   onEvents: (events: RunEvent[]) => void;
   onMachine: () => void;
   onObserved: (records: Observed[]) => void;
+  onView: (fragment: string) => void;
 }) {
   ({ onEvents, onMachine, onObserved } = handlers);
   readToken();
   if (isFile()) {
     const run = JSON.parse(await unpack("run-data"));
     store.data.connection.value = "file";
+    if (run.view && location.hash.length < 2) handlers.onView(String(run.view));
     await takeSnapshot(run.snap, run.model);
     onObserved(run.observed ?? []);
     store.data.statistics.value = run.statistics ?? null;

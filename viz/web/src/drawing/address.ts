@@ -18,9 +18,9 @@ export class Address {
     for (const one of [...chosen, playback.instant]) one.subscribe(() => this.#write());
   }
 
-  /** Take the view of the address again. */
-  read() {
-    this.#linked = viewOf(location.hash);
+  /** Take the view of the address again, or that of another fragment. */
+  read(fragment = location.hash) {
+    this.#linked = viewOf(fragment);
   }
 
   /** The address of the view. */
@@ -28,11 +28,12 @@ export class Address {
     const address = new URL(location.href);
     const name = store.data.facts.value?.name;
     if (name && !isFile()) address.searchParams.set("machine", name);
-    address.hash = this.#fragment();
+    address.hash = this.fragment;
     return String(address);
   }
 
-  #fragment() {
+  /** The view as the fragment of an address. */
+  get fragment() {
     const { view, playback, panels, notes } = store;
     const stretch = playback.stretch.value;
     return fragmentOf({
@@ -50,7 +51,7 @@ export class Address {
     clearTimeout(this.#due);
     this.#due = setTimeout(() => {
       if (store.data.model.value && !this.#linked && store.view.pageShown.value === "machine")
-        history.replaceState(null, "", `#${this.#fragment()}`);
+        history.replaceState(null, "", `#${this.fragment}`);
     }, WRITE_MS);
   }
 

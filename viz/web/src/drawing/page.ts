@@ -142,6 +142,7 @@ export class Page {
       onEvents: (events) => this.scheduler.takeEvents(events),
       onMachine: () => this.showMachine(),
       onObserved: (records) => this.scheduler.takeObserved(records),
+      onView: (fragment) => this.address.read(fragment),
     });
   }
 

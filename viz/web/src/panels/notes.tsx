@@ -1,7 +1,7 @@
 // Notes at instants of the run, and the link that shows this view to somebody else.
 
 import { useState } from "preact/hooks";
-import { isFile } from "#core/connection.ts";
+import { encoded, isFile, link } from "#core/connection.ts";
 import { store } from "#core/store.ts";
 import { saveFilm } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";
@@ -16,6 +16,12 @@ export function ShareButtons({ page }: { page: Page }) {
     } catch {
       store.view.notify("This browser lets no page copy here: the address bar shows the link", "error");
     }
+  };
+  const share = () => {
+    const saved = document.createElement("a");
+    saved.href = link("export", `&format=html&view=${encoded(page.address.fragment)}`);
+    saved.download = "";
+    saved.click();
   };
   const done = store.playback.filmed.value;
   const stop = () => {
@@ -41,6 +47,11 @@ export function ShareButtons({ page }: { page: Page }) {
       <button title="copy the address of this view: instant, selection, open containers, notes" onClick={copy}>
         Link
       </button>
+      {!isFile() && (
+        <button title="one HTML file that opens at this instant, with the notes, without a server" onClick={share}>
+          Share
+        </button>
+      )}
     </span>
   );
 }
