@@ -13,6 +13,7 @@ from smachpy.base.context import current_frame, current_path
 from smachpy.base.problems import Problems, unknown_name
 from smachpy.engine.frame import clock_of_run
 from smachpy.machines.state import State
+from smachpy.userdata.secret import masked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -138,7 +139,8 @@ class SetParameters(State):
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the node and the parameters."""
         kind, details = super().describe_details()
-        values = ", ".join(f"{name}={value!r}" for name, value in self.__values.items())
+        shown = ((name, masked(value, name)) for name, value in self.__values.items())
+        values = ", ".join(f"{name}={value!r}" for name, value in shown)
         return kind, (("node", self.__node), ("parameters", values), *details)
 
 
@@ -189,23 +191,32 @@ class RestoreParameters(State):
         for node, entries in [*kept.items()]:
 
             def restore(remote: RemoteNode, call: Call, entries: Any = entries) -> None:
-                now = call(lambda: remote.get_parameters(*entries))
+                names, missing = list(entries), None
+                try:
+                    now = call(lambda: remote.get_parameters(*names))
+                except RemoteNodeError as error:  # a node that was started anew without some
+                    missing = error
+                    names = [name for name in names if name not in error.problems]
+                    now = call(lambda: remote.get_parameters(*names)) if names else {}
                 others = {
                     name: value
                     for name, value in now.items()
                     if value not in (entries[name]["set"], entries[name]["was"])
                 }
                 for name, value in others.items():
+                    got, ours = masked(value, name), masked(entries[name]["set"], name)
                     log.logwarn(
-                        f"{_where(self)}: /{remote.name}: {name}: got {value!r}; expected "
-                        f"{entries[name]['set']!r}, which this mission has set. Somebody has "
-                        "changed it since; it is left as it is."
+                        f"{_where(self)}: /{remote.name}: {name}: got {got!r}; expected {ours!r}, "
+                        "which this mission has set. Somebody has changed it since; it is left as "
+                        "it is."
                     )
                 # Also what seems to be as before: a request of a state that was asked to stop may
                 # still wait at the node, and comes before this one.
-                values = {name: each["was"] for name, each in entries.items() if name not in others}
+                values = {name: entries[name]["was"] for name in names if name not in others}
                 if values:
                     call(lambda: remote.set_parameters(values))
+                if missing is not None:
+                    raise missing
 
             ended = _talk(self, f"/{node}", self.__timeout_s, restore)
             if ended == "succeeded":

@@ -214,6 +214,50 @@ def test_what_could_not_be_restored_stays_in_the_key(mission, controller, caplog
     assert sm.userdata.parameters_before == {"controller": {"max_vel_x": {"was": 0.5, "set": 0.2}}}
 
 
+def test_the_others_are_restored_where_a_node_does_not_have_one_any_more(
+    mission, controller, caplog
+):
+    class Restart(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            del controller.parameters["plugins"]
+            return "done"
+
+    sm = StateMachine([*ENDS, "done"], name="M")
+    both = {"max_vel_x": 0.2, "plugins": ["b"]}
+    sm.add("SET", SetParameters("controller", both), {"succeeded": "RESTART"})
+    sm.add("RESTART", Restart())
+    sm.add_cleanup("RESTORE", RestoreParameters())
+    mission(sm).assert_outcome("done")
+    assert controller.parameters == {"max_vel_x": 0.5}
+    assert "/controller: plugins: got no such parameter" in caplog.text
+    assert set(sm.userdata.parameters_before["controller"]) == set(both)
+
+
+def test_a_secret_is_shown_neither_in_pictures_nor_in_the_log(mission, caplog):
+    node = mission.ros2_node("wifi", {"password": "first"})
+
+    class Operator(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            node.parameters["password"] = "third"
+            return "done"
+
+    sm = StateMachine([*ENDS, "done"], name="M")
+    state = SetParameters("wifi", {"password": "second"})
+    sm.add("SET", state, {"succeeded": "OPERATOR"})
+    sm.add("OPERATOR", Operator())
+    sm.add_cleanup("RESTORE", RestoreParameters())
+    mission(sm).assert_outcome("done")
+    told = caplog.text + repr(state.describe_details())
+    assert "Somebody has changed it" in told
+    assert not {"first", "second", "third"} & set(told.replace("'", " ").split())
+
+
 def test_there_may_be_nothing_to_restore(mission):
     mission(alone(RestoreParameters())).assert_outcome("succeeded")
 
