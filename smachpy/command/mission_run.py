@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import posixpath
+import random
 import signal
 import sys
 import traceback
@@ -293,6 +294,9 @@ def _execute(machine: Container, show: Any, options: RunOptions) -> str | None:
     """
     outcome: str | None = None
     try:
+        seed = options.watching.origin.get("seed")
+        if seed is not None and options.watching.records:
+            random.seed(seed)  # a run that is reproduced throws the same dice again
         outcome = machine.execute()
     except Exception as error:
         show.close()

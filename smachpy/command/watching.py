@@ -54,6 +54,11 @@ class Watching:
     allow: tuple[str, ...] = ()
     alone: bool = False
 
+    @property
+    def records(self) -> bool:
+        """Whether there is a recording."""
+        return self.record is not None or self.view
+
 
 class Watch:
     """The page and the recording of one run.

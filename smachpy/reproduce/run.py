@@ -166,6 +166,7 @@ def reproduce(
         machine._smachpy.live.journal = Recorded(world, player)
         ends: list[str] = []  # why the run has no outcome
         outcome = None
+        random.seed(then.get("seed"))
         try:
             outcome = kit(machine, limit=world.ended - world.began + LONGER_S).outcome
         except (Deadlock, TimeLimitError, AssertionError, SmachError) as error:

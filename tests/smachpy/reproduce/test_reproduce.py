@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os as ENVIRONMENT
+import random
 import re
 import subprocess
 import sys
@@ -653,6 +654,45 @@ def test_results_of_once_come_from_the_recording(tmp_path):
     found = reproduce(read_recording(tmp_path / "run.jsonl"), make=make)
     assert found.is_same, lines_of(found)
     assert next(dice) == 2
+
+
+DICE = """
+import random
+import smachpy
+
+FACES = range(1, 7)
+
+
+def throw(userdata):
+    userdata.eyes = FACES[random.randrange(6)], random.random()
+    return "done"
+
+
+@smachpy.mission
+def mission() -> smachpy.StateMachine:
+    sm = smachpy.StateMachine(["done"], name="DICE", userdata={"first": random.random()})
+    sm.add("ONE", smachpy.CBState(throw, outcomes=["done"], output_keys=["eyes"]), {"done": "TWO"})
+    sm.add("TWO", smachpy.CBState(throw, outcomes=["done"], output_keys=["eyes"]))
+    return sm
+"""
+
+
+@pytest.mark.parametrize("more", [[], ["--time", "virtual"]], ids=["real", "virtual"])
+def test_a_recorded_mission_throws_the_same_dice_again(tmp_path, monkeypatch, capsys, more):
+    """Between the begin of the command and that of the mission, others had thrown some."""
+    monkeypatch.chdir(tmp_path)
+    Path("dice.py").write_text(DICE)
+    state = random.getstate()
+    try:
+        for name in ("one", "two"):
+            command = ["run", "dice.py", "--plain", "--record", f"{name}.jsonl", *more]
+            assert main(command) == 0
+            assert main(["runs", "reproduce", f"{name}.jsonl", "--allow", "."]) == 0
+    finally:
+        random.setstate(state)
+    first, second = (read_recording(f"{name}.jsonl").events for name in ("one", "two"))
+    written = [[e["value"] for e in events if "value" in e] for events in (first, second)]
+    assert written[0] != written[1]
 
 
 def looks_around(userdata):
