@@ -1121,269 +1121,6 @@ function dropAt(at, docks, page2) {
   return { dock, index };
 }
 
-// src/core/hub.ts
-var SILENT_BEATS = 2;
-var GONE_MS = 15e4;
-var OPEN_MS = 20;
-var TIDY_MS = 5e3;
-var RETRY_MS = 1e3;
-var MOST_FOLLOWED = 32;
-var HEAD = /^\{"name": ?("(?:[^"\\]|\\.)*")/;
-var Hub = class {
-  isShared;
-  #pages = /* @__PURE__ */ new Map();
-  #stream = null;
-  #names = [];
-  // machines that the stream follows
-  #lasts = /* @__PURE__ */ new Map();
-  // newest event by machine
-  #machines = /* @__PURE__ */ new Map();
-  // the list, by name
-  #settings = "";
-  #actions = "";
-  #standing = { state: "connecting", problem: "", wantsToken: false };
-  #silence = 0;
-  // half beats without a message
-  #patience = SILENT_BEATS;
-  // of an open stream [beats]; doubled when one was closed for its silence
-  #watchdog;
-  #due;
-  /** @param where without a shared worker, a hidden page needs no stream */
-  constructor({ isShared }) {
-    this.isShared = isShared;
-  }
-  add(port) {
-    this.#pages.set(port, { follow: null, heard: Date.now(), follows: "", hasAll: false });
-    port.onmessage = ({ data }) => this.#take(port, data);
-  }
-  #take(port, told) {
-    const page2 = this.#pages.get(port) ?? { follow: null, heard: 0, follows: "", hasAll: false };
-    page2.heard = Date.now();
-    this.#pages.set(port, page2);
-    if (told.kind === "bye") {
-      this.#pages.delete(port);
-      this.#open(TIDY_MS);
-    } else if (told.kind === "reconnect") {
-      this.#standing = { state: "lost", problem: "", wantsToken: false };
-      this.#tellAll({ event: "standing", standing: this.#standing });
-      this.#open(0, true);
-    } else if (told.kind === "follow") {
-      const isNew2 = page2.follow === null;
-      page2.follow = told;
-      page2.follows = told.machine;
-      if (isNew2 && this.#stream?.readyState === 1) this.#greet(port);
-      page2.hasAll = told.last !== "" && this.#stream !== null && this.#lasts.get(told.machine) === told.last;
-      if (told.hidden) this.#open(TIDY_MS);
-      else if (!page2.hasAll) this.#open(OPEN_MS, true);
-    }
-  }
-  /** Tell a page what is the same for all. */
-  #greet(port) {
-    if (this.#settings) port.postMessage({ event: "settings", text: this.#settings });
-    port.postMessage({ event: "machines", text: JSON.stringify([...this.#machines.values()]) });
-    if (this.#actions) port.postMessage({ event: "actions", text: this.#actions });
-    port.postMessage({ event: "standing", standing: this.#standing });
-  }
-  #tellAll(message) {
-    for (const [port, { follow: follow3 }] of this.#pages) if (follow3) port.postMessage(message);
-  }
-  /** The pages that are to get the events of their machine. */
-  get #looking() {
-    for (const [port, { heard }] of this.#pages) if (Date.now() - heard > GONE_MS) this.#pages.delete(port);
-    return [...this.#pages.values()].filter(({ follow: follow3 }) => follow3 && !follow3.hidden);
-  }
-  /** Open a stream for what the pages follow now, in a moment. @param pause [ms] */
-  #open(pause, anyway = false) {
-    clearTimeout(this.#due);
-    this.#due = setTimeout(() => this.#openNow(anyway), pause);
-  }
-  /** @param anyway also if it follows these machines already */
-  #openNow(anyway) {
-    const looking = this.#looking;
-    const first = this.#firstMachine();
-    for (const page2 of looking) page2.follows ||= first;
-    const names = [...new Set(looking.map(({ follows }) => follows))].filter(Boolean).slice(0, MOST_FOLLOWED);
-    const isSame = names.length === this.#names.length && names.every((name) => this.#names.includes(name));
-    if (isSame && !anyway) return;
-    this.#close();
-    this.#names = names;
-    this.#lasts.clear();
-    if (!looking.length && (!this.isShared || !this.#pages.size)) return;
-    const words2 = ["actions=1"];
-    for (const name of names) {
-      const of = looking.filter(({ follows }) => follows === name).map(({ follow: follow3 }) => follow3);
-      const last = of.map((one) => one.last).reduce(older);
-      words2.push(`machine=${encoded(name)}`, `last=${encoded(last)}`);
-      words2.push(`seen=${last ? of.reduce((least, one) => Math.min(least, one.seen), Infinity) : -1}`);
-      this.#lasts.set(name, last);
-    }
-    for (const page2 of looking) page2.hasAll = page2.follow?.last !== "" && names.includes(page2.follows);
-    this.#listen(new EventSource(`/api/events?${words2.join("&")}`));
-  }
-  #close() {
-    this.#stream?.close();
-    this.#stream = null;
-    clearInterval(this.#watchdog);
-  }
-  #listen(stream) {
-    this.#stream = stream;
-    for (const event of ["settings", "beat", "machines", "actions", "facts", "snap", "observed", "gap", "events"])
-      stream.addEventListener(event, (message) => {
-        if (stream !== this.#stream) return;
-        this.#silence = 0;
-        this.#pass(event, message.data);
-        this.#remember(message.lastEventId);
-      });
-    stream.onopen = () => this.#set("live");
-    stream.onerror = () => {
-      if (stream !== this.#stream) return;
-      this.#set("lost");
-      if (stream.readyState === 2) this.#askWhy(stream.url);
-    };
-    this.#watch(JSON.parse(this.#settings || "{}").beat);
-  }
-  /** Note how far the stream is, and with it the pages. @param id of a message */
-  #remember(id) {
-    const words2 = id.split(" ");
-    if (!id || words2.length !== this.#names.length) return;
-    for (const [i4, name] of this.#names.entries()) this.#lasts.set(name, decodeURIComponent(words2[i4]));
-    for (const { follow: follow3, follows, hasAll } of this.#looking)
-      if (follow3 && hasAll) follow3.last = this.#lasts.get(follows) ?? follow3.last;
-  }
-  #pass(event, text2) {
-    const message = { event, text: text2 };
-    if (event === "beat") {
-      this.#patience = SILENT_BEATS;
-      this.#set("live");
-    } else if (event === "settings") {
-      this.#settings = text2;
-      this.#machines.clear();
-      this.#watch(JSON.parse(text2).beat);
-    } else if (event === "actions") this.#actions = text2;
-    else if (event === "machines") {
-      const { machines, gone } = JSON.parse(text2);
-      for (const one of machines) this.#machines.set(one.name, one);
-      for (const name of gone) this.#machines.delete(name);
-      message.text = JSON.stringify([...this.#machines.values()]);
-      if (this.#looking.some(({ follows }) => !follows) && this.#firstMachine()) this.#open(0);
-    } else {
-      const name = JSON.parse(HEAD.exec(text2)?.[1] ?? '""');
-      for (const [port, page2] of this.#pages) {
-        if (!page2.follow || page2.follow.hidden || page2.follows !== name) continue;
-        page2.hasAll ||= event === "snap";
-        if (page2.hasAll) port.postMessage(message);
-      }
-      return;
-    }
-    this.#tellAll(message);
-  }
-  /** The machine that a page shows which asks for none: as `smachpy_viz.live.machines.Machines.first`. */
-  #firstMachine() {
-    const all = [...this.#machines.values()].sort((a5, b3) => a5.name < b3.name ? -1 : 1);
-    return (all.find((one) => one.stale === null) ?? all[0])?.name ?? "";
-  }
-  #set(state, problem = "", wantsToken = false) {
-    const isSame = this.#standing.state === state && this.#standing.problem === problem;
-    this.#standing = { state, problem, wantsToken };
-    if (!isSame) this.#tellAll({ event: "standing", standing: this.#standing });
-  }
-  /** The server refused the stream: an EventSource does not tell why. */
-  async #askWhy(address) {
-    const limit = new AbortController();
-    try {
-      const answer = await fetch(address, { signal: limit.signal });
-      if (!answer.ok) {
-        const { text: text2, wants_token } = await answer.json();
-        this.#set("lost", text2, wants_token === true);
-      }
-    } catch {
-    }
-    limit.abort();
-    this.#open(RETRY_MS, true);
-  }
-  /**
-   * Reconnect when the beats stay away: a broken connection shows no error for minutes. Beats are also missing while a
-   * long message arrives over a slow link, so the next stream gets twice the time.
-   * @param beat [s]
-   */
-  #watch(beat) {
-    clearInterval(this.#watchdog);
-    this.#silence = 0;
-    if (!(beat > 0)) return;
-    this.#watchdog = setInterval(() => {
-      const isOpen2 = this.#stream?.readyState === 1;
-      this.#silence += 1;
-      if (this.#silence <= 2 * (isOpen2 ? this.#patience : SILENT_BEATS)) return;
-      if (isOpen2) this.#patience *= 2;
-      this.#set("lost");
-      this.#open(0, true);
-    }, beat * 500);
-  }
-};
-function older(a5, b3) {
-  const [i4, j3] = [a5.lastIndexOf(":"), b3.lastIndexOf(":")];
-  if (!a5 || !b3 || a5.slice(0, i4) !== b3.slice(0, j3)) return "";
-  return Number(a5.slice(i4 + 1)) < Number(b3.slice(j3 + 1)) ? a5 : b3;
-}
-var encoded = (text2) => encodeURIComponent(text2.replace(/\p{Surrogate}/gu, "�"));
-
-// src/core/storage.ts
-function saved(name, fallback) {
-  try {
-    return JSON.parse(localStorage.getItem(`smachpy.${name}`) ?? "null") ?? fallback;
-  } catch {
-    return fallback;
-  }
-}
-function save(name, value) {
-  try {
-    localStorage.setItem(`smachpy.${name}`, JSON.stringify(value));
-  } catch {
-  }
-}
-
-// src/core/store/clock.ts
-var CLOCKS = ["run", "wall", "relative"];
-var Clock = class {
-  chosen = y3(saved("clock", "run"));
-  #data;
-  #playback;
-  constructor(data, playback) {
-    this.#data = data;
-    this.#playback = playback;
-  }
-  choose(name) {
-    this.chosen.value = name;
-    save("clock", name);
-    this.#playback.slowTick.value += 1;
-  }
-  /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */
-  instantText(t4, digits = 1) {
-    if (this.chosen.value === "wall") return wallText(t4, digits);
-    if (this.chosen.value !== "relative") return this.runText(t4, digits);
-    const live = this.#data.liveMs();
-    const seconds = (t4 - live) / 1e3;
-    return Math.abs(seconds) < 60 ? `${seconds.toFixed(digits)} s` : this.runText(t4, digits, live);
-  }
-  /** An instant as time since another one, by default the beginning of the run, such as 00:32.0. */
-  runText(t4, digits = 1, since = this.#playback.began() ?? t4) {
-    const seconds = (t4 - since) / 1e3;
-    const unit = 10 ** digits;
-    const all = Math.round(Math.abs(seconds) * unit);
-    const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
-    const hours = Math.floor(all / (3600 * unit));
-    const part = digits ? `.${String(all % unit).padStart(digits, "0")}` : "";
-    const minutes = `${two(all / unit / 60 % 60)}:${two(all / unit % 60)}${part}`;
-    return `${seconds < 0 && all ? "-" : ""}${hours ? `${hours}:` : ""}${minutes}`;
-  }
-};
-function wallText(t4, digits) {
-  const unit = 10 ** digits;
-  const rounded2 = new Date(Math.round(t4 * unit / 1e3) * (1e3 / unit));
-  const part = digits ? `.${String(Math.round(rounded2.getMilliseconds() * (unit / 1e3))).padStart(digits, "0")}` : "";
-  return `${rounded2.toLocaleTimeString("en-GB", { hour12: false })}${part}`;
-}
-
 // src/core/fold.ts
 var RAISED = "exception";
 var CUT_SHORT = "a new run began before it ended";
@@ -1581,6 +1318,406 @@ function reopen(state, since) {
 function answerPreempt(data, e4, fact) {
   const state = stateOf(data, e4.path);
   if (state.preempt) state[fact] = e4.stamp_ns;
+}
+
+// src/core/text.ts
+var SPACE = /[\t-\r\u0085\p{Z}]+/u;
+var UNPRINTABLE = /[\p{C}\p{Z}]/gu;
+function shorten(text2, length = 34) {
+  const start = [...String(text2).slice(0, 8 * length)].slice(0, 4 * length).join("");
+  const words2 = start.split(SPACE).filter(Boolean);
+  const line = [...words2.map((word) => word.replace(UNPRINTABLE, "�")).join(" ")];
+  return line.length <= length ? line.join("") : `${line.slice(0, length - 1).join("")}…`;
+}
+function shortenLines(text2, length) {
+  const lines = [];
+  let left = length;
+  for (const line of text2.trim().split(/\r?\n/)) {
+    if (left <= 0) return [...lines, "…"].join("\n");
+    lines.push(shorten(line, left));
+    left -= line.length + 1;
+  }
+  return lines.join("\n");
+}
+function duration(seconds) {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 120) return `${Math.floor(seconds)} s`;
+  const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
+  if (seconds < 7200) return `${Math.floor(seconds / 60)} min ${two(seconds % 60)}`;
+  return `${Math.floor(seconds / 3600)} h ${two(seconds % 3600 / 60)}`;
+}
+var countOfEvents = (count) => `${count.toLocaleString("en")} event${count === 1 ? "" : "s"}`;
+var SOURCES = {
+  signal: "signal",
+  shutdown: "the program's end",
+  operator: "operator",
+  timeout: "timeout of",
+  concurrence: "concurrence, after",
+  plan: "plan",
+  action: "action",
+  state: "state",
+  test: "test",
+  program: "program"
+};
+function askerText(asked2) {
+  if (!asked2?.source) return null;
+  const who = `${own(SOURCES, asked2.source) ?? asked2.source} ${asked2.by ?? ""}`.trim();
+  return asked2.why ? `${who}: ${asked2.why}` : who;
+}
+function holdText(row, now) {
+  const grace = row.asked?.grace;
+  const limit = grace != null ? ` of ${duration(grace)}` : "";
+  return `${duration((now - row.preempt) / 1e3)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
+}
+var lastWord = (path) => path.split("/").at(-1) || path;
+
+// src/core/model.ts
+var CHANGE_SIGNS = {
+  added: "+",
+  removed: "−",
+  changed: "≠",
+  numbers: "×"
+};
+var signed = (change2, name) => change2 ? `${CHANGE_SIGNS[change2]} ${name}` : name;
+var KIND_NAMES = {
+  state: "state",
+  callback: "function",
+  action: "action",
+  service: "service call",
+  monitor: "monitor",
+  condition: "condition",
+  machine: "state machine",
+  sequence: "sequence",
+  concurrence: "concurrence",
+  iterator: "iterator",
+  plan: "Petri net plan",
+  place: "place",
+  "goal place": "goal",
+  "fail place": "failed plan",
+  transition: "transition",
+  missing: "missing state"
+};
+var isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
+var isCleanup = (node) => node.details.some(([name, value]) => name === "runs" && value === "at any end");
+function isInCleanup(node) {
+  return Boolean(node && (isCleanup(node) || isInCleanup(node.parent)));
+}
+var MANY = 7;
+var READABLE = 40;
+var Model = class {
+  payload;
+  keys;
+  root;
+  byPath = /* @__PURE__ */ new Map();
+  order = [];
+  // parents first
+  /** @param implicit whether to show implicit transitions */
+  constructor(payload, implicit) {
+    this.payload = payload;
+    this.keys = payload.keys;
+    this.root = implicit ? payload.implicit : payload.explicit;
+    this.#index(this.root, null, 0);
+    const counts = /* @__PURE__ */ new Map();
+    for (const { name } of this.order) counts.set(name, (counts.get(name) ?? 0) + 1);
+    for (const node of this.order) node.isRepeated = counts.get(node.name) > 1;
+  }
+  #index(node, parent, depth) {
+    Object.assign(node, { parent, depth, number: this.order.length });
+    node.name = shorten(node.caption || node.label);
+    node.shown = signed(node.change, node.name);
+    this.byPath.set(node.path, node);
+    this.order.push(node);
+    node.total = 1;
+    for (const child of node.children) {
+      this.#index(child, node, depth + 1);
+      node.total += child.total;
+    }
+    node.joins = joinsOf(node);
+    node.links = linksOf(node);
+    const wired = /* @__PURE__ */ new Map();
+    for (const link2 of node.links)
+      for (const outcome of link2.outcomes) wired.set(link2.source, (wired.get(link2.source) ?? /* @__PURE__ */ new Set()).add(outcome));
+    for (const child of node.children) child.wired = child.outcomes.filter((o5) => wired.get(child.label)?.has(o5));
+  }
+  get(path) {
+    return path == null ? void 0 : this.byPath.get(path);
+  }
+  /** The containers around a state, outermost first. */
+  ancestors(path) {
+    const found = [];
+    for (let node = this.get(path)?.parent; node; node = node.parent) found.unshift(node);
+    return found;
+  }
+  /** The arrow of an outcome of a state. */
+  linkOf(node, outcome) {
+    return node.parent?.links.find((link2) => link2.source === node.label && link2.outcomes.includes(outcome));
+  }
+  search(text2) {
+    const words2 = text2.toLowerCase().split(/\s+/).filter(Boolean);
+    if (!words2.length) return [];
+    const found = this.order.filter((node) => words2.every((word) => node.path.toLowerCase().includes(word)));
+    const rank = (node) => node.label.toLowerCase().startsWith(words2[0]) ? 0 : 1;
+    return found.sort((a5, b3) => rank(a5) - rank(b3) || a5.number - b3.number);
+  }
+  /** Paths of the containers down to `depth` levels, or of all; up to there many branches of one stay closed. */
+  toDepth(depth) {
+    const isWanted = (node) => node.children.length > 0 && node.depth < depth && (depth >= ALL_LEVELS || !this.isBranch(node));
+    return new Set(this.order.filter(isWanted).map((node) => node.path));
+  }
+  /** Whether a state is one of many branches, or within one. */
+  isBranch(node) {
+    for (let one = node; one.parent; one = one.parent) if (hasManyBranches(one.parent)) return true;
+    return false;
+  }
+  /** The greatest depth at which a page is readable at a glance. */
+  readableDepth(most = READABLE, from = this.root) {
+    let visible = 0;
+    let depth = 0;
+    let level = [from];
+    while (level.length) {
+      visible += level.length;
+      if (visible > most && depth > 1) break;
+      depth += 1;
+      level = level.flatMap((node) => hasManyBranches(node) ? [] : node.children);
+    }
+    return Math.max(depth - 1, 1);
+  }
+};
+var ALL_LEVELS = 99;
+var hasManyBranches = ({ kind, children }) => kind === "concurrence" && children.length >= MANY;
+function joinsOf(node) {
+  const labels = new Set(node.children.map((child) => child.label));
+  return node.rules.flatMap(({ outcome, conditions, text: text2, change: change2 }) => {
+    const known2 = conditions.filter(([label]) => labels.has(label));
+    if (new Set(known2.map(([label]) => label)).size < 2 || text2.startsWith("any of")) return [];
+    const quorum = /^(\d+) of /.exec(text2);
+    return [{ outcome, text: text2, change: change2, conditions: known2, need: quorum ? Number(quorum[1]) : known2.length }];
+  });
+}
+function joinText({ need, conditions }, met) {
+  const all = conditions.length;
+  const what = need < all ? `${need} of ${all}` : all === 2 ? "both" : `all ${all}`;
+  return met > 0 && met < need ? `${what}: ${met} of ${need}` : what;
+}
+function linksOf(node) {
+  const found = node.edges.map((edge) => ({ ...edge, rule: null, join: null }));
+  const keyOf3 = (...parts) => parts.join("\n");
+  const known2 = new Set(found.flatMap((edge) => edge.outcomes.map((o5) => keyOf3(edge.source, o5, edge.target, null))));
+  for (const rule of node.rules) {
+    const number = node.joins.findIndex((one) => one.outcome === rule.outcome && one.text === rule.text);
+    const join2 = number < 0 ? null : number;
+    for (const [source, outcome] of rule.conditions) {
+      const key = keyOf3(source, outcome, rule.outcome, join2);
+      if (known2.has(key) || !node.children.some((child) => child.label === source)) continue;
+      known2.add(key);
+      const same2 = found.find(
+        (edge) => edge.rule && edge.source === source && edge.target === rule.outcome && edge.change === rule.change && edge.join === join2
+      );
+      if (same2) same2.outcomes = [...same2.outcomes, outcome];
+      else
+        found.push({
+          source,
+          target: rule.outcome,
+          to_outcome: true,
+          outcomes: [outcome],
+          implicit: false,
+          back: false,
+          rule: rule.text || rule.outcome,
+          join: join2,
+          change: rule.change,
+          note: ""
+        });
+    }
+  }
+  return found;
+}
+
+// src/core/values.ts
+var MOST = 2e4;
+var ROUNDED = 6;
+var WIDE = 88;
+var QUOTED = /[\\\p{Cc}\u00a0\u2028\u2029]/gu;
+var ESCAPES = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "	": "\\t" };
+function quoted(text2) {
+  const quote = text2.includes("'") && !text2.includes('"') ? '"' : "'";
+  const hex = (c4) => c4.charCodeAt(0).toString(16);
+  const inside = text2.replace(QUOTED, (c4) => {
+    const long = c4.charCodeAt(0) > 255;
+    return ESCAPES[c4] ?? (long ? `\\u${hex(c4)}` : `\\x${hex(c4).padStart(2, "0")}`);
+  });
+  return `${quote}${quote === "'" ? inside.replaceAll("'", "\\'") : inside}${quote}`;
+}
+var isTree = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
+var items = (value) => {
+  if (!Array.isArray(value)) throw new TypeError("no list");
+  return value;
+};
+var className = (value) => String(value.$object ?? String(value.$msg).split("/").at(-1));
+function fieldsOf(value) {
+  if (!isTree(value)) return null;
+  if ("$msg" in value || "$object" in value) return isTree(value.fields) ? value.fields : {};
+  return formOf(value) === null ? value : null;
+}
+var FORMS = {
+  $tuple: ({ $tuple }) => listed("tuple", "(", items($tuple), items($tuple).length === 1 ? ",)" : ")"),
+  $set: ({ $set }) => items($set).length ? listed("set", "{", items($set), "}") : "set()",
+  $items: ({ $items }) => ({
+    ...{ name: "dict", begin: "{", end: "}", sign: ": " },
+    parts: items($items).map((item) => [brief(items(item)[0]), items(item)[1]])
+  }),
+  $float: ({ $float }) => String($float),
+  $int: ({ $int }) => String($int),
+  $bytes: ({ $bytes }) => `b${quoted(atob(String($bytes)))}`,
+  $msg: (value) => called(value),
+  $object: (value) => called(value),
+  $array: ({ $array, dtype }) => listed("array", "array([", items($array), `], dtype=${dtype})`),
+  $cut: ({ $cut }) => `${quoted(String($cut))}…`,
+  $large: ({ $large, length }) => `<${$large} of ${length} elements>`,
+  $repr: ({ $repr }) => String($repr)
+};
+var listed = (name, begin, parts, end) => ({
+  name,
+  begin,
+  end,
+  sign: "",
+  parts: parts.map((one) => [null, one])
+});
+var called = (value) => ({
+  ...{ name: className(value), begin: `${className(value)}(`, end: ")", sign: "=" },
+  parts: Object.entries(fieldsOf(value) ?? {})
+});
+var formOf = (value) => Object.keys(FORMS).find((mark) => Object.hasOwn(value, mark)) ?? null;
+function opened(value, numberText2) {
+  if (value === null || value === void 0) return "None";
+  if (typeof value === "boolean") return value ? "True" : "False";
+  if (typeof value === "number") return numberText2(value);
+  if (typeof value === "string") return quoted(value);
+  if (Array.isArray(value)) return listed("list", "[", value, "]");
+  if (!isTree(value)) return String(value);
+  const form = formOf(value);
+  try {
+    if (form) return FORMS[form](value);
+  } catch {
+  }
+  const parts = Object.entries(value).map(([key, part]) => [quoted(key), part]);
+  return { name: "dict", begin: "{", end: "}", sign: ": ", parts };
+}
+var rounded = (number) => String(Number.isInteger(number) ? number : Number(number.toPrecision(ROUNDED)));
+var branchOf = (value) => opened(value, rounded);
+var brief = (value) => text(value, rounded);
+function text(value, numberText2) {
+  const one = opened(value, numberText2);
+  if (typeof one === "string") return one;
+  const parts = one.parts.map(([name, part]) => `${head(one, name)}${text(part, numberText2)}`);
+  return `${one.begin}${parts.join(", ")}${one.end}`;
+}
+var head = ({ sign: sign2 }, name) => name === null ? "" : `${name}${sign2}`;
+var pretty = (value) => wrapped(value, "").slice(0, MOST);
+function wrapped(value, indent) {
+  const line = text(value, String);
+  const one = opened(value, String);
+  if (typeof one === "string" || line.length + indent.length <= WIDE) return line;
+  const inner = `${indent}  `;
+  const parts = one.parts.map(([name, part]) => `${inner}${head(one, name)}${wrapped(part, inner)}`);
+  return `${one.begin}
+${parts.join(",\n")}
+${indent}${one.end}`;
+}
+function wasShortened(value) {
+  if (Array.isArray(value)) return value.some(wasShortened);
+  if (!isTree(value)) return false;
+  if ("$cut" in value || "$large" in value || String(value.$repr ?? "").endsWith("…")) return true;
+  return Object.values(value).some(wasShortened);
+}
+
+// src/core/places.ts
+var LONGEST_NAME = 40;
+var MOST_NAMES = 200;
+var fields = (value) => fieldsOf(value) ?? {};
+var isNumber = (value) => Number.isFinite(value);
+function placeOf2(stamped) {
+  const outer = fields(stamped);
+  const { position, orientation } = fields(outer.pose ?? stamped);
+  const { x: x3, y: y5 } = fields(position);
+  if (!isNumber(x3) || !isNumber(y5)) return null;
+  const turn = fields(orientation);
+  const [qx, qy, qz, qw] = [turn.x, turn.y, turn.z, turn.w].map((v4) => isNumber(v4) ? v4 : 0);
+  const frame = fields(outer.header).frame_id ?? "map";
+  const yaw = Math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz));
+  return /(^|\/)map$/.test(String(frame)) ? { x: x3, y: y5, yaw } : null;
+}
+var placeIn = (message, names) => names.map((name) => placeOf2(own(fields(message), name))).find((place) => place !== null) ?? null;
+function namedPlaces(value) {
+  const one = namedPlace(value, null);
+  if (one) return [one];
+  const parts = isTree(value) ? value.$tuple : value;
+  const named = Array.isArray(parts) ? parts.slice(0, MOST_NAMES).map((part) => namedPlace(part, null)) : Object.entries(fields(value)).slice(0, MOST_NAMES).map(([key, part]) => namedPlace(part, key));
+  return named.filter((place) => place !== null);
+}
+function namedPlace(value, key) {
+  const { name, label, x: x3, y: y5, pose } = fields(value);
+  const called2 = name ?? label ?? key;
+  if (typeof called2 !== "string" || !called2 || called2.length > LONGEST_NAME) return null;
+  const place = isNumber(x3) && isNumber(y5) ? { x: x3, y: y5 } : placeOf2(pose ?? value) ?? fields(pose);
+  return isNumber(place.x) && isNumber(place.y) ? { name: called2, x: place.x, y: place.y } : null;
+}
+var placeText = ({ x: x3, y: y5 }) => `(${x3.toFixed(1)}, ${y5.toFixed(1)})`;
+
+// src/core/storage.ts
+function saved(name, fallback) {
+  try {
+    return JSON.parse(localStorage.getItem(`smachpy.${name}`) ?? "null") ?? fallback;
+  } catch {
+    return fallback;
+  }
+}
+function save(name, value) {
+  try {
+    localStorage.setItem(`smachpy.${name}`, JSON.stringify(value));
+  } catch {
+  }
+}
+
+// src/core/store/clock.ts
+var CLOCKS = ["run", "wall", "relative"];
+var Clock = class {
+  chosen = y3(saved("clock", "run"));
+  #data;
+  #playback;
+  constructor(data, playback) {
+    this.#data = data;
+    this.#playback = playback;
+  }
+  choose(name) {
+    this.chosen.value = name;
+    save("clock", name);
+    this.#playback.slowTick.value += 1;
+  }
+  /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */
+  instantText(t4, digits = 1) {
+    if (this.chosen.value === "wall") return wallText(t4, digits);
+    if (this.chosen.value !== "relative") return this.runText(t4, digits);
+    const live = this.#data.liveMs();
+    const seconds = (t4 - live) / 1e3;
+    return Math.abs(seconds) < 60 ? `${seconds.toFixed(digits)} s` : this.runText(t4, digits, live);
+  }
+  /** An instant as time since another one, by default the beginning of the run, such as 00:32.0. */
+  runText(t4, digits = 1, since = this.#playback.began() ?? t4) {
+    const seconds = (t4 - since) / 1e3;
+    const unit = 10 ** digits;
+    const all = Math.round(Math.abs(seconds) * unit);
+    const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
+    const hours = Math.floor(all / (3600 * unit));
+    const part = digits ? `.${String(all % unit).padStart(digits, "0")}` : "";
+    const minutes = `${two(all / unit / 60 % 60)}:${two(all / unit % 60)}${part}`;
+    return `${seconds < 0 && all ? "-" : ""}${hours ? `${hours}:` : ""}${minutes}`;
+  }
+};
+function wallText(t4, digits) {
+  const unit = 10 ** digits;
+  const rounded2 = new Date(Math.round(t4 * unit / 1e3) * (1e3 / unit));
+  const part = digits ? `.${String(Math.round(rounded2.getMilliseconds() * (unit / 1e3))).padStart(digits, "0")}` : "";
+  return `${rounded2.toLocaleTimeString("en-GB", { hour12: false })}${part}`;
 }
 
 // src/core/lists.ts
@@ -1945,104 +2082,6 @@ var Run = class {
 };
 var timeOf = (e4) => e4.stamp_ns / 1e6;
 
-// src/core/values.ts
-var MOST = 2e4;
-var ROUNDED = 6;
-var WIDE = 88;
-var QUOTED = /[\\\p{Cc}\u00a0\u2028\u2029]/gu;
-var ESCAPES = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "	": "\\t" };
-function quoted(text2) {
-  const quote = text2.includes("'") && !text2.includes('"') ? '"' : "'";
-  const hex = (c4) => c4.charCodeAt(0).toString(16);
-  const inside = text2.replace(QUOTED, (c4) => {
-    const long = c4.charCodeAt(0) > 255;
-    return ESCAPES[c4] ?? (long ? `\\u${hex(c4)}` : `\\x${hex(c4).padStart(2, "0")}`);
-  });
-  return `${quote}${quote === "'" ? inside.replaceAll("'", "\\'") : inside}${quote}`;
-}
-var isTree = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
-var items = (value) => {
-  if (!Array.isArray(value)) throw new TypeError("no list");
-  return value;
-};
-var className = (value) => String(value.$object ?? String(value.$msg).split("/").at(-1));
-function fieldsOf(value) {
-  if (!isTree(value)) return null;
-  if ("$msg" in value || "$object" in value) return isTree(value.fields) ? value.fields : {};
-  return formOf(value) === null ? value : null;
-}
-var FORMS = {
-  $tuple: ({ $tuple }) => listed("tuple", "(", items($tuple), items($tuple).length === 1 ? ",)" : ")"),
-  $set: ({ $set }) => items($set).length ? listed("set", "{", items($set), "}") : "set()",
-  $items: ({ $items }) => ({
-    ...{ name: "dict", begin: "{", end: "}", sign: ": " },
-    parts: items($items).map((item) => [brief(items(item)[0]), items(item)[1]])
-  }),
-  $float: ({ $float }) => String($float),
-  $int: ({ $int }) => String($int),
-  $bytes: ({ $bytes }) => `b${quoted(atob(String($bytes)))}`,
-  $msg: (value) => called(value),
-  $object: (value) => called(value),
-  $array: ({ $array, dtype }) => listed("array", "array([", items($array), `], dtype=${dtype})`),
-  $cut: ({ $cut }) => `${quoted(String($cut))}…`,
-  $large: ({ $large, length }) => `<${$large} of ${length} elements>`,
-  $repr: ({ $repr }) => String($repr)
-};
-var listed = (name, begin, parts, end) => ({
-  name,
-  begin,
-  end,
-  sign: "",
-  parts: parts.map((one) => [null, one])
-});
-var called = (value) => ({
-  ...{ name: className(value), begin: `${className(value)}(`, end: ")", sign: "=" },
-  parts: Object.entries(fieldsOf(value) ?? {})
-});
-var formOf = (value) => Object.keys(FORMS).find((mark) => Object.hasOwn(value, mark)) ?? null;
-function opened(value, numberText2) {
-  if (value === null || value === void 0) return "None";
-  if (typeof value === "boolean") return value ? "True" : "False";
-  if (typeof value === "number") return numberText2(value);
-  if (typeof value === "string") return quoted(value);
-  if (Array.isArray(value)) return listed("list", "[", value, "]");
-  if (!isTree(value)) return String(value);
-  const form = formOf(value);
-  try {
-    if (form) return FORMS[form](value);
-  } catch {
-  }
-  const parts = Object.entries(value).map(([key, part]) => [quoted(key), part]);
-  return { name: "dict", begin: "{", end: "}", sign: ": ", parts };
-}
-var rounded = (number) => String(Number.isInteger(number) ? number : Number(number.toPrecision(ROUNDED)));
-var branchOf = (value) => opened(value, rounded);
-var brief = (value) => text(value, rounded);
-function text(value, numberText2) {
-  const one = opened(value, numberText2);
-  if (typeof one === "string") return one;
-  const parts = one.parts.map(([name, part]) => `${head(one, name)}${text(part, numberText2)}`);
-  return `${one.begin}${parts.join(", ")}${one.end}`;
-}
-var head = ({ sign: sign2 }, name) => name === null ? "" : `${name}${sign2}`;
-var pretty = (value) => wrapped(value, "").slice(0, MOST);
-function wrapped(value, indent) {
-  const line = text(value, String);
-  const one = opened(value, String);
-  if (typeof one === "string" || line.length + indent.length <= WIDE) return line;
-  const inner = `${indent}  `;
-  const parts = one.parts.map(([name, part]) => `${inner}${head(one, name)}${wrapped(part, inner)}`);
-  return `${one.begin}
-${parts.join(",\n")}
-${indent}${one.end}`;
-}
-function wasShortened(value) {
-  if (Array.isArray(value)) return value.some(wasShortened);
-  if (!isTree(value)) return false;
-  if ("$cut" in value || "$large" in value || String(value.$repr ?? "").endsWith("…")) return true;
-  return Object.values(value).some(wasShortened);
-}
-
 // src/core/scene.ts
 var COLOURS = 8;
 var MOST_POSES = 6e4;
@@ -2051,38 +2090,8 @@ var MOST_SERIES = 400;
 var NEAR = 0.3;
 var ENDED = { Left: 1, Failed: 1, Finished: 1 };
 var robotOf = (action) => String(action ?? "").replace(/^\//, "").replace(/\/?[^/]*$/, "");
-var fields = (value) => fieldsOf(value) ?? {};
-var isNumber = (value) => Number.isFinite(value);
-function placeOf2(stamped) {
-  const outer = fields(stamped);
-  const { position, orientation } = fields(outer.pose ?? stamped);
-  const { x: x3, y: y5 } = fields(position);
-  if (!isNumber(x3) || !isNumber(y5)) return null;
-  const turn = fields(orientation);
-  const [qx, qy, qz, qw] = [turn.x, turn.y, turn.z, turn.w].map((v4) => isNumber(v4) ? v4 : 0);
-  const frame = fields(outer.header).frame_id ?? "map";
-  const yaw = Math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz));
-  return /(^|\/)map$/.test(String(frame)) ? { x: x3, y: y5, yaw } : null;
-}
-var placeIn = (message, names) => names.map((name) => placeOf2(own(fields(message), name))).find((place) => place !== null) ?? null;
 var GOALS = ["target_pose", "pose", "goal_pose", "goal"];
 var FEEDBACK = ["base_position", "current_pose"];
-var LONGEST_NAME = 40;
-var MOST_NAMES = 200;
-function namedPlaces(value) {
-  const one = namedPlace(value, null);
-  if (one) return [one];
-  const parts = isTree(value) ? value.$tuple : value;
-  const named = Array.isArray(parts) ? parts.slice(0, MOST_NAMES).map((part) => namedPlace(part, null)) : Object.entries(fields(value)).slice(0, MOST_NAMES).map(([key, part]) => namedPlace(part, key));
-  return named.filter((place) => place !== null);
-}
-function namedPlace(value, key) {
-  const { name, label, x: x3, y: y5, pose } = fields(value);
-  const called2 = name ?? label ?? key;
-  if (typeof called2 !== "string" || !called2 || called2.length > LONGEST_NAME) return null;
-  const place = isNumber(x3) && isNumber(y5) ? { x: x3, y: y5 } : placeOf2(pose ?? value) ?? fields(pose);
-  return isNumber(place.x) && isNumber(place.y) ? { name: called2, x: place.x, y: place.y } : null;
-}
 var countUntil = (list, t4) => countWhile(list, (one) => one.t <= t4);
 function newestAt(goals, t4) {
   const goal = goals[countUntil(goals, t4) - 1];
@@ -2339,56 +2348,6 @@ function scanPoints({ at: [x3, y5, yaw], first, step, ranges }) {
     if (cm >= 0) points2.push({ x: x3 + cm / 100 * Math.cos(turn), y: y5 + cm / 100 * Math.sin(turn) });
   });
   return points2;
-}
-
-// src/core/text.ts
-var SPACE = /[\t-\r\u0085\p{Z}]+/u;
-var UNPRINTABLE = /[\p{C}\p{Z}]/gu;
-function shorten(text2, length = 34) {
-  const start = [...String(text2).slice(0, 8 * length)].slice(0, 4 * length).join("");
-  const words2 = start.split(SPACE).filter(Boolean);
-  const line = [...words2.map((word) => word.replace(UNPRINTABLE, "�")).join(" ")];
-  return line.length <= length ? line.join("") : `${line.slice(0, length - 1).join("")}…`;
-}
-function shortenLines(text2, length) {
-  const lines = [];
-  let left = length;
-  for (const line of text2.trim().split(/\r?\n/)) {
-    if (left <= 0) return [...lines, "…"].join("\n");
-    lines.push(shorten(line, left));
-    left -= line.length + 1;
-  }
-  return lines.join("\n");
-}
-function duration(seconds) {
-  if (seconds < 10) return `${seconds.toFixed(1)} s`;
-  if (seconds < 120) return `${Math.floor(seconds)} s`;
-  const two = (n3) => String(Math.floor(n3)).padStart(2, "0");
-  if (seconds < 7200) return `${Math.floor(seconds / 60)} min ${two(seconds % 60)}`;
-  return `${Math.floor(seconds / 3600)} h ${two(seconds % 3600 / 60)}`;
-}
-var countOfEvents = (count) => `${count.toLocaleString("en")} event${count === 1 ? "" : "s"}`;
-var SOURCES = {
-  signal: "signal",
-  shutdown: "the program's end",
-  operator: "operator",
-  timeout: "timeout of",
-  concurrence: "concurrence, after",
-  plan: "plan",
-  action: "action",
-  state: "state",
-  test: "test",
-  program: "program"
-};
-function askerText(asked2) {
-  if (!asked2?.source) return null;
-  const who = `${own(SOURCES, asked2.source) ?? asked2.source} ${asked2.by ?? ""}`.trim();
-  return asked2.why ? `${who}: ${asked2.why}` : who;
-}
-function holdText(row, now) {
-  const grace = row.asked?.grace;
-  const limit = grace != null ? ` of ${duration(grace)}` : "";
-  return `${duration((now - row.preempt) / 1e3)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
 }
 
 // src/core/why.ts
@@ -3132,167 +3091,6 @@ var Pointer = class {
   }
 };
 
-// src/core/model.ts
-var CHANGE_SIGNS = {
-  added: "+",
-  removed: "−",
-  changed: "≠",
-  numbers: "×"
-};
-var signed = (change2, name) => change2 ? `${CHANGE_SIGNS[change2]} ${name}` : name;
-var KIND_NAMES = {
-  state: "state",
-  callback: "function",
-  action: "action",
-  service: "service call",
-  monitor: "monitor",
-  condition: "condition",
-  machine: "state machine",
-  sequence: "sequence",
-  concurrence: "concurrence",
-  iterator: "iterator",
-  plan: "Petri net plan",
-  place: "place",
-  "goal place": "goal",
-  "fail place": "failed plan",
-  transition: "transition",
-  missing: "missing state"
-};
-var isPartOfNet = ({ kind }) => kind === "transition" || kind.endsWith("place");
-var isCleanup = (node) => node.details.some(([name, value]) => name === "runs" && value === "at any end");
-function isInCleanup(node) {
-  return Boolean(node && (isCleanup(node) || isInCleanup(node.parent)));
-}
-var MANY = 7;
-var READABLE = 40;
-var Model = class {
-  payload;
-  keys;
-  root;
-  byPath = /* @__PURE__ */ new Map();
-  order = [];
-  // parents first
-  /** @param implicit whether to show implicit transitions */
-  constructor(payload, implicit) {
-    this.payload = payload;
-    this.keys = payload.keys;
-    this.root = implicit ? payload.implicit : payload.explicit;
-    this.#index(this.root, null, 0);
-    const counts = /* @__PURE__ */ new Map();
-    for (const { name } of this.order) counts.set(name, (counts.get(name) ?? 0) + 1);
-    for (const node of this.order) node.isRepeated = counts.get(node.name) > 1;
-  }
-  #index(node, parent, depth) {
-    Object.assign(node, { parent, depth, number: this.order.length });
-    node.name = shorten(node.caption || node.label);
-    node.shown = signed(node.change, node.name);
-    this.byPath.set(node.path, node);
-    this.order.push(node);
-    node.total = 1;
-    for (const child of node.children) {
-      this.#index(child, node, depth + 1);
-      node.total += child.total;
-    }
-    node.joins = joinsOf(node);
-    node.links = linksOf(node);
-    const wired = /* @__PURE__ */ new Map();
-    for (const link2 of node.links)
-      for (const outcome of link2.outcomes) wired.set(link2.source, (wired.get(link2.source) ?? /* @__PURE__ */ new Set()).add(outcome));
-    for (const child of node.children) child.wired = child.outcomes.filter((o5) => wired.get(child.label)?.has(o5));
-  }
-  get(path) {
-    return path == null ? void 0 : this.byPath.get(path);
-  }
-  /** The containers around a state, outermost first. */
-  ancestors(path) {
-    const found = [];
-    for (let node = this.get(path)?.parent; node; node = node.parent) found.unshift(node);
-    return found;
-  }
-  /** The arrow of an outcome of a state. */
-  linkOf(node, outcome) {
-    return node.parent?.links.find((link2) => link2.source === node.label && link2.outcomes.includes(outcome));
-  }
-  search(text2) {
-    const words2 = text2.toLowerCase().split(/\s+/).filter(Boolean);
-    if (!words2.length) return [];
-    const found = this.order.filter((node) => words2.every((word) => node.path.toLowerCase().includes(word)));
-    const rank = (node) => node.label.toLowerCase().startsWith(words2[0]) ? 0 : 1;
-    return found.sort((a5, b3) => rank(a5) - rank(b3) || a5.number - b3.number);
-  }
-  /** Paths of the containers down to `depth` levels, or of all; up to there many branches of one stay closed. */
-  toDepth(depth) {
-    const isWanted = (node) => node.children.length > 0 && node.depth < depth && (depth >= ALL_LEVELS || !this.isBranch(node));
-    return new Set(this.order.filter(isWanted).map((node) => node.path));
-  }
-  /** Whether a state is one of many branches, or within one. */
-  isBranch(node) {
-    for (let one = node; one.parent; one = one.parent) if (hasManyBranches(one.parent)) return true;
-    return false;
-  }
-  /** The greatest depth at which a page is readable at a glance. */
-  readableDepth(most = READABLE, from = this.root) {
-    let visible = 0;
-    let depth = 0;
-    let level = [from];
-    while (level.length) {
-      visible += level.length;
-      if (visible > most && depth > 1) break;
-      depth += 1;
-      level = level.flatMap((node) => hasManyBranches(node) ? [] : node.children);
-    }
-    return Math.max(depth - 1, 1);
-  }
-};
-var ALL_LEVELS = 99;
-var hasManyBranches = ({ kind, children }) => kind === "concurrence" && children.length >= MANY;
-function joinsOf(node) {
-  const labels = new Set(node.children.map((child) => child.label));
-  return node.rules.flatMap(({ outcome, conditions, text: text2, change: change2 }) => {
-    const known2 = conditions.filter(([label]) => labels.has(label));
-    if (new Set(known2.map(([label]) => label)).size < 2 || text2.startsWith("any of")) return [];
-    const quorum = /^(\d+) of /.exec(text2);
-    return [{ outcome, text: text2, change: change2, conditions: known2, need: quorum ? Number(quorum[1]) : known2.length }];
-  });
-}
-function joinText({ need, conditions }, met) {
-  const all = conditions.length;
-  const what = need < all ? `${need} of ${all}` : all === 2 ? "both" : `all ${all}`;
-  return met > 0 && met < need ? `${what}: ${met} of ${need}` : what;
-}
-function linksOf(node) {
-  const found = node.edges.map((edge) => ({ ...edge, rule: null, join: null }));
-  const keyOf3 = (...parts) => parts.join("\n");
-  const known2 = new Set(found.flatMap((edge) => edge.outcomes.map((o5) => keyOf3(edge.source, o5, edge.target, null))));
-  for (const rule of node.rules) {
-    const number = node.joins.findIndex((one) => one.outcome === rule.outcome && one.text === rule.text);
-    const join2 = number < 0 ? null : number;
-    for (const [source, outcome] of rule.conditions) {
-      const key = keyOf3(source, outcome, rule.outcome, join2);
-      if (known2.has(key) || !node.children.some((child) => child.label === source)) continue;
-      known2.add(key);
-      const same2 = found.find(
-        (edge) => edge.rule && edge.source === source && edge.target === rule.outcome && edge.change === rule.change && edge.join === join2
-      );
-      if (same2) same2.outcomes = [...same2.outcomes, outcome];
-      else
-        found.push({
-          source,
-          target: rule.outcome,
-          to_outcome: true,
-          outcomes: [outcome],
-          implicit: false,
-          back: false,
-          rule: rule.text || rule.outcome,
-          join: join2,
-          change: rule.change,
-          note: ""
-        });
-    }
-  }
-  return found;
-}
-
 // src/core/store/status.ts
 var Status = class {
   #data;
@@ -3533,6 +3331,458 @@ function createStore() {
 }
 var store = createStore();
 
+// src/core/purposes.ts
+var NAMES = ["name", "station", "place", "waypoint", "location", "target", "object", "item", "text"];
+function purposeOf(id, { goal }) {
+  const { scene } = store.data;
+  const driven = scene.goalWithId(id);
+  if (driven) return scene.placeName(driven) || placeText(driven);
+  const fields2 = fieldsOf(goal) ?? {};
+  for (const name of NAMES) if (typeof fields2[name] === "string" && fields2[name]) return shorten(fields2[name], 24);
+  return "";
+}
+function goalText(id, goal) {
+  const purpose = purposeOf(id, goal);
+  const left = goal.progress?.distance;
+  const name = goal.action.replace(/^\//, "");
+  return `${name}${purpose ? ` → ${purpose}` : ""}${left == null ? "" : `, ${left.toFixed(1)} m left`}`;
+}
+function purposeOfVisit(span) {
+  if (span.note) return shorten(span.note, 40);
+  if (span.purpose !== void 0) return span.purpose;
+  const found = span.sent ? purposeOf(span.sent.id, span.sent) : "";
+  if (span.to !== null) span.purpose = found;
+  return found;
+}
+function attemptText(path, attempt) {
+  const retry = store.data.model.value?.get(path)?.details.find(([name]) => name === "retry")?.[1] ?? "";
+  const most = /^(\d+) attempts/.exec(retry)?.[1];
+  return `attempt ${attempt}${most ? ` of ${most}` : ""}`;
+}
+var tidies = (path) => isInCleanup(store.data.model.value?.get(path));
+function wordsOf(name, span, now) {
+  const took = duration(Math.max(0, Math.min(span.to ?? now, now) - span.from) / 1e3);
+  const purpose = purposeOfVisit(span);
+  const runs2 = span.to === null || span.to > now;
+  const facts = [
+    (span.attempt ?? 1) > 1 && attemptText(span.path, span.attempt ?? 1),
+    tidies(span.path) && (runs2 ? "tidying up" : "tidied up"),
+    runs2 && span.serviced !== null && span.serviced <= now && "cleaning up"
+  ].filter(Boolean);
+  const more = facts.map((fact) => `, ${fact}`).join("");
+  const to = purpose && `→ ${purpose}`;
+  const all = [
+    `${name}${to && ` ${to}`}${more} ${took}`,
+    `${name}${to && ` ${to}`}${more}`,
+    to && `${to}${more} ${took}`,
+    to || name,
+    purpose || name
+  ];
+  return [...new Set(all.filter(Boolean))];
+}
+function insideText(path) {
+  const leaf = store.status.activeLeaves.value.find((one) => one.startsWith(`${path}/`));
+  if (leaf) return `${leaf.slice(leaf.lastIndexOf("/") + 1)} ${purposeOfState(leaf)}`.trim();
+  const state = own(store.playback.shown().states, path);
+  if (!state?.visits) return "not begun";
+  return state.since != null ? purposeOfState(path) : state.error ?? state.outcome ?? "";
+}
+function purposeOfState(path) {
+  const span = store.data.run.open.get(path);
+  const purpose = span ? purposeOfVisit(span) : "";
+  return [tidies(path) && "tidying up", purpose && `→ ${purpose}`].filter(Boolean).join(" ");
+}
+
+// src/core/requests.ts
+var ANSWER_MS = 3e3;
+var token = null;
+var view = "";
+function readToken() {
+  const words2 = new URLSearchParams(location.hash.slice(1));
+  const given = words2.get("token") || null;
+  view = words2.get("view") ?? "";
+  words2.delete("token");
+  words2.delete("view");
+  try {
+    if (given) sessionStorage.setItem("smachpy.token", given);
+    token = given ?? sessionStorage.getItem("smachpy.token");
+  } catch {
+    token = given;
+  }
+  const rest = String(words2);
+  if (given || view) history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
+}
+async function logIn() {
+  const known2 = token ?? view;
+  if (known2) await ask("/api/login", { method: "POST", body: JSON.stringify({ token: known2 }) });
+}
+var hasToken = () => token !== null && store.data.settings.value.control;
+function setToken(text2) {
+  const [, found] = /#token=([\w-]+)/.exec(text2) ?? /^\s*([\w-]+)\s*$/.exec(text2) ?? [];
+  if (!found) return false;
+  token = found;
+  try {
+    sessionStorage.setItem("smachpy.token", found);
+  } catch {
+  }
+  return true;
+}
+var encoded = (text2) => encodeURIComponent(text2.replace(/\p{Surrogate}/gu, "�"));
+var link = (what, more = "", machine = store.data.facts.value?.name ?? "") => `/api/${what}?machine=${encoded(machine)}${more}`;
+async function ask(address, options = {}) {
+  let answer;
+  let text2;
+  try {
+    answer = await fetch(address, options);
+    text2 = await answer.text();
+  } catch (error) {
+    return failure(`The viewer's server does not answer (${messageOf(error)}).`);
+  }
+  try {
+    return JSON.parse(text2);
+  } catch {
+    const status = `${answer.status} ${answer.statusText}`.trim();
+    const reason = [status, text2.trim().slice(0, 300)].filter(Boolean).join(": ");
+    return failure(`The viewer's server answered ${reason}`);
+  }
+}
+var failure = (text2) => ({ ok: false, text: text2, wants_token: false, problems: [] });
+var isFailure = (answer) => typeof answer === "object" && answer !== null && "ok" in answer && answer.ok === false;
+var messageOf = (error) => error instanceof Error ? error.message : String(error);
+async function post(address, data) {
+  const limit = new AbortController();
+  const timer = setTimeout(() => limit.abort(), ANSWER_MS);
+  const answer = await ask(address, {
+    method: "POST",
+    headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
+    body: JSON.stringify(data),
+    signal: limit.signal
+  });
+  clearTimeout(timer);
+  if (limit.signal.aborted)
+    return failure(`no answer in ${ANSWER_MS / 1e3} s; it may still be carried out: look at the machine.`);
+  if (isFailure(answer) && answer.wants_token) store.view.tokenAsked.value = true;
+  return answer;
+}
+var askAction = (data) => post("/api/action", data);
+
+// src/core/commands.ts
+var MOST_NAMED = 4;
+function control() {
+  const facts = store.data.facts.value;
+  return hasToken() && !facts?.recorded ? facts?.control ?? null : null;
+}
+function canAnswer() {
+  const facts = store.data.facts.value;
+  return hasToken() && store.data.connection.value === "live" && facts?.stale == null && !facts?.recorded;
+}
+var sent = y3(null);
+var FAILED_MS = 8e3;
+var keyOf = (name, path) => `${name} ${path ?? ""}`;
+async function command(name, more = {}, machine = store.data.facts.value?.name ?? "") {
+  if (store.status.whyDisarmed.value) {
+    store.view.notify(store.status.whyDisarmed.value, "error");
+    return false;
+  }
+  const mine = { key: keyOf(name, more.path), failure: null };
+  sent.value = mine;
+  const result = await post(link("control", "", machine), { command: name, ...more });
+  const isNewest = sent.value === mine;
+  if (result.ok) {
+    if (name !== "answer") store.view.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
+    if (isNewest) sent.value = null;
+  } else if (result.wants_token) {
+    if (isNewest) sent.value = null;
+  } else {
+    const failure2 = `${name}: ${result.text ?? "refused"}`;
+    store.view.notify(failure2, "error");
+    if (isNewest) {
+      const failed = { ...mine, failure: failure2 };
+      sent.value = failed;
+      setTimeout(() => {
+        if (sent.value === failed) sent.value = null;
+      }, FAILED_MS);
+    }
+  }
+  return Boolean(result.ok);
+}
+var confirmation = y3(null);
+var situationOf = (...more) => JSON.stringify([
+  ...[
+    store.data.facts.value?.name,
+    store.data.facts.value?.epoch,
+    store.data.run.now.started,
+    store.data.run.now.ended
+  ],
+  ...[store.view.pageShown.value, store.status.whyDisarmed.value, ...more]
+]);
+function situationAt(path, within3) {
+  const visits = store.data.run.now.states;
+  const running = Object.keys(visits).filter((one) => visits[one].since != null && `${one}/`.startsWith(`${within3}/`));
+  return situationOf(
+    store.view.selected.value === path,
+    running.map((one) => [one, visits[one].since])
+  );
+}
+function askFirst(asked2) {
+  confirmation.value = { ...asked2, was: asked2.situation() };
+}
+function confirmationNow() {
+  const asked2 = confirmation.value;
+  if (!asked2 || asked2.situation() === asked2.was) return asked2;
+  confirmation.value = null;
+  store.view.notify(`“${asked2.title}” was closed: what it was about has changed`, "error");
+  return null;
+}
+function targetText() {
+  const name = store.data.facts.value?.label ?? "";
+  const robots = store.data.robotNames();
+  if (!robots.length) return name;
+  return robots.length === 1 ? `${name} on ${robots[0]}` : `${name} on ${robots.length} robots`;
+}
+function endsText(within3) {
+  const inside = (path) => `${path}/`.startsWith(`${within3}/`);
+  const { states: states2, goals } = store.data.run.now;
+  const now = store.data.liveMs();
+  const leaves = store.data.runningLeaves().filter(inside);
+  const running = leaves.slice(0, MOST_NAMED).map((path) => {
+    const since = own(states2, path)?.since;
+    return `${store.data.nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1e3)})`}`;
+  });
+  const sentGoals = Object.entries(goals).filter(([, goal]) => goal.ended == null && inside(goal.path));
+  const targets = sentGoals.slice(0, MOST_NAMED).map(([id, goal]) => goalText(id, goal));
+  const more = (count) => count > MOST_NAMED ? `, and ${count - MOST_NAMED} more` : "";
+  return [
+    running.length ? `Running: ${running.join(", ")}${more(leaves.length)}.` : "No state runs.",
+    targets.length ? `Cancels the goal${targets.length > 1 ? "s" : ""} ${targets.join("; ")}${more(sentGoals.length)}.` : ""
+  ].filter(Boolean);
+}
+
+// src/core/hub.ts
+var SILENT_BEATS = 2;
+var GONE_MS = 15e4;
+var OPEN_MS = 20;
+var TIDY_MS = 5e3;
+var RETRY_MS = 1e3;
+var MOST_FOLLOWED = 32;
+var HEAD = /^\{"name": ?("(?:[^"\\]|\\.)*")/;
+var Hub = class {
+  isShared;
+  #pages = /* @__PURE__ */ new Map();
+  #stream = null;
+  #names = [];
+  // machines that the stream follows
+  #lasts = /* @__PURE__ */ new Map();
+  // newest event by machine
+  #machines = /* @__PURE__ */ new Map();
+  // the list, by name
+  #settings = "";
+  #actions = "";
+  #standing = { state: "connecting", problem: "", wantsToken: false };
+  #silence = 0;
+  // half beats without a message
+  #patience = SILENT_BEATS;
+  // of an open stream [beats]; doubled when one was closed for its silence
+  #watchdog;
+  #due;
+  /** @param where without a shared worker, a hidden page needs no stream */
+  constructor({ isShared }) {
+    this.isShared = isShared;
+  }
+  add(port) {
+    this.#pages.set(port, { follow: null, heard: Date.now(), follows: "", hasAll: false });
+    port.onmessage = ({ data }) => this.#take(port, data);
+  }
+  #take(port, told) {
+    const page2 = this.#pages.get(port) ?? { follow: null, heard: 0, follows: "", hasAll: false };
+    page2.heard = Date.now();
+    this.#pages.set(port, page2);
+    if (told.kind === "bye") {
+      this.#pages.delete(port);
+      this.#open(TIDY_MS);
+    } else if (told.kind === "reconnect") {
+      this.#standing = { state: "lost", problem: "", wantsToken: false };
+      this.#tellAll({ event: "standing", standing: this.#standing });
+      this.#open(0, true);
+    } else if (told.kind === "follow") {
+      const isNew2 = page2.follow === null;
+      page2.follow = told;
+      page2.follows = told.machine;
+      if (isNew2 && this.#stream?.readyState === 1) this.#greet(port);
+      page2.hasAll = told.last !== "" && this.#stream !== null && this.#lasts.get(told.machine) === told.last;
+      if (told.hidden) this.#open(TIDY_MS);
+      else if (!page2.hasAll) this.#open(OPEN_MS, true);
+    }
+  }
+  /** Tell a page what is the same for all. */
+  #greet(port) {
+    if (this.#settings) port.postMessage({ event: "settings", text: this.#settings });
+    port.postMessage({ event: "machines", text: JSON.stringify([...this.#machines.values()]) });
+    if (this.#actions) port.postMessage({ event: "actions", text: this.#actions });
+    port.postMessage({ event: "standing", standing: this.#standing });
+  }
+  #tellAll(message) {
+    for (const [port, { follow: follow3 }] of this.#pages) if (follow3) port.postMessage(message);
+  }
+  /** The pages that are to get the events of their machine. */
+  get #looking() {
+    for (const [port, { heard }] of this.#pages) if (Date.now() - heard > GONE_MS) this.#pages.delete(port);
+    return [...this.#pages.values()].filter(({ follow: follow3 }) => follow3 && !follow3.hidden);
+  }
+  /** Open a stream for what the pages follow now, in a moment. @param pause [ms] */
+  #open(pause, anyway = false) {
+    clearTimeout(this.#due);
+    this.#due = setTimeout(() => this.#openNow(anyway), pause);
+  }
+  /** @param anyway also if it follows these machines already */
+  #openNow(anyway) {
+    const looking = this.#looking;
+    const first = this.#firstMachine();
+    for (const page2 of looking) page2.follows ||= first;
+    const names = [...new Set(looking.map(({ follows }) => follows))].filter(Boolean).slice(0, MOST_FOLLOWED);
+    const isSame = names.length === this.#names.length && names.every((name) => this.#names.includes(name));
+    if (isSame && !anyway) return;
+    this.#close();
+    this.#names = names;
+    this.#lasts.clear();
+    if (!looking.length && (!this.isShared || !this.#pages.size)) return;
+    const words2 = ["actions=1"];
+    for (const name of names) {
+      const of = looking.filter(({ follows }) => follows === name).map(({ follow: follow3 }) => follow3);
+      const last = of.map((one) => one.last).reduce(older);
+      words2.push(`machine=${encoded2(name)}`, `last=${encoded2(last)}`);
+      words2.push(`seen=${last ? of.reduce((least, one) => Math.min(least, one.seen), Infinity) : -1}`);
+      this.#lasts.set(name, last);
+    }
+    for (const page2 of looking) page2.hasAll = page2.follow?.last !== "" && names.includes(page2.follows);
+    this.#listen(new EventSource(`/api/events?${words2.join("&")}`));
+  }
+  #close() {
+    this.#stream?.close();
+    this.#stream = null;
+    clearInterval(this.#watchdog);
+  }
+  #listen(stream) {
+    this.#stream = stream;
+    for (const event of ["settings", "beat", "machines", "actions", "facts", "snap", "observed", "gap", "events"])
+      stream.addEventListener(event, (message) => {
+        if (stream !== this.#stream) return;
+        this.#silence = 0;
+        this.#pass(event, message.data);
+        this.#remember(message.lastEventId);
+      });
+    stream.onopen = () => this.#set("live");
+    stream.onerror = () => {
+      if (stream !== this.#stream) return;
+      this.#set("lost");
+      if (stream.readyState === 2) this.#askWhy(stream.url);
+    };
+    this.#watch(JSON.parse(this.#settings || "{}").beat);
+  }
+  /** Note how far the stream is, and with it the pages. @param id of a message */
+  #remember(id) {
+    const words2 = id.split(" ");
+    if (!id || words2.length !== this.#names.length) return;
+    for (const [i4, name] of this.#names.entries()) this.#lasts.set(name, decodeURIComponent(words2[i4]));
+    for (const { follow: follow3, follows, hasAll } of this.#looking)
+      if (follow3 && hasAll) follow3.last = this.#lasts.get(follows) ?? follow3.last;
+  }
+  #pass(event, text2) {
+    const message = { event, text: text2 };
+    if (event === "beat") {
+      this.#patience = SILENT_BEATS;
+      this.#set("live");
+    } else if (event === "settings") {
+      this.#settings = text2;
+      this.#machines.clear();
+      this.#watch(JSON.parse(text2).beat);
+    } else if (event === "actions") this.#actions = text2;
+    else if (event === "machines") {
+      const { machines, gone } = JSON.parse(text2);
+      for (const one of machines) this.#machines.set(one.name, one);
+      for (const name of gone) this.#machines.delete(name);
+      message.text = JSON.stringify([...this.#machines.values()]);
+      if (this.#looking.some(({ follows }) => !follows) && this.#firstMachine()) this.#open(0);
+    } else {
+      const name = JSON.parse(HEAD.exec(text2)?.[1] ?? '""');
+      for (const [port, page2] of this.#pages) {
+        if (!page2.follow || page2.follow.hidden || page2.follows !== name) continue;
+        page2.hasAll ||= event === "snap";
+        if (page2.hasAll) port.postMessage(message);
+      }
+      return;
+    }
+    this.#tellAll(message);
+  }
+  /** The machine that a page shows which asks for none: as `smachpy_viz.live.machines.Machines.first`. */
+  #firstMachine() {
+    const all = [...this.#machines.values()].sort((a5, b3) => a5.name < b3.name ? -1 : 1);
+    return (all.find((one) => one.stale === null) ?? all[0])?.name ?? "";
+  }
+  #set(state, problem = "", wantsToken = false) {
+    const isSame = this.#standing.state === state && this.#standing.problem === problem;
+    this.#standing = { state, problem, wantsToken };
+    if (!isSame) this.#tellAll({ event: "standing", standing: this.#standing });
+  }
+  /** The server refused the stream: an EventSource does not tell why. */
+  async #askWhy(address) {
+    const limit = new AbortController();
+    try {
+      const answer = await fetch(address, { signal: limit.signal });
+      if (!answer.ok) {
+        const { text: text2, wants_token } = await answer.json();
+        this.#set("lost", text2, wants_token === true);
+      }
+    } catch {
+    }
+    limit.abort();
+    this.#open(RETRY_MS, true);
+  }
+  /**
+   * Reconnect when the beats stay away: a broken connection shows no error for minutes. Beats are also missing while a
+   * long message arrives over a slow link, so the next stream gets twice the time.
+   * @param beat [s]
+   */
+  #watch(beat) {
+    clearInterval(this.#watchdog);
+    this.#silence = 0;
+    if (!(beat > 0)) return;
+    this.#watchdog = setInterval(() => {
+      const isOpen2 = this.#stream?.readyState === 1;
+      this.#silence += 1;
+      if (this.#silence <= 2 * (isOpen2 ? this.#patience : SILENT_BEATS)) return;
+      if (isOpen2) this.#patience *= 2;
+      this.#set("lost");
+      this.#open(0, true);
+    }, beat * 500);
+  }
+};
+function older(a5, b3) {
+  const [i4, j3] = [a5.lastIndexOf(":"), b3.lastIndexOf(":")];
+  if (!a5 || !b3 || a5.slice(0, i4) !== b3.slice(0, j3)) return "";
+  return Number(a5.slice(i4 + 1)) < Number(b3.slice(j3 + 1)) ? a5 : b3;
+}
+var encoded2 = (text2) => encodeURIComponent(text2.replace(/\p{Surrogate}/gu, "�"));
+
+// src/core/page_file.ts
+var isFile = () => document.getElementById("run-data") !== null;
+async function unpack(id) {
+  const text2 = document.getElementById(id)?.textContent ?? "";
+  const bytes = Uint8Array.from(atob(text2), (c4) => c4.charCodeAt(0));
+  const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(plain).text();
+}
+async function bytesOf(text2) {
+  const packed = Uint8Array.from(atob(text2), (c4) => c4.charCodeAt(0));
+  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(plain).arrayBuffer());
+}
+async function makeWorker(name) {
+  if (!isFile()) return new Worker(`/${name}-worker.js`);
+  const code = await unpack(`${name}-data`);
+  return new Worker(URL.createObjectURL(new Blob([code], { type: "text/javascript" })));
+}
+
 // src/core/pages.ts
 var PAGES = ["runs", "fleet", "actions"];
 function pageOf(search) {
@@ -3561,7 +3811,6 @@ function showPage(name, { machine, replace = false } = {}) {
 var CAUGHT_UP_MS = 1e3;
 var RETRY_MS2 = 250;
 var LONGEST_RETRY_MS = 4e3;
-var ANSWER_MS = 3e3;
 var hub = null;
 var streamBegan = 0;
 var epoch = "";
@@ -3569,8 +3818,6 @@ var newest = 0;
 var seen = -1;
 var isNew = false;
 var loads = 0;
-var token = null;
-var view = "";
 var onEvents = () => {
 };
 var onMachine = () => {
@@ -3578,23 +3825,6 @@ var onMachine = () => {
 var onObserved = () => {
 };
 var whyOfFile = null;
-var isFile = () => document.getElementById("run-data") !== null;
-async function unpack(id) {
-  const text2 = document.getElementById(id)?.textContent ?? "";
-  const bytes = Uint8Array.from(atob(text2), (c4) => c4.charCodeAt(0));
-  const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(plain).text();
-}
-async function bytesOf(text2) {
-  const packed = Uint8Array.from(atob(text2), (c4) => c4.charCodeAt(0));
-  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(plain).arrayBuffer());
-}
-async function makeWorker(name) {
-  if (!isFile()) return new Worker(`/${name}-worker.js`);
-  const code = await unpack(`${name}-data`);
-  return new Worker(URL.createObjectURL(new Blob([code], { type: "text/javascript" })));
-}
 async function connect(handlers) {
   ({ onEvents, onMachine, onObserved } = handlers);
   readToken();
@@ -3619,26 +3849,6 @@ async function connect(handlers) {
   openHub();
   tellHub();
 }
-function readToken() {
-  const words2 = new URLSearchParams(location.hash.slice(1));
-  const given = words2.get("token") || null;
-  view = words2.get("view") ?? "";
-  words2.delete("token");
-  words2.delete("view");
-  try {
-    if (given) sessionStorage.setItem("smachpy.token", given);
-    token = given ?? sessionStorage.getItem("smachpy.token");
-  } catch {
-    token = given;
-  }
-  const rest = String(words2);
-  if (given || view) history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
-}
-async function logIn() {
-  const known2 = token ?? view;
-  if (known2) await ask("/api/login", { method: "POST", body: JSON.stringify({ token: known2 }) });
-}
-var hasToken = () => token !== null && store.data.settings.value.control;
 function choose(name) {
   showPage("machine", { machine: name });
   if (name !== store.data.wanted.value || store.data.facts.value?.name !== name) follow(name);
@@ -3653,8 +3863,6 @@ function follow(name) {
   loads += 1;
   tellHub();
 }
-var encoded2 = (text2) => encodeURIComponent(text2.replace(/\p{Surrogate}/gu, "�"));
-var link = (what, more = "", machine = store.data.facts.value?.name ?? "") => `/api/${what}?machine=${encoded2(machine)}${more}`;
 var HERE_MS = 2e4;
 function openHub() {
   if (typeof SharedWorker === "undefined") {
@@ -3774,61 +3982,19 @@ async function load(facts) {
 }
 async function fetchModel(name) {
   try {
-    const answer = await fetch(`/api/model?machine=${encoded2(name)}`);
+    const answer = await fetch(`/api/model?machine=${encoded(name)}`);
     return answer.ok ? await answer.json() : null;
   } catch {
     return null;
   }
 }
-async function ask(address, options = {}) {
-  let answer;
-  let text2;
-  try {
-    answer = await fetch(address, options);
-    text2 = await answer.text();
-  } catch (error) {
-    return failure(`The viewer's server does not answer (${messageOf(error)}).`);
-  }
-  try {
-    return JSON.parse(text2);
-  } catch {
-    const status = `${answer.status} ${answer.statusText}`.trim();
-    const reason = [status, text2.trim().slice(0, 300)].filter(Boolean).join(": ");
-    return failure(`The viewer's server answered ${reason}`);
-  }
-}
-var failure = (text2) => ({ ok: false, text: text2, wants_token: false, problems: [] });
-var isFailure = (answer) => typeof answer === "object" && answer !== null && "ok" in answer && answer.ok === false;
-var messageOf = (error) => error instanceof Error ? error.message : String(error);
-async function post(address, data) {
-  const limit = new AbortController();
-  const timer = setTimeout(() => limit.abort(), ANSWER_MS);
-  const answer = await ask(address, {
-    method: "POST",
-    headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
-    body: JSON.stringify(data),
-    signal: limit.signal
-  });
-  clearTimeout(timer);
-  if (limit.signal.aborted)
-    return failure(`no answer in ${ANSWER_MS / 1e3} s; it may still be carried out: look at the machine.`);
-  if (isFailure(answer) && answer.wants_token) store.view.tokenAsked.value = true;
-  return answer;
-}
 function takeToken(text2) {
-  const [, found] = /#token=([\w-]+)/.exec(text2) ?? /^\s*([\w-]+)\s*$/.exec(text2) ?? [];
-  if (!found) return false;
-  token = found;
-  try {
-    sessionStorage.setItem("smachpy.token", found);
-  } catch {
-  }
+  if (!setToken(text2)) return false;
   store.view.tokenAsked.value = false;
   logIn().then(reconnect);
   store.view.notify("Try again now");
   return true;
 }
-var askAction = (data) => post("/api/action", data);
 async function showWhy(open = store.data.why.value === null) {
   const shown = store.data.facts.value?.epoch;
   const answer = open ? whyOfFile ?? await ask(link("why")) : null;
@@ -3837,206 +4003,6 @@ async function showWhy(open = store.data.why.value === null) {
     store.data.why.value = answer;
     if (answer) store.view.part.value = "log";
   }
-}
-var REFRESH_MS = 2e3;
-var refreshed = -REFRESH_MS;
-var refreshDue = 0;
-function refreshRuns() {
-  if (refreshDue) return;
-  refreshDue = setTimeout(
-    async () => {
-      const answer = await ask("/api/runs");
-      refreshed = performance.now();
-      refreshDue = 0;
-      r3(() => {
-        store.data.runsProblem.value = isFailure(answer) ? answer.text : "";
-        if (!isFailure(answer)) store.data.runs.value = answer;
-        store.data.runsKnown.value = true;
-      });
-    },
-    Math.max(0, refreshed + REFRESH_MS - performance.now())
-  );
-}
-async function askFleet(skip) {
-  const answer = await ask(`/api/fleet?skip=${skip}`);
-  return isFailure(answer) ? null : answer;
-}
-async function askSimulation(data) {
-  const answer = await post("/api/simulate", data);
-  await refreshSimulations();
-  return answer;
-}
-async function refreshSimulations() {
-  const answer = await ask("/api/simulations");
-  if (!isFailure(answer)) store.data.simulations.value = answer;
-}
-async function commandMission({ journal, id }, what) {
-  const answer = await post("/api/mission", { journal, id, command: what });
-  if (answer.ok) store.view.notify(`${id}: ${answer.text}`);
-  else if (!answer.wants_token) store.view.notify(answer.text, "error");
-  refreshRuns();
-}
-async function openRun(id) {
-  const answer = await ask(`/api/open?run=${encoded2(id)}`);
-  if (!answer.ok) {
-    store.view.notify(`Run: ${answer.text}`, "error");
-    return;
-  }
-  choose(answer.name);
-}
-
-// src/core/purposes.ts
-var NAMES = ["name", "station", "place", "waypoint", "location", "target", "object", "item", "text"];
-function purposeOf(id, { goal }) {
-  const { scene } = store.data;
-  const driven = scene.goalWithId(id);
-  if (driven) return scene.placeName(driven) || `(${driven.x.toFixed(1)}, ${driven.y.toFixed(1)})`;
-  const fields2 = fieldsOf(goal) ?? {};
-  for (const name of NAMES) if (typeof fields2[name] === "string" && fields2[name]) return shorten(fields2[name], 24);
-  return "";
-}
-function goalText(id, goal) {
-  const purpose = purposeOf(id, goal);
-  const left = goal.progress?.distance;
-  const name = goal.action.replace(/^\//, "");
-  return `${name}${purpose ? ` → ${purpose}` : ""}${left == null ? "" : `, ${left.toFixed(1)} m left`}`;
-}
-function purposeOfVisit(span) {
-  if (span.note) return shorten(span.note, 40);
-  if (span.purpose !== void 0) return span.purpose;
-  const found = span.sent ? purposeOf(span.sent.id, span.sent) : "";
-  if (span.to !== null) span.purpose = found;
-  return found;
-}
-function attemptText(path, attempt) {
-  const retry = store.data.model.value?.get(path)?.details.find(([name]) => name === "retry")?.[1] ?? "";
-  const most = /^(\d+) attempts/.exec(retry)?.[1];
-  return `attempt ${attempt}${most ? ` of ${most}` : ""}`;
-}
-var tidies = (path) => isInCleanup(store.data.model.value?.get(path));
-function wordsOf(name, span, now) {
-  const took = duration(Math.max(0, Math.min(span.to ?? now, now) - span.from) / 1e3);
-  const purpose = purposeOfVisit(span);
-  const runs2 = span.to === null || span.to > now;
-  const facts = [
-    (span.attempt ?? 1) > 1 && attemptText(span.path, span.attempt ?? 1),
-    tidies(span.path) && (runs2 ? "tidying up" : "tidied up"),
-    runs2 && span.serviced !== null && span.serviced <= now && "cleaning up"
-  ].filter(Boolean);
-  const more = facts.map((fact) => `, ${fact}`).join("");
-  const to = purpose && `→ ${purpose}`;
-  const all = [
-    `${name}${to && ` ${to}`}${more} ${took}`,
-    `${name}${to && ` ${to}`}${more}`,
-    to && `${to}${more} ${took}`,
-    to || name,
-    purpose || name
-  ];
-  return [...new Set(all.filter(Boolean))];
-}
-function insideText(path) {
-  const leaf = store.status.activeLeaves.value.find((one) => one.startsWith(`${path}/`));
-  if (leaf) return `${leaf.slice(leaf.lastIndexOf("/") + 1)} ${purposeOfState(leaf)}`.trim();
-  const state = own(store.playback.shown().states, path);
-  if (!state?.visits) return "not begun";
-  return state.since != null ? purposeOfState(path) : state.error ?? state.outcome ?? "";
-}
-function purposeOfState(path) {
-  const span = store.data.run.open.get(path);
-  const purpose = span ? purposeOfVisit(span) : "";
-  return [tidies(path) && "tidying up", purpose && `→ ${purpose}`].filter(Boolean).join(" ");
-}
-
-// src/core/commands.ts
-var MOST_NAMED = 4;
-function control() {
-  const facts = store.data.facts.value;
-  return hasToken() && !facts?.recorded ? facts?.control ?? null : null;
-}
-function canAnswer() {
-  const facts = store.data.facts.value;
-  return hasToken() && store.data.connection.value === "live" && facts?.stale == null && !facts?.recorded;
-}
-var sent = y3(null);
-var FAILED_MS = 8e3;
-var keyOf = (name, path) => `${name} ${path ?? ""}`;
-async function command(name, more = {}, machine = store.data.facts.value?.name ?? "") {
-  if (store.status.whyDisarmed.value) {
-    store.view.notify(store.status.whyDisarmed.value, "error");
-    return false;
-  }
-  const mine = { key: keyOf(name, more.path), failure: null };
-  sent.value = mine;
-  const result = await post(link("control", "", machine), { command: name, ...more });
-  const isNewest = sent.value === mine;
-  if (result.ok) {
-    if (name !== "answer") store.view.notify(`${name}${more.path ? ` ${more.path}` : ""}: done`);
-    if (isNewest) sent.value = null;
-  } else if (result.wants_token) {
-    if (isNewest) sent.value = null;
-  } else {
-    const failure2 = `${name}: ${result.text ?? "refused"}`;
-    store.view.notify(failure2, "error");
-    if (isNewest) {
-      const failed = { ...mine, failure: failure2 };
-      sent.value = failed;
-      setTimeout(() => {
-        if (sent.value === failed) sent.value = null;
-      }, FAILED_MS);
-    }
-  }
-  return Boolean(result.ok);
-}
-var confirmation = y3(null);
-var situationOf = (...more) => JSON.stringify([
-  ...[
-    store.data.facts.value?.name,
-    store.data.facts.value?.epoch,
-    store.data.run.now.started,
-    store.data.run.now.ended
-  ],
-  ...[store.view.pageShown.value, store.status.whyDisarmed.value, ...more]
-]);
-function situationAt(path, within3) {
-  const visits = store.data.run.now.states;
-  const running = Object.keys(visits).filter((one) => visits[one].since != null && `${one}/`.startsWith(`${within3}/`));
-  return situationOf(
-    store.view.selected.value === path,
-    running.map((one) => [one, visits[one].since])
-  );
-}
-function askFirst(asked2) {
-  confirmation.value = { ...asked2, was: asked2.situation() };
-}
-function confirmationNow() {
-  const asked2 = confirmation.value;
-  if (!asked2 || asked2.situation() === asked2.was) return asked2;
-  confirmation.value = null;
-  store.view.notify(`“${asked2.title}” was closed: what it was about has changed`, "error");
-  return null;
-}
-function targetText() {
-  const name = store.data.facts.value?.label ?? "";
-  const robots = store.data.robotNames();
-  if (!robots.length) return name;
-  return robots.length === 1 ? `${name} on ${robots[0]}` : `${name} on ${robots.length} robots`;
-}
-function endsText(within3) {
-  const inside = (path) => `${path}/`.startsWith(`${within3}/`);
-  const { states: states2, goals } = store.data.run.now;
-  const now = store.data.liveMs();
-  const leaves = store.data.runningLeaves().filter(inside);
-  const running = leaves.slice(0, MOST_NAMED).map((path) => {
-    const since = own(states2, path)?.since;
-    return `${store.data.nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1e3)})`}`;
-  });
-  const sentGoals = Object.entries(goals).filter(([, goal]) => goal.ended == null && inside(goal.path));
-  const targets = sentGoals.slice(0, MOST_NAMED).map(([id, goal]) => goalText(id, goal));
-  const more = (count) => count > MOST_NAMED ? `, and ${count - MOST_NAMED} more` : "";
-  return [
-    running.length ? `Running: ${running.join(", ")}${more(leaves.length)}.` : "No state runs.",
-    targets.length ? `Cancels the goal${targets.length > 1 ? "s" : ""} ${targets.join("; ")}${more(sentGoals.length)}.` : ""
-  ].filter(Boolean);
 }
 
 // src/core/two_runs.ts
@@ -4133,7 +4099,7 @@ async function reproduce(what, expect = "") {
 }
 async function follow2(mine) {
   for (; ; ) {
-    const answer = await ask(`/api/reproduction?id=${encoded2(mine.id)}`);
+    const answer = await ask(`/api/reproduction?id=${encoded(mine.id)}`);
     if (newest2.value?.id !== mine.id) return;
     if (isFailure(answer) || !answer.running) {
       const problem = isFailure(answer) ? answer.text : answer.problem;
@@ -5871,7 +5837,101 @@ var LayoutController = class {
   }
 };
 
+// src/drawing/floor.ts
+var pixelOf = ({ k: k4, left, bottom }, { x: x3, y: y5 }) => [
+  left + x3 * k4,
+  bottom - y5 * k4
+];
+var placeAt = ({ k: k4, left, bottom }, px, py) => ({
+  x: (px - left) / k4,
+  y: (bottom - py) / k4
+});
+var Floor = class {
+  #colours;
+  #onPicture;
+  /** pictures of maps, by their cells and colours */
+  #pictures = /* @__PURE__ */ new Map();
+  /** @param onPicture called when a map was unpacked that could not be drawn before */
+  constructor(colours, onPicture) {
+    this.#colours = colours;
+    this.#onPicture = onPicture;
+  }
+  /** Make the pictures anew. */
+  forget() {
+    this.#pictures.clear();
+  }
+  /** @param ratio of device pixels to CSS pixels */
+  draw(g5, map, scale, ratio) {
+    const picture = this.#picture(map);
+    if (!picture) return;
+    const cell = scale.k * map.resolution;
+    const [x3, y5] = pixelOf(scale, cellAt(map, 0, 0));
+    g5.save();
+    g5.translate(x3, y5);
+    g5.rotate(-map.origin[2]);
+    g5.scale(cell, cell);
+    g5.imageSmoothingEnabled = cell * ratio < 2;
+    g5.imageSmoothingQuality = "high";
+    g5.drawImage(picture, 0, -map.height);
+    g5.restore();
+  }
+  /** A map as a picture; null while it is being unpacked. */
+  #picture(map) {
+    const colours = ["floor", "wall", "unknown"].map((name) => this.#colours.of(name));
+    const key = `${colours.join()} ${map.width} ${map.cells}`;
+    const known2 = this.#pictures.get(key);
+    if (known2) return known2.width ? known2 : null;
+    const made = document.createElement("canvas");
+    made.width = 0;
+    this.#pictures.clear();
+    this.#pictures.set(key, made);
+    bytesOf(map.cells).then((cells) => {
+      if (cells.length !== map.width * map.height) return;
+      paintCells(made, map, cells, colours.map(wordOf2));
+      this.#onPicture();
+    }).catch(() => {
+    });
+    return null;
+  }
+  /** Draw a grid of 1 m. */
+  drawGrid(g5, scale, width, height) {
+    const step = scale.k > 6 ? 1 : 10;
+    const from = placeAt(scale, 0, height);
+    const to = placeAt(scale, width, 0);
+    g5.strokeStyle = this.#colours.of("hair-map");
+    g5.lineWidth = 1;
+    g5.beginPath();
+    for (let x3 = Math.ceil(from.x / step) * step; x3 < to.x; x3 += step) {
+      const [px] = pixelOf(scale, { x: x3, y: 0 });
+      g5.moveTo(px, 0);
+      g5.lineTo(px, height);
+    }
+    for (let y5 = Math.ceil(from.y / step) * step; y5 < to.y; y5 += step) {
+      const [, py] = pixelOf(scale, { x: 0, y: y5 });
+      g5.moveTo(0, py);
+      g5.lineTo(width, py);
+    }
+    g5.stroke();
+  }
+};
+function paintCells(canvas2, { width, height }, cells, shades) {
+  Object.assign(canvas2, { width, height });
+  const g5 = canvas2.getContext("2d");
+  const image = g5.createImageData(width, height);
+  const words2 = new Uint32Array(image.data.buffer);
+  for (let row = 0; row < height; row++)
+    for (let i4 = 0, from = (height - 1 - row) * width; i4 < width; i4++)
+      words2[row * width + i4] = shades[cells[from + i4]] ?? shades[2];
+  g5.putImageData(image, 0, 0);
+}
+function wordOf2(hex) {
+  const full = hex.length === 4 ? [...hex.slice(1)].map((c4) => c4 + c4).join("") : hex.slice(1, 7);
+  const [r4, g5, b3] = [0, 2, 4].map((i4) => Number.parseInt(full.slice(i4, i4 + 2), 16));
+  return (255 << 24 | b3 << 16 | g5 << 8 | r4) >>> 0;
+}
+
 // src/drawing/theme.ts
+var FONT = "11px Inter, Arial, sans-serif";
 var systemIsDark = matchMedia("(prefers-color-scheme: dark)");
 var isDark = () => store.view.theme.value === "system" ? systemIsDark.matches : store.view.theme.value === "dark";
 function applyTheme() {
@@ -5903,6 +5963,52 @@ function fitted(g5) {
   g5.setTransform(ratio, 0, 0, ratio, 0, 0);
   return { width, height, ratio };
 }
+
+// src/drawing/labels.ts
+var Labels = class {
+  #g;
+  #colours;
+  #taken = [];
+  constructor(g5, colours) {
+    this.#g = g5;
+    this.#colours = colours;
+  }
+  /** Begin a new picture. */
+  forget() {
+    this.#taken = [];
+  }
+  /** Keep names away from an area [px]. */
+  keepFree(area) {
+    this.#taken.push(area);
+  }
+  /** Write a name beside a place [px]. */
+  write(text2, x3, y5, strong) {
+    if (!text2) return;
+    const g5 = this.#g;
+    g5.font = strong ? `620 ${FONT}` : FONT;
+    const wide = g5.measureText(text2).width;
+    const sides = [
+      [x3 + 12, y5],
+      [x3 - 12 - wide, y5],
+      [x3 - wide / 2, y5 + 16],
+      [x3 - wide / 2, y5 - 16]
+    ].map(([left, middle]) => ({ left, top: middle - 7, right: left + wide, bottom: middle + 7 }));
+    const side = sides.find((one) => this.#isFree(one)) ?? sides[0];
+    this.#taken.push(side);
+    g5.textAlign = "left";
+    g5.strokeStyle = this.#colours.of("floor");
+    g5.lineWidth = 3;
+    g5.lineJoin = "round";
+    g5.strokeText(text2, side.left, side.top + 7);
+    g5.fillStyle = this.#colours.of("ink");
+    g5.fillText(text2, side.left, side.top + 7);
+  }
+  #isFree(a5) {
+    const isInside = a5.left > 2 && a5.right < this.#g.canvas.clientWidth - 2;
+    const meets = (b3) => a5.left < b3.right && b3.left < a5.right && a5.top < b3.bottom && b3.top < a5.bottom;
+    return isInside && !this.#taken.some(meets);
+  }
+};
 
 // src/drawing/viewport.ts
 var LEAST_SCALE = 0.04;
@@ -6068,7 +6174,6 @@ var RADIUS_M = 0.25;
 var SMALLEST = 6;
 var [CLOSEST, FARTHEST] = [400, 0.5];
 var SCALES_M = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1e3];
-var FONT = "11px Inter, Arial, sans-serif";
 var MapView = class {
   canvas;
   context;
@@ -6078,15 +6183,14 @@ var MapView = class {
   view = null;
   /** shown in place of the page's run, without links to it */
   given = null;
-  /** pictures of maps, by their cells and colours */
-  #pictures = /* @__PURE__ */ new Map();
   #colours = new Colours();
-  /** where names are, and marks of places */
-  #labels = [];
+  #floor = new Floor(this.#colours, () => this.draw());
+  #labels;
   #scale = { k: 1, left: 0, bottom: 0 };
   constructor(canvas2) {
     this.canvas = canvas2;
     this.context = canvas2.getContext("2d");
+    this.#labels = new Labels(this.context, this.#colours);
     canvas2.addEventListener("pointermove", (e4) => this.#hover(e4));
     canvas2.addEventListener("pointerleave", () => store.pointer.hover(null));
     grab(canvas2, {
@@ -6102,13 +6206,13 @@ var MapView = class {
   /** Read the colours again. */
   restyle() {
     this.#colours.forget();
-    this.#pictures.clear();
+    this.#floor.forget();
   }
   /** Reset the view for another machine. */
   reset() {
     this.view = null;
     this.followed = null;
-    this.#pictures.clear();
+    this.#floor.forget();
   }
   /** Show the whole map, or one robot. */
   show(robot) {
@@ -6117,13 +6221,8 @@ var MapView = class {
     this.draw();
   }
   /** The pixel of a place. @param place [m] @returns [px] */
-  at({ x: x3, y: y5 }) {
-    const { k: k4, left, bottom } = this.#scale;
-    return [left + x3 * k4, bottom - y5 * k4];
-  }
-  #placeAt(px, py) {
-    const { k: k4, left, bottom } = this.#scale;
-    return { x: (px - left) / k4, y: (bottom - py) / k4 };
+  at(place) {
+    return pixelOf(this.#scale, place);
   }
   #frame(scene, now, width, height) {
     const box = scene.extent(now);
@@ -6149,79 +6248,17 @@ var MapView = class {
     const map = scene.mapAt(now);
     g5.fillStyle = this.#colours.of(map ? "unknown" : "floor");
     g5.fillRect(0, 0, width, height);
-    if (map) this.#floor(map, ratio);
-    else this.#grid(width, height);
+    if (map) this.#floor.draw(g5, map, this.#scale, ratio);
+    else this.#floor.drawGrid(g5, this.#scale, width, height);
     const until = (this.given ? null : store.playback.cursor.value) ?? Infinity;
     for (const robot of scene.robots.values()) this.#seen(scene, robot, now, until);
     for (const robot of scene.robots.values()) this.#tracks(scene, robot, until);
-    this.#labels = [this.#scaleBox(width, height)];
+    this.#labels.forget();
+    this.#labels.keepFree(this.#scaleBox(width, height));
     this.#goals(scene, until);
     for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
     this.#scaleBar(width, height);
     canvas2.setAttribute("aria-label", describe(scene, now));
-  }
-  #floor(map, ratio) {
-    const picture = this.#picture(map);
-    if (!picture) return;
-    const g5 = this.context;
-    const { k: k4 } = this.#scale;
-    const [x3, y5] = this.at(cellAt(map, 0, 0));
-    g5.save();
-    g5.translate(x3, y5);
-    g5.rotate(-map.origin[2]);
-    g5.scale(k4 * map.resolution, k4 * map.resolution);
-    g5.imageSmoothingEnabled = k4 * map.resolution * ratio < 2;
-    g5.imageSmoothingQuality = "high";
-    g5.drawImage(picture, 0, -map.height);
-    g5.restore();
-  }
-  /** A map as a picture; null while it is being unpacked. */
-  #picture(map) {
-    const colours = ["floor", "wall", "unknown"].map((name) => this.#colours.of(name));
-    const key = `${colours.join()} ${map.width} ${map.cells}`;
-    const known2 = this.#pictures.get(key);
-    if (known2) return known2.width ? known2 : null;
-    const made = document.createElement("canvas");
-    made.width = 0;
-    this.#pictures.clear();
-    this.#pictures.set(key, made);
-    bytesOf(map.cells).then((cells) => {
-      if (cells.length !== map.width * map.height) return;
-      Object.assign(made, { width: map.width, height: map.height });
-      const g5 = made.getContext("2d");
-      const image = g5.createImageData(map.width, map.height);
-      const words2 = new Uint32Array(image.data.buffer);
-      const shades = colours.map(wordOf2);
-      for (let row = 0; row < map.height; row++)
-        for (let i4 = 0, from = (map.height - 1 - row) * map.width; i4 < map.width; i4++)
-          words2[row * map.width + i4] = shades[cells[from + i4]] ?? shades[2];
-      g5.putImageData(image, 0, 0);
-      this.draw();
-    }).catch(() => {
-    });
-    return null;
-  }
-  /** A grid of 1 m, if there is no map. */
-  #grid(width, height) {
-    const g5 = this.context;
-    const { k: k4 } = this.#scale;
-    const step = k4 > 6 ? 1 : 10;
-    const from = this.#placeAt(0, height);
-    const to = this.#placeAt(width, 0);
-    g5.strokeStyle = this.#colours.of("hair-map");
-    g5.lineWidth = 1;
-    g5.beginPath();
-    for (let x3 = Math.ceil(from.x / step) * step; x3 < to.x; x3 += step) {
-      const [px] = this.at({ x: x3, y: 0 });
-      g5.moveTo(px, 0);
-      g5.lineTo(px, height);
-    }
-    for (let y5 = Math.ceil(from.y / step) * step; y5 < to.y; y5 += step) {
-      const [, py] = this.at({ x: 0, y: y5 });
-      g5.moveTo(0, py);
-      g5.lineTo(width, py);
-    }
-    g5.stroke();
   }
   /** The scan and the plan of a robot. */
   #seen(scene, robot, now, until) {
@@ -6257,8 +6294,7 @@ var MapView = class {
   }
   #tracks(scene, robot, until) {
     const g5 = this.context;
-    const { hovered } = store.pointer;
-    const lit = hovered.value;
+    const lit = store.pointer.hovered.value;
     const pieces = scene.piecesOf(robot);
     const isLit = (one) => lit !== null && one.path === lit.path && one.visit === lit.from;
     const anyLit = pieces.some(isLit);
@@ -6294,7 +6330,7 @@ var MapView = class {
     g5.textBaseline = "middle";
     for (const goal of places.values()) {
       const [x3, y5] = this.at(goal);
-      this.#labels.push({ left: x3 - 8, top: y5 - 8, right: x3 + 8, bottom: y5 + 8 });
+      this.#labels.keepFree({ left: x3 - 8, top: y5 - 8, right: x3 + 8, bottom: y5 + 8 });
     }
     for (const goal of places.values()) {
       const [x3, y5] = this.at(goal);
@@ -6328,31 +6364,8 @@ var MapView = class {
         }
         g5.stroke();
       }
-      this.#label(scene.placeName(goal), x3, y5, runs2);
+      this.#labels.write(scene.placeName(goal), x3, y5, runs2);
     }
-  }
-  /** Write a name beside a place, on a side without another name. */
-  #label(text2, x3, y5, strong = false) {
-    if (!text2) return;
-    const g5 = this.context;
-    g5.font = strong ? `620 ${FONT}` : FONT;
-    const wide = g5.measureText(text2).width;
-    const sides = [
-      [x3 + 12, y5],
-      [x3 - 12 - wide, y5],
-      [x3 - wide / 2, y5 + 16],
-      [x3 - wide / 2, y5 - 16]
-    ].map(([left, middle]) => ({ left, top: middle - 7, right: left + wide, bottom: middle + 7 }));
-    const isFree = (a5) => a5.left > 2 && a5.right < this.canvas.clientWidth - 2 && !this.#labels.some((b3) => a5.left < b3.right && b3.left < a5.right && a5.top < b3.bottom && b3.top < a5.bottom);
-    const side = sides.find(isFree) ?? sides[0];
-    this.#labels.push(side);
-    g5.textAlign = "left";
-    g5.strokeStyle = this.#colours.of("floor");
-    g5.lineWidth = 3;
-    g5.lineJoin = "round";
-    g5.strokeText(text2, side.left, side.top + 7);
-    g5.fillStyle = this.#colours.of("ink");
-    g5.fillText(text2, side.left, side.top + 7);
   }
   #robot(scene, name, robot, now) {
     const pose = scene.poseAt(robot, now);
@@ -6377,7 +6390,7 @@ var MapView = class {
     g5.lineTo(-0.35 * r4, -0.5 * r4);
     g5.fill();
     g5.restore();
-    if (scene.robots.size > 1) this.#label(name, x3, y5 - r4 - 7, true);
+    if (scene.robots.size > 1) this.#labels.write(name, x3, y5 - r4 - 7, true);
   }
   /** The box of the scale, at the bottom right. */
   #scaleBox(width, height) {
@@ -6410,7 +6423,7 @@ var MapView = class {
   // -- input --------------------------------------------------------------------------------------
   #nearest(e4) {
     if (this.given) return null;
-    const { x: x3, y: y5 } = this.#placeAt(e4.offsetX, e4.offsetY);
+    const { x: x3, y: y5 } = placeAt(this.#scale, e4.offsetX, e4.offsetY);
     return store.data.scene.nearest(x3, y5, REACH / this.#scale.k, store.playback.cursor.value ?? Infinity);
   }
   #hover(e4) {
@@ -6428,7 +6441,7 @@ var MapView = class {
   }
   #pan(dx, dy) {
     this.followed = null;
-    const middle = this.#placeAt(this.canvas.clientWidth / 2 - dx, this.canvas.clientHeight / 2 - dy);
+    const middle = placeAt(this.#scale, this.canvas.clientWidth / 2 - dx, this.canvas.clientHeight / 2 - dy);
     this.view = { k: this.#scale.k, ...middle };
     this.draw();
   }
@@ -6438,7 +6451,7 @@ var MapView = class {
   }
   /** @param py the place that stays */
   #zoom(factor, px = this.canvas.clientWidth / 2, py = this.canvas.clientHeight / 2) {
-    const held = this.#placeAt(px, py);
+    const held = placeAt(this.#scale, px, py);
     const k4 = Math.max(FARTHEST, Math.min(this.#scale.k * factor, CLOSEST));
     const [w5, h5] = [this.canvas.clientWidth, this.canvas.clientHeight];
     this.view = { k: k4, x: held.x + (w5 / 2 - px) / k4, y: held.y - (h5 / 2 - py) / k4 };
@@ -6453,11 +6466,6 @@ var MapView = class {
     e4.stopPropagation();
   }
 };
-function wordOf2(hex) {
-  const full = hex.length === 4 ? [...hex.slice(1)].map((c4) => c4 + c4).join("") : hex.slice(1, 7);
-  const [r4, g5, b3] = [0, 2, 4].map((i4) => Number.parseInt(full.slice(i4, i4 + 2), 16));
-  return (255 << 24 | b3 << 16 | g5 << 8 | r4) >>> 0;
-}
 function describe(scene, now) {
   const parts = [...scene.robots].flatMap(([name, robot]) => {
     const pose = scene.poseAt(robot, now);
@@ -6467,7 +6475,6 @@ function describe(scene, now) {
   });
   return `map: ${parts.join("; ") || "no robot yet"}`;
 }
-var placeText = ({ x: x3, y: y5 }) => `(${x3.toFixed(1)}, ${y5.toFixed(1)})`;
 
 // src/drawing/minimap.ts
 var SHOWN_BELOW = 0.6;
@@ -7074,7 +7081,6 @@ var heightOf = (lanes) => lanes.reduce((sum, lane) => sum + laneHeight(lane), 0)
 var THINNEST = 0.5;
 var FAILED = 3;
 var MOST_WIDTHS = 4e3;
-var FONT2 = "11px Inter, Arial, sans-serif";
 var Bars = class {
   context;
   colours;
@@ -7261,7 +7267,7 @@ var Bars = class {
     g5.fillStyle = this.colours.of(colour);
     g5.textAlign = "left";
     if (shown) clipped(g5, left, top, wide - 3, tall, () => g5.fillText(shown, left + 4, top + tall / 2 + 0.5));
-    g5.font = FONT2;
+    g5.font = FONT;
   }
   /** @param size of the font, which is set [px] */
   #widthOf(text2, size) {
@@ -7443,7 +7449,7 @@ var Timeline = class {
     const room = height - FOOT;
     this.names = width < 640 ? NAMES_NARROW : NAMES2;
     g5.clearRect(0, 0, width, height);
-    g5.font = FONT2;
+    g5.font = FONT;
     g5.textBaseline = "middle";
     this.window.keepInView();
     const [from, to] = this.window.range();
@@ -7582,7 +7588,7 @@ var Timeline = class {
     g5.fillStyle = this.#colours.of("background");
     g5.textAlign = "center";
     g5.fillText(text2, middle, height - FOOT / 2 + 0.5);
-    g5.font = FONT2;
+    g5.font = FONT;
   }
   // -- input ------------------------------------------------------------------------------------
   #timeAt(px) {
@@ -8246,7 +8252,7 @@ function GoalForm({ name, server }) {
   A2(() => {
     if (!server || definition?.type === type) return;
     setFailure(null);
-    ask(`/api/action?name=${encoded2(name)}`).then((found) => {
+    ask(`/api/action?name=${encoded(name)}`).then((found) => {
       if (isFailure(found)) {
         setFailure(found.text);
         return;
@@ -8719,7 +8725,7 @@ function ServerGoals({ name }) {
   A2(() => {
     let open = true;
     const read = async () => {
-      const found = await ask(`/api/goals?name=${encoded2(name)}`);
+      const found = await ask(`/api/goals?name=${encoded(name)}`);
       if (!open) return;
       setGoals(isFailure(found) ? [] : found);
       setProblem(isFailure(found) ? found.text : "");
@@ -9296,6 +9302,54 @@ function sceneOf(rows) {
   return { scene, now };
 }
 
+// src/core/run_requests.ts
+var REFRESH_MS = 2e3;
+var refreshed = -REFRESH_MS;
+var refreshDue = 0;
+function refreshRuns() {
+  if (refreshDue) return;
+  refreshDue = setTimeout(
+    async () => {
+      const answer = await ask("/api/runs");
+      refreshed = performance.now();
+      refreshDue = 0;
+      r3(() => {
+        store.data.runsProblem.value = isFailure(answer) ? answer.text : "";
+        if (!isFailure(answer)) store.data.runs.value = answer;
+        store.data.runsKnown.value = true;
+      });
+    },
+    Math.max(0, refreshed + REFRESH_MS - performance.now())
+  );
+}
+async function askFleet(skip) {
+  const answer = await ask(`/api/fleet?skip=${skip}`);
+  return isFailure(answer) ? null : answer;
+}
+async function askSimulation(data) {
+  const answer = await post("/api/simulate", data);
+  await refreshSimulations();
+  return answer;
+}
+async function refreshSimulations() {
+  const answer = await ask("/api/simulations");
+  if (!isFailure(answer)) store.data.simulations.value = answer;
+}
+async function commandMission({ journal, id }, what) {
+  const answer = await post("/api/mission", { journal, id, command: what });
+  if (answer.ok) store.view.notify(`${id}: ${answer.text}`);
+  else if (!answer.wants_token) store.view.notify(answer.text, "error");
+  refreshRuns();
+}
+async function openRun(id) {
+  const answer = await ask(`/api/open?run=${encoded(id)}`);
+  if (!answer.ok) {
+    store.view.notify(`Run: ${answer.text}`, "error");
+    return;
+  }
+  choose(answer.name);
+}
+
 // src/panels/fleet.tsx
 var REFRESH_MS2 = 1e3;
 var MOST_ROWS3 = 32;
@@ -9493,9 +9547,7 @@ function outageText({ outages }) {
   return `resumed after ${times}${duration(gone)}`;
 }
 
-// src/panels/home.tsx
-var MOST_ROWS4 = 40;
-var MOST_NAMES2 = 8;
+// src/panels/run_rows.tsx
 var SIGNS = {
   live: "●",
   success: "✓",
@@ -9507,132 +9559,7 @@ var SIGNS = {
   queued: "…"
 };
 var WORDS = { live: "running", interrupted: "interrupted", queued: "queued" };
-var REFRESH_MS3 = 5e3;
 var KINDS = { live: "active", cut: "waiting", interrupted: "waiting", queued: "waiting" };
-var HomePage = () => store.view.pageShown.value === "runs" ? /* @__PURE__ */ a4(OpenHome, {}) : null;
-var openSimulations = () => {
-  store.view.simulateOpen.value = true;
-};
-var lastWord = (path) => path.split("/").at(-1) || path;
-var ALL = { show: "all", machine: null, robot: null, text: "" };
-function OpenHome() {
-  const [filter, setFilter] = d2(ALL);
-  const [most, setMost] = d2(MOST_ROWS4);
-  const heading = T2(null);
-  const { machines } = store.data;
-  A2(() => heading.current?.focus(), []);
-  A2(() => {
-    refreshRuns();
-  }, [machines.value]);
-  const { runs: runs2, folders, journals } = store.data.runs.value;
-  A2(() => {
-    if (!journals.length) return;
-    const timer = setInterval(refreshRuns, REFRESH_MS3);
-    return () => clearInterval(timer);
-  }, [journals.length > 0]);
-  store.playback.slowTick.value;
-  const pins2 = store.view.pins.value;
-  const rows = chosen(runs2, filter, pins2);
-  const change2 = (some) => {
-    setFilter({ ...filter, ...some });
-    setMost(MOST_ROWS4);
-  };
-  const failed = rows.filter((row) => standing(row) === "failure").length;
-  const failedText = failed ? `, ${failed} failed` : "";
-  return /* @__PURE__ */ a4("section", { class: "home", "aria-labelledby": "home-title", children: [
-    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins: pins2, onChange: change2 }),
-    /* @__PURE__ */ a4("div", { class: "run-list", children: [
-      /* @__PURE__ */ a4("header", { children: [
-        /* @__PURE__ */ a4("h2", { id: "home-title", tabindex: -1, ref: heading, children: "Runs" }),
-        folders.map((one) => /* @__PURE__ */ a4("span", { class: "chip", title: one, children: [
-          "folder ",
-          shorten(lastWord(one), 24)
-        ] })),
-        journals.map((one) => /* @__PURE__ */ a4(JournalChip, { ...one })),
-        /* @__PURE__ */ a4("span", { class: "spread" }),
-        /* @__PURE__ */ a4("span", { class: "hint", role: "status", children: store.data.runsKnown.value ? `${rows.length.toLocaleString("en")} run${rows.length === 1 ? "" : "s"}${failedText}` : "reading the runs…" }),
-        /* @__PURE__ */ a4(
-          "input",
-          {
-            placeholder: "machine, robot, state, reason",
-            "aria-label": "search runs",
-            value: filter.text,
-            onInput: (e4) => change2({ text: fieldValue(e4) })
-          }
-        ),
-        runs2.filter((row) => row.live).length > 1 && /* @__PURE__ */ a4("button", { onClick: () => showPage("fleet"), children: "Fleet" }),
-        /* @__PURE__ */ a4("button", { onClick: openSimulations, children: "Simulate" }),
-        store.data.model.value && /* @__PURE__ */ a4("button", { onClick: () => showPage("machine"), children: "Close" })
-      ] }),
-      store.data.runsProblem.value && /* @__PURE__ */ a4("p", { class: "error", children: store.data.runsProblem.value }),
-      !runs2.length && store.data.runsKnown.value && /* @__PURE__ */ a4(NoRuns, {}),
-      runs2.length > 0 && !rows.length && /* @__PURE__ */ a4("div", { class: "empty-list", children: [
-        /* @__PURE__ */ a4("p", { children: [
-          "No run is ",
-          filterText(filter),
-          "."
-        ] }),
-        /* @__PURE__ */ a4("button", { onClick: () => setFilter(ALL), children: "Clear filters" })
-      ] }),
-      rows.length > 0 && /* @__PURE__ */ a4(Rows2, { rows: rows.slice(0, most), pins: pins2 }),
-      /* @__PURE__ */ a4(More, { left: rows.length - most, onMore: () => setMost(most + 200) })
-    ] })
-  ] });
-}
-var JournalChip = ({ name, problem }) => /* @__PURE__ */ a4("span", { class: problem ? "chip bad" : "chip", title: problem || name, children: [
-  "journal ",
-  shorten(lastWord(name), 24),
-  problem && ": not readable"
-] });
-function NoRuns() {
-  const text2 = "smachpy run patrol --start-robot --view";
-  const copy2 = () => navigator.clipboard?.writeText(text2).then(() => store.view.notify("copied"));
-  return /* @__PURE__ */ a4("div", { class: "empty-list", children: [
-    /* @__PURE__ */ a4("p", { children: "No runs yet. Make one:" }),
-    /* @__PURE__ */ a4("p", { children: [
-      /* @__PURE__ */ a4("code", { children: text2 }),
-      " ",
-      /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy" })
-    ] })
-  ] });
-}
-function Filters({
-  runs: runs2,
-  filter,
-  pins: pins2,
-  onChange
-}) {
-  const counts = countsOf(runs2, pins2);
-  const choice = (name, count, on2, choose2) => /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4("button", { class: on2 ? "on" : "", "aria-pressed": on2, onClick: choose2, children: [
-    /* @__PURE__ */ a4("span", { children: shorten(name, 24) }),
-    /* @__PURE__ */ a4("span", { class: "number", children: count })
-  ] }) });
-  const names = (what, found) => found.length > 0 && /* @__PURE__ */ a4($, { children: [
-    /* @__PURE__ */ a4("h3", { children: what === "machine" ? "Machine" : "Robot" }),
-    /* @__PURE__ */ a4("ul", { children: found.slice(0, MOST_NAMES2).map(
-      ([name, count]) => choice(
-        name,
-        count,
-        filter[what] === name,
-        () => onChange({ [what]: filter[what] === name ? null : name })
-      )
-    ) })
-  ] });
-  return /* @__PURE__ */ a4("nav", { class: "filters", "aria-label": "filters", children: [
-    /* @__PURE__ */ a4("h3", { children: "Show" }),
-    /* @__PURE__ */ a4("ul", { children: SHOWN.filter((show2) => show2 === "all" || (counts.get(show2) ?? 0) > 0 || filter.show === show2).map(
-      (show2) => choice(SHOWN_NAMES[show2], counts.get(show2) ?? 0, filter.show === show2, () => onChange({ show: show2 }))
-    ) }),
-    names(
-      "machine",
-      tally(runs2, (row) => [row.machine])
-    ),
-    names(
-      "robot",
-      tally(runs2, (row) => row.robots)
-    )
-  ] });
-}
 function Rows2({ rows, pins: pins2 }) {
   const today = /* @__PURE__ */ new Date();
   return /* @__PURE__ */ a4("table", { class: "runs", children: [
@@ -9765,6 +9692,134 @@ function Strip2({ row, seconds }) {
   ] });
 }
 
+// src/panels/home.tsx
+var MOST_ROWS4 = 40;
+var MOST_NAMES2 = 8;
+var REFRESH_MS3 = 5e3;
+var HomePage = () => store.view.pageShown.value === "runs" ? /* @__PURE__ */ a4(OpenHome, {}) : null;
+var openSimulations = () => {
+  store.view.simulateOpen.value = true;
+};
+var ALL = { show: "all", machine: null, robot: null, text: "" };
+function OpenHome() {
+  const [filter, setFilter] = d2(ALL);
+  const [most, setMost] = d2(MOST_ROWS4);
+  const heading = T2(null);
+  const { machines } = store.data;
+  A2(() => heading.current?.focus(), []);
+  A2(() => {
+    refreshRuns();
+  }, [machines.value]);
+  const { runs: runs2, folders, journals } = store.data.runs.value;
+  A2(() => {
+    if (!journals.length) return;
+    const timer = setInterval(refreshRuns, REFRESH_MS3);
+    return () => clearInterval(timer);
+  }, [journals.length > 0]);
+  store.playback.slowTick.value;
+  const pins2 = store.view.pins.value;
+  const rows = chosen(runs2, filter, pins2);
+  const change2 = (some) => {
+    setFilter({ ...filter, ...some });
+    setMost(MOST_ROWS4);
+  };
+  const failed = rows.filter((row) => standing(row) === "failure").length;
+  const failedText = failed ? `, ${failed} failed` : "";
+  return /* @__PURE__ */ a4("section", { class: "home", "aria-labelledby": "home-title", children: [
+    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins: pins2, onChange: change2 }),
+    /* @__PURE__ */ a4("div", { class: "run-list", children: [
+      /* @__PURE__ */ a4("header", { children: [
+        /* @__PURE__ */ a4("h2", { id: "home-title", tabindex: -1, ref: heading, children: "Runs" }),
+        folders.map((one) => /* @__PURE__ */ a4("span", { class: "chip", title: one, children: [
+          "folder ",
+          shorten(lastWord(one), 24)
+        ] })),
+        journals.map((one) => /* @__PURE__ */ a4(JournalChip, { ...one })),
+        /* @__PURE__ */ a4("span", { class: "spread" }),
+        /* @__PURE__ */ a4("span", { class: "hint", role: "status", children: store.data.runsKnown.value ? `${rows.length.toLocaleString("en")} run${rows.length === 1 ? "" : "s"}${failedText}` : "reading the runs…" }),
+        /* @__PURE__ */ a4(
+          "input",
+          {
+            placeholder: "machine, robot, state, reason",
+            "aria-label": "search runs",
+            value: filter.text,
+            onInput: (e4) => change2({ text: fieldValue(e4) })
+          }
+        ),
+        runs2.filter((row) => row.live).length > 1 && /* @__PURE__ */ a4("button", { onClick: () => showPage("fleet"), children: "Fleet" }),
+        /* @__PURE__ */ a4("button", { onClick: openSimulations, children: "Simulate" }),
+        store.data.model.value && /* @__PURE__ */ a4("button", { onClick: () => showPage("machine"), children: "Close" })
+      ] }),
+      store.data.runsProblem.value && /* @__PURE__ */ a4("p", { class: "error", children: store.data.runsProblem.value }),
+      !runs2.length && store.data.runsKnown.value && /* @__PURE__ */ a4(NoRuns, {}),
+      runs2.length > 0 && !rows.length && /* @__PURE__ */ a4("div", { class: "empty-list", children: [
+        /* @__PURE__ */ a4("p", { children: [
+          "No run is ",
+          filterText(filter),
+          "."
+        ] }),
+        /* @__PURE__ */ a4("button", { onClick: () => setFilter(ALL), children: "Clear filters" })
+      ] }),
+      rows.length > 0 && /* @__PURE__ */ a4(Rows2, { rows: rows.slice(0, most), pins: pins2 }),
+      /* @__PURE__ */ a4(More, { left: rows.length - most, onMore: () => setMost(most + 200) })
+    ] })
+  ] });
+}
+var JournalChip = ({ name, problem }) => /* @__PURE__ */ a4("span", { class: problem ? "chip bad" : "chip", title: problem || name, children: [
+  "journal ",
+  shorten(lastWord(name), 24),
+  problem && ": not readable"
+] });
+function NoRuns() {
+  const text2 = "smachpy run patrol --start-robot --view";
+  const copy2 = () => navigator.clipboard?.writeText(text2).then(() => store.view.notify("copied"));
+  return /* @__PURE__ */ a4("div", { class: "empty-list", children: [
+    /* @__PURE__ */ a4("p", { children: "No runs yet. Make one:" }),
+    /* @__PURE__ */ a4("p", { children: [
+      /* @__PURE__ */ a4("code", { children: text2 }),
+      " ",
+      /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy" })
+    ] })
+  ] });
+}
+function Filters({
+  runs: runs2,
+  filter,
+  pins: pins2,
+  onChange
+}) {
+  const counts = countsOf(runs2, pins2);
+  const choice = (name, count, on2, choose2) => /* @__PURE__ */ a4("li", { children: /* @__PURE__ */ a4("button", { class: on2 ? "on" : "", "aria-pressed": on2, onClick: choose2, children: [
+    /* @__PURE__ */ a4("span", { children: shorten(name, 24) }),
+    /* @__PURE__ */ a4("span", { class: "number", children: count })
+  ] }) });
+  const names = (what, found) => found.length > 0 && /* @__PURE__ */ a4($, { children: [
+    /* @__PURE__ */ a4("h3", { children: what === "machine" ? "Machine" : "Robot" }),
+    /* @__PURE__ */ a4("ul", { children: found.slice(0, MOST_NAMES2).map(
+      ([name, count]) => choice(
+        name,
+        count,
+        filter[what] === name,
+        () => onChange({ [what]: filter[what] === name ? null : name })
+      )
+    ) })
+  ] });
+  return /* @__PURE__ */ a4("nav", { class: "filters", "aria-label": "filters", children: [
+    /* @__PURE__ */ a4("h3", { children: "Show" }),
+    /* @__PURE__ */ a4("ul", { children: SHOWN.filter((show2) => show2 === "all" || (counts.get(show2) ?? 0) > 0 || filter.show === show2).map(
+      (show2) => choice(SHOWN_NAMES[show2], counts.get(show2) ?? 0, filter.show === show2, () => onChange({ show: show2 }))
+    ) }),
+    names(
+      "machine",
+      tally(runs2, (row) => [row.machine])
+    ),
+    names(
+      "robot",
+      tally(runs2, (row) => row.robots)
+    )
+  ] });
+}
+
 // src/panels/comparison.tsx
 var MOST3 = 60;
 async function compare(page2, name) {
@@ -9776,7 +9831,7 @@ async function compare(page2, name) {
     return;
   }
   const asked2 = store.data.facts.value?.name;
-  const found = await ask(link("compare", `&with=${encoded2(name)}`));
+  const found = await ask(link("compare", `&with=${encoded(name)}`));
   const model = store.data.model.value;
   if (!model || asked2 !== store.data.facts.value?.name) return;
   if (isFailure(found)) {
@@ -10148,7 +10203,7 @@ function ShareButtons({ page: page2 }) {
   };
   const share = () => {
     const saved2 = document.createElement("a");
-    saved2.href = link("export", `&format=html&view=${encoded2(page2.address.fragment)}`);
+    saved2.href = link("export", `&format=html&view=${encoded(page2.address.fragment)}`);
     saved2.download = "";
     saved2.click();
   };
@@ -10797,7 +10852,7 @@ function WholeValue({ entry }) {
     e4.stopPropagation();
     put2({ text: "Asking the mission…" });
     put2(
-      await ask(link("value", `&container=${encoded2(container)}&key=${encoded2(entry.key)}`))
+      await ask(link("value", `&container=${encoded(container)}&key=${encoded(entry.key)}`))
     );
   };
   if (!found)
@@ -16094,7 +16149,6 @@ uPlot.sync = _sync;
 
 // src/drawing/plot.ts
 var SCALE = 44;
-var FONT3 = "11px Inter, Arial, sans-serif";
 var RIGHT4 = 14;
 var Plot = class {
   element;
@@ -16129,7 +16183,7 @@ var Plot = class {
           {
             size: SCALE,
             gap: 4,
-            font: FONT3,
+            font: FONT,
             space: 24,
             stroke: colour("muted"),
             grid: { stroke: colour("hair"), width: 1 },
@@ -16425,7 +16479,7 @@ function Card({ one, page: page2 }) {
     const by = store.view.operator.value.trim() || void 0;
     if (!await command("answer", { path: one.path, answer, by })) setSent(false);
   };
-  const id = `question-${encoded2(one.path)}`;
+  const id = `question-${encoded(one.path)}`;
   return /* @__PURE__ */ a4("div", { class: `question ${one.isOpen ? "" : "over"}`, role: "alertdialog", "aria-labelledby": id, children: [
     /* @__PURE__ */ a4("header", { children: [
       /* @__PURE__ */ a4("div", { children: [
@@ -16491,7 +16545,7 @@ var Ring = ({ one }) => /* @__PURE__ */ a4("svg", { class: `ring ${isUrgent(one)
 function Picture2({ one }) {
   const [gone, setGone] = d2(false);
   if (gone) return null;
-  const source = link("question", `&path=${encoded2(one.path)}&asked=${one.asked}`);
+  const source = link("question", `&path=${encoded(one.path)}&asked=${one.asked}`);
   return /* @__PURE__ */ a4("img", { class: "question-picture", alt: "what the question is about", src: source, onError: () => setGone(true) });
 }
 var HeldCard = ({ path, page: page2 }) => /* @__PURE__ */ a4("div", { class: "question held", role: "alertdialog", "aria-label": "breakpoint", children: [
@@ -16661,7 +16715,7 @@ function BatchRow({ batch }) {
       report && /* @__PURE__ */ a4(
         "a",
         {
-          href: `/api/report?batch=${encoded2(id)}`,
+          href: `/api/report?batch=${encoded(id)}`,
           target: "_blank",
           rel: "noopener noreferrer",
           "aria-label": `report of ${id}`,
@@ -16816,7 +16870,7 @@ function NumbersLine({ page: page2 }) {
   ] });
 }
 function Downloads() {
-  const active = store.status.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded2(path)}`);
+  const active = store.status.activePaths.value.slice(0, MOST_ACTIVE).map((path) => `&active=${encoded(path)}`);
   const looks = `&theme=${isDark() ? "dark" : "light"}${active.join("")}`;
   const picture = (format) => /* @__PURE__ */ a4("a", { class: "button", href: link("picture", `&format=${format}${looks}`), download: true, children: format });
   return /* @__PURE__ */ a4($, { children: [

@@ -1,7 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { inflateSync } from "node:zlib";
-import { cellAt, namedPlaces, placeOf, robotOf, Scene, scanPoints } from "#core/scene.ts";
+import { namedPlaces, placeOf } from "#core/places.ts";
+import { cellAt, robotOf, Scene, scanPoints } from "#core/scene.ts";
 import type { GridMap, Robot, RunEvent } from "#core/types.ts";
 import { fixture } from "./fixtures.ts";
 

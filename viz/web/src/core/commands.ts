@@ -2,9 +2,9 @@
 // what became of the last one.
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
-import { hasToken, link, post } from "#core/connection.ts";
 import { own } from "#core/fold.ts";
 import { goalText } from "#core/purposes.ts";
+import { hasToken, link, post } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 

@@ -1,27 +1,18 @@
-// Receives events, from a server or from the file that this page is, and sends requests to the server.
+// Receives events, from a server or from the file that this page is.
 
 import { batch } from "@preact/signals";
 import type { Message } from "#core/hub.ts";
 import { Hub } from "#core/hub.ts";
+import { isFile, unpack } from "#core/page_file.ts";
 import { pageOf, showPage } from "#core/pages.ts";
+import { ask, encoded, isFailure, link, logIn, readToken, setToken } from "#core/requests.ts";
 import { store } from "#core/store.ts";
-import type {
-  FleetRuns,
-  MachineFacts,
-  MachinePayload,
-  MachineSummary,
-  Mission,
-  Observed,
-  RunEvent,
-  Snapshot,
-  Why,
-} from "#core/types.ts";
-import type { Answers, BatchStarted, CheckedGoal, Done, Failure, GoalAccepted, StreamData } from "#core/wire.ts";
+import type { MachineFacts, MachinePayload, MachineSummary, Observed, RunEvent, Snapshot, Why } from "#core/types.ts";
+import type { Answers, StreamData } from "#core/wire.ts";
 
 const CAUGHT_UP_MS = 1000; // time in which a new stream may bring old events
 const RETRY_MS = 250; // time between two attempts to fetch a structure; it doubles
 const LONGEST_RETRY_MS = 4000;
-const ANSWER_MS = 3000; // time in which every command is answered, or has failed
 
 let hub: Pick<MessagePort, "postMessage" | "onmessage"> | null = null; // the other end of this page's stream
 let streamBegan = 0; // [ms]
@@ -30,37 +21,10 @@ let newest = 0; // number of the newest of them
 let seen = -1; // number of the newest record of robot topics
 let isNew = false; // whether the last snapshot replaced what this page had
 let loads = 0; // numbers the fetches of structures: only the newest one counts
-let token: string | null = null; // for commands
-let view = ""; // the token for reading
 let onEvents: (events: RunEvent[]) => void = () => {};
 let onMachine = () => {};
 let onObserved: (records: Observed[]) => void = () => {};
 let whyOfFile: Why | null = null;
-
-/** Whether this page is a file that contains its run. */
-export const isFile = () => document.getElementById("run-data") !== null;
-
-/** The text in an element. @param id of an element with gzip data in base64 */
-async function unpack(id: string) {
-  const text = document.getElementById(id)?.textContent ?? "";
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(plain).text();
-}
-
-/** The bytes of zlib data in base64. */
-export async function bytesOf(text: string) {
-  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(plain).arrayBuffer());
-}
-
-/** Start a worker: a file of the server, or a part of this page if that is a file. */
-export async function makeWorker(name: "elk" | "film") {
-  if (!isFile()) return new Worker(`/${name}-worker.js`);
-  const code = await unpack(`${name}-data`);
-  return new Worker(URL.createObjectURL(new Blob([code], { type: "text/javascript" })));
-}
 
 export async function connect(handlers: {
   onEvents: (events: RunEvent[]) => void;
@@ -92,34 +56,6 @@ export async function connect(handlers: {
   tellHub();
 }
 
-/**
- * Read the token from the fragment of the address, which browsers do not send to servers, and remove it there, so that
- * a copied address does not contain it.
- */
-export function readToken() {
-  const words = new URLSearchParams(location.hash.slice(1));
-  const given = words.get("token") || null;
-  view = words.get("view") ?? "";
-  words.delete("token");
-  words.delete("view");
-  try {
-    if (given) sessionStorage.setItem("smachpy.token", given);
-    token = given ?? sessionStorage.getItem("smachpy.token");
-  } catch {
-    token = given; // a page in a file has no storage
-  }
-  const rest = String(words);
-  if (given || view) history.replaceState(null, "", location.pathname + location.search + (rest && `#${rest}`));
-}
-
-/** Get the cookie by which links, pictures and streams may read. */
-async function logIn() {
-  const known = token ?? view;
-  if (known) await ask("/api/login", { method: "POST", body: JSON.stringify({ token: known }) });
-}
-
-export const hasToken = () => token !== null && store.data.settings.value.control;
-
 /** Show the machine of that name. */
 export function choose(name: string) {
   showPage("machine", { machine: name });
@@ -137,13 +73,6 @@ function follow(name: string) {
   loads += 1;
   tellHub();
 }
-
-/** A text for an address; without lone surrogates, at which encodeURIComponent would throw. */
-export const encoded = (text: string) => encodeURIComponent(text.replace(/\p{Surrogate}/gu, "\ufffd"));
-
-/** The address of a resource of a machine, by default the one shown. */
-export const link = (what: string, more: string = "", machine = store.data.facts.value?.name ?? "") =>
-  `/api/${what}?machine=${encoded(machine)}${more}`;
 
 // -- the stream of events -----------------------------------------------------------------------
 
@@ -299,69 +228,14 @@ async function fetchModel(name: string): Promise<MachinePayload | null> {
   }
 }
 
-// -- questions and commands ---------------------------------------------------------------------
-
-/** The JSON answer of the server, or an error in the same form. */
-export async function ask<T>(address: string, options: RequestInit = {}): Promise<T | Failure> {
-  let answer: Response;
-  let text: string;
-  try {
-    answer = await fetch(address, options);
-    text = await answer.text();
-  } catch (error) {
-    return failure(`The viewer's server does not answer (${messageOf(error)}).`);
-  }
-  try {
-    return JSON.parse(text);
-  } catch {
-    const status = `${answer.status} ${answer.statusText}`.trim();
-    const reason = [status, text.trim().slice(0, 300)].filter(Boolean).join(": ");
-    return failure(`The viewer's server answered ${reason}`);
-  }
-}
-
-const failure = (text: string): Failure => ({ ok: false, text, wants_token: false, problems: [] });
-
-export const isFailure = (answer: unknown): answer is Failure =>
-  typeof answer === "object" && answer !== null && "ok" in answer && answer.ok === false;
-
-export const messageOf = (error: unknown) => (error instanceof Error ? error.message : String(error));
-
-/** Send a command. After 3 s without an answer it counts as failed, as nobody watches a button for longer. */
-export async function post<T extends { ok: true }>(address: string, data: object): Promise<T | Failure> {
-  const limit = new AbortController();
-  const timer = setTimeout(() => limit.abort(), ANSWER_MS);
-  const answer = await ask<T>(address, {
-    method: "POST",
-    headers: { "content-type": "application/json", "x-smachpy-token": token ?? "" },
-    body: JSON.stringify(data),
-    signal: limit.signal,
-  });
-  clearTimeout(timer);
-  if (limit.signal.aborted)
-    return failure(`no answer in ${ANSWER_MS / 1000} s; it may still be carried out: look at the machine.`);
-  if (isFailure(answer) && answer.wants_token) store.view.tokenAsked.value = true; // a new viewer's is another one
-  return answer;
-}
-
-/** Set the token. Returns false if there is none. @param text the token, or an address that contains it */
+/** Take another token, and open the stream with it. Returns false if there is none in the text. */
 export function takeToken(text: string) {
-  const [, found] = /#token=([\w-]+)/.exec(text) ?? /^\s*([\w-]+)\s*$/.exec(text) ?? [];
-  if (!found) return false;
-  token = found;
-  try {
-    sessionStorage.setItem("smachpy.token", found);
-  } catch {
-    // without storage it is lost when the page is loaded again
-  }
+  if (!setToken(text)) return false;
   store.view.tokenAsked.value = false;
   logIn().then(reconnect);
   store.view.notify("Try again now");
   return true;
 }
-
-/** Check or send a goal, or cancel one. */
-export const askAction = (data: object) => post<CheckedGoal | GoalAccepted | Done>("/api/action", data);
 
 /** Show or hide the causes of the run's end. */
 export async function showWhy(open: boolean = store.data.why.value === null) {
@@ -372,65 +246,4 @@ export async function showWhy(open: boolean = store.data.why.value === null) {
     store.data.why.value = answer;
     if (answer) store.view.part.value = "log"; // the part in which a phone shows them
   }
-}
-
-// -- the list of runs ---------------------------------------------------------------------------
-
-const REFRESH_MS = 2000; // shortest time between two lists of runs
-let refreshed = -REFRESH_MS; // [ms]
-let refreshDue: ReturnType<typeof setTimeout> | 0 = 0;
-
-/** Request the list of runs, at once or when it is due. */
-export function refreshRuns() {
-  if (refreshDue) return;
-  refreshDue = setTimeout(
-    async () => {
-      const answer = await ask<Answers["GET /api/runs"]>("/api/runs");
-      refreshed = performance.now();
-      refreshDue = 0;
-      batch(() => {
-        store.data.runsProblem.value = isFailure(answer) ? answer.text : "";
-        if (!isFailure(answer)) store.data.runs.value = answer;
-        store.data.runsKnown.value = true;
-      });
-    },
-    Math.max(0, refreshed + REFRESH_MS - performance.now()),
-  );
-}
-
-/** Some of the live runs together: those after the first `skip`. */
-export async function askFleet(skip: number): Promise<FleetRuns | null> {
-  const answer = await ask<Answers["GET /api/fleet"]>(`/api/fleet?skip=${skip}`);
-  return isFailure(answer) ? null : answer;
-}
-
-/** Start a batch of simulated runs, or stop one. */
-export async function askSimulation(data: object) {
-  const answer = await post<Done | BatchStarted>("/api/simulate", data);
-  await refreshSimulations();
-  return answer;
-}
-
-/** Request the batches of simulated runs. */
-export async function refreshSimulations() {
-  const answer = await ask<Answers["GET /api/simulations"]>("/api/simulations");
-  if (!isFailure(answer)) store.data.simulations.value = answer;
-}
-
-/** Resume or cancel a durable mission. */
-export async function commandMission({ journal, id }: Mission, what: string) {
-  const answer = await post<Done>("/api/mission", { journal, id, command: what });
-  if (answer.ok) store.view.notify(`${id}: ${answer.text}`);
-  else if (!answer.wants_token) store.view.notify(answer.text, "error");
-  refreshRuns();
-}
-
-/** Show a run of the list. */
-export async function openRun(id: string) {
-  const answer = await ask<Answers["GET /api/open"]>(`/api/open?run=${encoded(id)}`);
-  if (!answer.ok) {
-    store.view.notify(`Run: ${answer.text}`, "error");
-    return;
-  }
-  choose(answer.name);
 }

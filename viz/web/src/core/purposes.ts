@@ -2,6 +2,7 @@
 
 import { own } from "#core/fold.ts";
 import { isInCleanup } from "#core/model.ts";
+import { placeText } from "#core/places.ts";
 import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { GoalRun, Span } from "#core/types.ts";
@@ -13,7 +14,7 @@ const NAMES = ["name", "station", "place", "waypoint", "location", "target", "ob
 export function purposeOf(id: string, { goal }: Pick<GoalRun, "goal">) {
   const { scene } = store.data;
   const driven = scene.goalWithId(id);
-  if (driven) return scene.placeName(driven) || `(${driven.x.toFixed(1)}, ${driven.y.toFixed(1)})`;
+  if (driven) return scene.placeName(driven) || placeText(driven);
   const fields = fieldsOf(goal) ?? {};
   for (const name of NAMES) if (typeof fields[name] === "string" && fields[name]) return shorten(fields[name], 24);
   return "";

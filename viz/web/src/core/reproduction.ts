@@ -2,8 +2,9 @@
 
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
-import { ask, encoded, hasToken, isFailure, isFile, link, post } from "#core/connection.ts";
 import type { Note } from "#core/links.ts";
+import { isFile } from "#core/page_file.ts";
+import { ask, encoded, hasToken, isFailure, link, post } from "#core/requests.ts";
 import { Run } from "#core/run.ts";
 import { store } from "#core/store.ts";
 import { beginOf } from "#core/two_runs.ts";

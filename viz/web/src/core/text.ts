@@ -65,3 +65,6 @@ export function holdText(row: PreemptedSpan, now: number) {
   const limit = grace != null ? ` of ${duration(grace)}` : "";
   return `${duration((now - row.preempt) / 1000)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
 }
+
+/** The last part of a path. */
+export const lastWord = (path: string) => path.split("/").at(-1) || path;

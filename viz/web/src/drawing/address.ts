@@ -1,9 +1,9 @@
 // The view in the fragment of the page's address: written a moment after a change, and shown when a page is opened
 // with it.
 
-import { isFile } from "#core/connection.ts";
 import type { LinkedView } from "#core/links.ts";
 import { fragmentOf, viewOf } from "#core/links.ts";
+import { isFile } from "#core/page_file.ts";
 import { store } from "#core/store.ts";
 
 const WRITE_MS = 300; // delay between a change and the update of the address

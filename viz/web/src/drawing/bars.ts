@@ -8,13 +8,12 @@ import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 import type { Span, StateNode } from "#core/types.ts";
 import { type Lanes, laneHeight, rowsOf } from "#drawing/lanes.ts";
-import type { Colours } from "#drawing/theme.ts";
+import { type Colours, FONT } from "#drawing/theme.ts";
 
 // Sizes in CSS pixels
 const THINNEST = 0.5;
 const FAILED = 3; // narrowest bar of a failure
 const MOST_WIDTHS = 4000; // texts whose widths are kept
-export const FONT = "11px Inter, Arial, sans-serif";
 
 /** the range shown [ms], and its pixels between the names of the lanes and the right end */
 export type Scale = { from: number; to: number; left: number; right: number; x: (t: number) => number };

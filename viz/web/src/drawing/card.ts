@@ -1,6 +1,6 @@
 // The causes of a run's end as a picture to pass on: what happened, the diagram, the map, and which run it was.
 
-import { messageOf } from "#core/connection.ts";
+import { messageOf } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Why } from "#core/types.ts";

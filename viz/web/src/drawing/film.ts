@@ -1,8 +1,9 @@
 // Saves a stretch of the run as a GIF: shows one instant after another and encodes a picture of the page for each.
 
-import { makeWorker, messageOf } from "#core/connection.ts";
+import { makeWorker } from "#core/page_file.ts";
 import type { Stretch } from "#core/playback.ts";
 import { FILM_FRAME_MS, framesOf } from "#core/playback.ts";
+import { messageOf } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import type { Page } from "#drawing/page.ts";
 import { isDark } from "#drawing/theme.ts";

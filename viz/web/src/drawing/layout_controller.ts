@@ -1,6 +1,6 @@
 // Lays out the machine with the containers that are open, draws it, and brings into view what was asked for.
 
-import { messageOf } from "#core/connection.ts";
+import { messageOf } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import type { Box } from "#core/types.ts";
 import type { Diagram } from "#drawing/diagram.ts";

@@ -1,13 +1,15 @@
 // The map: floor, tracks in the colours of the states that drove them, goals, plans, scans, robots.
 // A click on a track goes to the instant at which the robot was there.
 
-import { bytesOf } from "#core/connection.ts";
 import { outcomeClass } from "#core/outcomes.ts";
+import { placeText } from "#core/places.ts";
 import type { Scene } from "#core/scene.ts";
-import { COLOURS, cellAt, countUntil, scanPoints } from "#core/scene.ts";
+import { COLOURS, countUntil, scanPoints } from "#core/scene.ts";
 import { store } from "#core/store.ts";
-import type { DrivenGoal, GridMap, Piece, Point, Robot } from "#core/types.ts";
-import { Colours, fitted } from "#drawing/theme.ts";
+import type { DrivenGoal, Piece, Point, Robot } from "#core/types.ts";
+import { Floor, type MapScale, pixelOf, placeAt } from "#drawing/floor.ts";
+import { Labels } from "#drawing/labels.ts";
+import { Colours, FONT, fitted } from "#drawing/theme.ts";
 import { grab } from "#drawing/viewport.ts";
 
 const MARGIN = 10; // around the map [px]
@@ -18,7 +20,6 @@ const RADIUS_M = 0.25; // of a robot
 const SMALLEST = 6; // of a robot [px]
 const [CLOSEST, FARTHEST] = [400, 0.5]; // [px/m]
 const SCALES_M = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
-const FONT = "11px Inter, Arial, sans-serif";
 
 export class MapView {
   canvas: HTMLCanvasElement;
@@ -29,16 +30,15 @@ export class MapView {
   view: { k: number; x: number; y: number } | null = null;
   /** shown in place of the page's run, without links to it */
   given: { scene: Scene; now: number } | null = null;
-  /** pictures of maps, by their cells and colours */
-  #pictures: Map<string, HTMLCanvasElement> = new Map();
   #colours = new Colours();
-  /** where names are, and marks of places */
-  #labels: { left: number; top: number; right: number; bottom: number }[] = [];
-  #scale = { k: 1, left: 0, bottom: 0 };
+  #floor = new Floor(this.#colours, () => this.draw());
+  #labels: Labels;
+  #scale: MapScale = { k: 1, left: 0, bottom: 0 };
 
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d") as CanvasRenderingContext2D;
+    this.#labels = new Labels(this.context, this.#colours);
     canvas.addEventListener("pointermove", (e) => this.#hover(e));
     canvas.addEventListener("pointerleave", () => store.pointer.hover(null));
     grab(canvas, {
@@ -55,14 +55,14 @@ export class MapView {
   /** Read the colours again. */
   restyle() {
     this.#colours.forget();
-    this.#pictures.clear();
+    this.#floor.forget();
   }
 
   /** Reset the view for another machine. */
   reset() {
     this.view = null;
     this.followed = null;
-    this.#pictures.clear();
+    this.#floor.forget();
   }
 
   /** Show the whole map, or one robot. */
@@ -73,14 +73,8 @@ export class MapView {
   }
 
   /** The pixel of a place. @param place [m] @returns [px] */
-  at({ x, y }: Point): [number, number] {
-    const { k, left, bottom } = this.#scale;
-    return [left + x * k, bottom - y * k];
-  }
-
-  #placeAt(px: number, py: number): Point {
-    const { k, left, bottom } = this.#scale;
-    return { x: (px - left) / k, y: (bottom - py) / k };
+  at(place: Point): [number, number] {
+    return pixelOf(this.#scale, place);
   }
 
   #frame(scene: Scene, now: number, width: number, height: number) {
@@ -110,83 +104,17 @@ export class MapView {
     const map = scene.mapAt(now);
     g.fillStyle = this.#colours.of(map ? "unknown" : "floor");
     g.fillRect(0, 0, width, height);
-    if (map) this.#floor(map, ratio);
-    else this.#grid(width, height);
+    if (map) this.#floor.draw(g, map, this.#scale, ratio);
+    else this.#floor.drawGrid(g, this.#scale, width, height);
     const until = (this.given ? null : store.playback.cursor.value) ?? Infinity;
     for (const robot of scene.robots.values()) this.#seen(scene, robot, now, until);
     for (const robot of scene.robots.values()) this.#tracks(scene, robot, until);
-    this.#labels = [this.#scaleBox(width, height)];
+    this.#labels.forget();
+    this.#labels.keepFree(this.#scaleBox(width, height));
     this.#goals(scene, until);
     for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
     this.#scaleBar(width, height);
     canvas.setAttribute("aria-label", describe(scene, now));
-  }
-
-  #floor(map: GridMap, ratio: number) {
-    const picture = this.#picture(map);
-    if (!picture) return;
-    const g = this.context;
-    const { k } = this.#scale;
-    const [x, y] = this.at(cellAt(map, 0, 0));
-    g.save();
-    g.translate(x, y);
-    g.rotate(-map.origin[2]);
-    g.scale(k * map.resolution, k * map.resolution);
-    g.imageSmoothingEnabled = k * map.resolution * ratio < 2;
-    g.imageSmoothingQuality = "high";
-    g.drawImage(picture, 0, -map.height);
-    g.restore();
-  }
-
-  /** A map as a picture; null while it is being unpacked. */
-  #picture(map: GridMap) {
-    const colours = ["floor", "wall", "unknown"].map((name) => this.#colours.of(name));
-    const key = `${colours.join()} ${map.width} ${map.cells}`;
-    const known = this.#pictures.get(key);
-    if (known) return known.width ? known : null;
-    const made = document.createElement("canvas");
-    made.width = 0;
-    this.#pictures.clear(); // older maps are not needed any more
-    this.#pictures.set(key, made);
-    bytesOf(map.cells)
-      .then((cells) => {
-        if (cells.length !== map.width * map.height) return; // a recording that was edited by hand
-        Object.assign(made, { width: map.width, height: map.height });
-        const g = made.getContext("2d") as CanvasRenderingContext2D;
-        const image = g.createImageData(map.width, map.height);
-        const words = new Uint32Array(image.data.buffer);
-        const shades = colours.map(wordOf);
-        for (let row = 0; row < map.height; row++)
-          for (let i = 0, from = (map.height - 1 - row) * map.width; i < map.width; i++)
-            words[row * map.width + i] = shades[cells[from + i]] ?? shades[2];
-        g.putImageData(image, 0, 0);
-        this.draw();
-      })
-      .catch(() => {}); // an invalid map: poses are shown without one
-    return null;
-  }
-
-  /** A grid of 1 m, if there is no map. */
-  #grid(width: number, height: number) {
-    const g = this.context;
-    const { k } = this.#scale;
-    const step = k > 6 ? 1 : 10;
-    const from = this.#placeAt(0, height);
-    const to = this.#placeAt(width, 0);
-    g.strokeStyle = this.#colours.of("hair-map");
-    g.lineWidth = 1;
-    g.beginPath();
-    for (let x = Math.ceil(from.x / step) * step; x < to.x; x += step) {
-      const [px] = this.at({ x, y: 0 });
-      g.moveTo(px, 0);
-      g.lineTo(px, height);
-    }
-    for (let y = Math.ceil(from.y / step) * step; y < to.y; y += step) {
-      const [, py] = this.at({ x: 0, y });
-      g.moveTo(0, py);
-      g.lineTo(width, py);
-    }
-    g.stroke();
   }
 
   /** The scan and the plan of a robot. */
@@ -225,8 +153,7 @@ export class MapView {
 
   #tracks(scene: Scene, robot: Robot, until: number) {
     const g = this.context;
-    const { hovered } = store.pointer;
-    const lit = hovered.value;
+    const lit = store.pointer.hovered.value;
     const pieces = scene.piecesOf(robot);
     const isLit = (one: Piece) => lit !== null && one.path === lit.path && one.visit === lit.from;
     const anyLit = pieces.some(isLit);
@@ -264,7 +191,7 @@ export class MapView {
     g.textBaseline = "middle";
     for (const goal of places.values()) {
       const [x, y] = this.at(goal);
-      this.#labels.push({ left: x - 8, top: y - 8, right: x + 8, bottom: y + 8 });
+      this.#labels.keepFree({ left: x - 8, top: y - 8, right: x + 8, bottom: y + 8 });
     }
     for (const goal of places.values()) {
       const [x, y] = this.at(goal);
@@ -298,35 +225,8 @@ export class MapView {
         }
         g.stroke();
       }
-      this.#label(scene.placeName(goal), x, y, runs);
+      this.#labels.write(scene.placeName(goal), x, y, runs);
     }
-  }
-
-  /** Write a name beside a place, on a side without another name. */
-  #label(text: string, x: number, y: number, strong: boolean = false) {
-    if (!text) return;
-    const g = this.context;
-    g.font = strong ? `620 ${FONT}` : FONT;
-    const wide = g.measureText(text).width;
-    const sides = [
-      [x + 12, y],
-      [x - 12 - wide, y],
-      [x - wide / 2, y + 16],
-      [x - wide / 2, y - 16],
-    ].map(([left, middle]) => ({ left, top: middle - 7, right: left + wide, bottom: middle + 7 }));
-    const isFree = (a: (typeof sides)[0]) =>
-      a.left > 2 &&
-      a.right < this.canvas.clientWidth - 2 &&
-      !this.#labels.some((b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom);
-    const side = sides.find(isFree) ?? sides[0];
-    this.#labels.push(side);
-    g.textAlign = "left";
-    g.strokeStyle = this.#colours.of("floor");
-    g.lineWidth = 3;
-    g.lineJoin = "round";
-    g.strokeText(text, side.left, side.top + 7);
-    g.fillStyle = this.#colours.of("ink");
-    g.fillText(text, side.left, side.top + 7);
   }
 
   #robot(scene: Scene, name: string, robot: Robot, now: number) {
@@ -352,7 +252,7 @@ export class MapView {
     g.lineTo(-0.35 * r, -0.5 * r);
     g.fill();
     g.restore();
-    if (scene.robots.size > 1) this.#label(name, x, y - r - 7, true);
+    if (scene.robots.size > 1) this.#labels.write(name, x, y - r - 7, true);
   }
 
   /** The box of the scale, at the bottom right. */
@@ -389,7 +289,7 @@ export class MapView {
 
   #nearest(e: PointerEvent | MouseEvent) {
     if (this.given) return null;
-    const { x, y } = this.#placeAt(e.offsetX, e.offsetY);
+    const { x, y } = placeAt(this.#scale, e.offsetX, e.offsetY);
     return store.data.scene.nearest(x, y, REACH / this.#scale.k, store.playback.cursor.value ?? Infinity);
   }
 
@@ -410,7 +310,7 @@ export class MapView {
 
   #pan(dx: number, dy: number) {
     this.followed = null;
-    const middle = this.#placeAt(this.canvas.clientWidth / 2 - dx, this.canvas.clientHeight / 2 - dy);
+    const middle = placeAt(this.#scale, this.canvas.clientWidth / 2 - dx, this.canvas.clientHeight / 2 - dy);
     this.view = { k: this.#scale.k, ...middle };
     this.draw();
   }
@@ -422,7 +322,7 @@ export class MapView {
 
   /** @param py the place that stays */
   #zoom(factor: number, px: number = this.canvas.clientWidth / 2, py: number = this.canvas.clientHeight / 2) {
-    const held = this.#placeAt(px, py);
+    const held = placeAt(this.#scale, px, py);
     const k = Math.max(FARTHEST, Math.min(this.#scale.k * factor, CLOSEST));
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
     this.view = { k, x: held.x + (w / 2 - px) / k, y: held.y - (h / 2 - py) / k };
@@ -439,13 +339,6 @@ export class MapView {
   }
 }
 
-/** A colour as a pixel. @param hex such as #1a2531 or #fff */
-function wordOf(hex: string) {
-  const full = hex.length === 4 ? [...hex.slice(1)].map((c) => c + c).join("") : hex.slice(1, 7);
-  const [r, g, b] = [0, 2, 4].map((i) => Number.parseInt(full.slice(i, i + 2), 16));
-  return ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
-}
-
 /** The map as text, for screen readers. */
 function describe(scene: Scene, now: number) {
   const parts = [...scene.robots].flatMap(([name, robot]) => {
@@ -456,5 +349,3 @@ function describe(scene: Scene, now: number) {
   });
   return `map: ${parts.join("; ") || "no robot yet"}`;
 }
-
-const placeText = ({ x, y }: Point) => `(${x.toFixed(1)}, ${y.toFixed(1)})`;

@@ -1,9 +1,11 @@
 // The drawn part of the page: the diagram, the timeline with its plots, the map. Carries out the user's actions on the
 // view.
 
-import { connect, isFile, makeWorker, readToken } from "#core/connection.ts";
+import { connect } from "#core/connection.ts";
+import { isFile, makeWorker } from "#core/page_file.ts";
 import { showPage } from "#core/pages.ts";
 import { newest, reproduction } from "#core/reproduction.ts";
+import { readToken } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import type { Box, Theme } from "#core/types.ts";
 import { Address } from "#drawing/address.ts";

@@ -2,11 +2,10 @@
 import uPlot from "uplot";
 import { aligned, Samples } from "#core/series.ts";
 import { store } from "#core/store.ts";
-import { Colours } from "#drawing/theme.ts";
+import { Colours, FONT } from "#drawing/theme.ts";
 import { drag } from "#drawing/viewport.ts";
 
 const SCALE = 44; // width of the scale's numbers [px]
-const FONT = "11px Inter, Arial, sans-serif";
 export const RIGHT = 14; // margin, as in the timeline [px]
 
 /** the range shown [ms] */

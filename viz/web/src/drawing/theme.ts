@@ -2,6 +2,8 @@
 import { save } from "#core/storage.ts";
 import { store } from "#core/store.ts";
 
+export const FONT = "11px Inter, Arial, sans-serif"; // of names in canvases
+
 export const systemIsDark = matchMedia("(prefers-color-scheme: dark)");
 
 export const isDark = () =>

@@ -7,9 +7,9 @@ import { pins } from "#core/reproduction.ts";
 import { store } from "#core/store.ts";
 import { askerText, duration } from "#core/text.ts";
 import type { Span } from "#core/types.ts";
-import { Bars, clipped, FONT, type Scale } from "#drawing/bars.ts";
+import { Bars, clipped, type Scale } from "#drawing/bars.ts";
 import { heightOf, Lanes, laneHeight } from "#drawing/lanes.ts";
-import { Colours, fitted } from "#drawing/theme.ts";
+import { Colours, FONT, fitted } from "#drawing/theme.ts";
 import { TimeWindow } from "#drawing/time_window.ts";
 import { drag } from "#drawing/viewport.ts";
 

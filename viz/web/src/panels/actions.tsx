@@ -2,8 +2,9 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { askFirst } from "#core/commands.ts";
-import { ask, askAction, encoded, hasToken, isFailure, isFile } from "#core/connection.ts";
 import { outcomeClass } from "#core/outcomes.ts";
+import { isFile } from "#core/page_file.ts";
+import { ask, askAction, encoded, hasToken, isFailure } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { ActionServer, SentGoal, ServerGoal } from "#core/types.ts";

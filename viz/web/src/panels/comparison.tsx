@@ -1,8 +1,9 @@
 // Two machines, or two runs, in one drawing, with what was added, removed and changed.
 
 import { useState } from "preact/hooks";
-import { ask, encoded, isFailure, isFile, link } from "#core/connection.ts";
 import { CHANGE_SIGNS } from "#core/model.ts";
+import { isFile } from "#core/page_file.ts";
+import { ask, encoded, isFailure, link } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Comparison, MachinePayload } from "#core/types.ts";

@@ -1,9 +1,9 @@
 // Several live runs together: a card and a lane for each, and a common map.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { askFleet, openRun } from "#core/connection.ts";
 import { lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
 import { showPage } from "#core/pages.ts";
+import { askFleet, openRun } from "#core/run_requests.ts";
 import type { Scene } from "#core/scene.ts";
 import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";

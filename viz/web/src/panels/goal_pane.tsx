@@ -1,8 +1,8 @@
 // The form of a goal: fields or YAML, sent to the server, which also checks it.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { ask, askAction, encoded, hasToken, isFailure } from "#core/connection.ts";
 import { type FormState, problemsWithoutField, toState, toYaml } from "#core/goal_values.ts";
+import { ask, askAction, encoded, hasToken, isFailure } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import type { ActionServer, FieldProblem } from "#core/types.ts";
 import type { GoalForm as Definition, Failure } from "#core/wire.ts";

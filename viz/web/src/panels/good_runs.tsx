@@ -1,8 +1,9 @@
 // How the run that failed differs from good ones: a line for each value, with a sentence.
 
 import { useEffect, useState } from "preact/hooks";
-import { ask, isFailure, isFile, link } from "#core/connection.ts";
 import { placed } from "#core/good_runs.ts";
+import { isFile } from "#core/page_file.ts";
+import { ask, isFailure, link } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Answers, Fact, GoodRuns } from "#core/wire.ts";

@@ -1,7 +1,8 @@
 // The keyboard shortcuts: everything that the pointer can do.
 
 import { command, confirmation, control } from "#core/commands.ts";
-import { isFile, showWhy } from "#core/connection.ts";
+import { showWhy } from "#core/connection.ts";
+import { isFile } from "#core/page_file.ts";
 import type { PageName } from "#core/pages.ts";
 import { showPage } from "#core/pages.ts";
 import { CLOCKS } from "#core/store/clock.ts";

@@ -1,8 +1,9 @@
 // Everything over the diagram: why nothing is shown, banners, the legend, notices, help.
 
 import { useState } from "preact/hooks";
-import { choose, isFile, takeToken } from "#core/connection.ts";
+import { choose, takeToken } from "#core/connection.ts";
 import { CHANGE_SIGNS } from "#core/model.ts";
+import { isFile } from "#core/page_file.ts";
 import { heatScale } from "#core/statistics.ts";
 import { store } from "#core/store.ts";
 import { askerText, duration, holdText, shorten } from "#core/text.ts";

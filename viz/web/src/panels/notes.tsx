@@ -1,7 +1,8 @@
 // Notes at instants of the run, and the link that shows this view to somebody else.
 
 import { useState } from "preact/hooks";
-import { encoded, isFile, link } from "#core/connection.ts";
+import { isFile } from "#core/page_file.ts";
+import { encoded, link } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { saveFilm } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";

@@ -2,12 +2,15 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { command, control, targetText } from "#core/commands.ts";
-import { choose, hasToken, isFile, openRun, refreshRuns, showWhy } from "#core/connection.ts";
+import { choose, showWhy } from "#core/connection.ts";
 import { KIND_NAMES } from "#core/model.ts";
+import { isFile } from "#core/page_file.ts";
 import { showPage } from "#core/pages.ts";
 import { asked, type Item, ranked, SIGNS } from "#core/palette.ts";
 import { parseInstant } from "#core/playback.ts";
 import { canReproduce, reproduce } from "#core/reproduction.ts";
+import { hasToken } from "#core/requests.ts";
+import { openRun, refreshRuns } from "#core/run_requests.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import { brief } from "#core/values.ts";

@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
-import { isFile } from "#core/connection.ts";
+import { isFile } from "#core/page_file.ts";
 import { parseInstant, RATES } from "#core/playback.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";

@@ -2,9 +2,11 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { canAnswer, command, control } from "#core/commands.ts";
-import { choose, encoded, isFile, link } from "#core/connection.ts";
+import { choose } from "#core/connection.ts";
+import { isFile } from "#core/page_file.ts";
 import type { ShownQuestion } from "#core/questions.ts";
 import { answerText, buttonsOf, heldStates, isUrgent, questionsOf, titleOf } from "#core/questions.ts";
+import { encoded, link } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import { shorten, shortenLines } from "#core/text.ts";
 import type { MachineSummary } from "#core/types.ts";

@@ -1,9 +1,10 @@
 // The dialog for simulated runs: starts batches, shows their progress and reports.
 
 import { useEffect, useState } from "preact/hooks";
-import { askSimulation, encoded, hasToken, refreshSimulations } from "#core/connection.ts";
 import { outcomeClass } from "#core/outcomes.ts";
+import { encoded, hasToken } from "#core/requests.ts";
 import { beganText } from "#core/run_list.ts";
+import { askSimulation, refreshSimulations } from "#core/run_requests.ts";
 import type { Form } from "#core/simulations.ts";
 import { doneOf, startOf } from "#core/simulations.ts";
 import { store } from "#core/store.ts";

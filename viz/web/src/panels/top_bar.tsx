@@ -1,8 +1,9 @@
 // The bar above the diagram: machine, status, breadcrumb, search and view.
 
 import { useEffect, useState } from "preact/hooks";
-import { choose, isFile, showWhy } from "#core/connection.ts";
+import { choose, showWhy } from "#core/connection.ts";
 import { KIND_NAMES } from "#core/model.ts";
+import { isFile } from "#core/page_file.ts";
 import { showPage } from "#core/pages.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";

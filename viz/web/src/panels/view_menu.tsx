@@ -1,9 +1,10 @@
 // The menu of what the page shows and how: levels, numbers, colours, panels, keys, downloads.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { encoded, isFile, link } from "#core/connection.ts";
 import { ALL_LEVELS } from "#core/model.ts";
+import { isFile } from "#core/page_file.ts";
 import { canReproduce } from "#core/reproduction.ts";
+import { encoded, link } from "#core/requests.ts";
 import { MODES, OF_RECORDED_RUNS } from "#core/statistics.ts";
 import { save } from "#core/storage.ts";
 import { store } from "#core/store.ts";
