@@ -11,6 +11,7 @@ import base64
 import binascii
 import zlib
 from functools import cache
+from sys import intern
 from types import NoneType
 from typing import (
     TYPE_CHECKING,
@@ -156,7 +157,11 @@ def read_event(data: Any) -> dict[str, Any]:
     if kind not in EVENT_KINDS:
         return dict(data)
     defaults, checks = _checks(kind)
-    record = {**defaults, **data}
+    # A run has a million records with the same few names, paths and outcomes: each is kept once.
+    record = {
+        **defaults,
+        **{intern(k): intern(v) if type(v) is str else v for k, v in data.items()},
+    }
     for name, (usual, check) in checks.items():
         if name not in record:
             raise DataError.without([name])

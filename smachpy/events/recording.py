@@ -727,21 +727,23 @@ def read_recording(path: str | Path) -> Recording:
 
 def _read(path: Path, file: TextIO) -> Recording:
     recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
-    events: list[dict[str, Any]] = []
     wrong = recording.wrong
-    for number, record in _records(path, file):
-        if record is None:
-            recording.cut = True
-        elif record["kind"] in {OBSERVED, CROSSED}:
-            try:
-                _add_data(recording, record)
-            except DataError as error:
-                wrong.append(f"line {number}: {error}")
-        elif record["kind"] == TYPES:
-            recording.definitions |= _texts(record.get("definitions"))
-        elif record["kind"] != END:
-            events.append(record)
-    recording.events = list(_numbered(map(SteadyStamps().fix, events)))
+
+    def events() -> Iterator[dict[str, Any]]:
+        for number, record in _records(path, file):
+            if record is None:
+                recording.cut = True
+            elif record["kind"] in {OBSERVED, CROSSED}:
+                try:
+                    _add_data(recording, record)
+                except DataError as error:
+                    wrong.append(f"line {number}: {error}")
+            elif record["kind"] == TYPES:
+                recording.definitions |= _texts(record.get("definitions"))
+            elif record["kind"] != END:
+                yield record
+
+    recording.events = list(_numbered(map(SteadyStamps().fix, events())))
     if wrong:
         log.logwarn(
             f"recording {str(path)!r}: {len(wrong)} record(s) of topics or inputs are left out; "

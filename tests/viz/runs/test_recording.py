@@ -443,6 +443,26 @@ def test_a_large_recording_is_counted_event_by_event(record, monkeypatch, capsys
     assert "line 4" in capsys.readouterr().err
 
 
+def test_a_large_recording_is_drawn_event_by_event(record, monkeypatch, tmp_path):
+    from smachpy.command import main
+
+    path = record("run.jsonl", failing=True)
+    whole, streamed = tmp_path / "whole.txt", tmp_path / "streamed.txt"
+    assert main(["runs", "export", str(path), "-o", str(whole)]) == 0
+    monkeypatch.setattr(recording_module, "STREAMED", 10)
+    monkeypatch.setattr(recording_module, "read_recording", None)  # nothing is read whole
+    assert main(["runs", "export", str(path), "-o", str(streamed)]) == 0
+    assert streamed.read_text() == whole.read_text()
+
+
+def test_names_that_a_recording_repeats_are_kept_once(record):
+    events = read_recording(record("run.jsonl")).events
+    texts = {}
+    for event in events:
+        for text in (*event, event["kind"], event["path"], event.get("outcome")):
+            assert texts.setdefault(text, text) is text
+
+
 def test_a_list_is_a_page_of_the_newest(record, capsys):
     from smachpy.command import main
 

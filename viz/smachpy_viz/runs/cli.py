@@ -351,12 +351,14 @@ def _side(place: str) -> ComparedRun:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from smachpy.events.recording import read_recording
+    from smachpy.events.recording import each_recording
 
     if Path(args.file).is_dir():
         return _export_all(args.file, Path(args.output))
-    recording = read_recording(args.file)
     output = Path(args.output)
+    # A picture needs the events one after the other, the others all at once.
+    is_picture = output.suffix not in {".html", ".mcap"}
+    [recording] = each_recording([args.file], stream=is_picture)
     try:
         _write(recording, output, args.runs, args.map)
     except OSError as error:
