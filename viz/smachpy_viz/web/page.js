@@ -4952,12 +4952,12 @@ function cards(node, outer, aspect) {
   const outcomes = [...new Set(ways.map((way) => way.outcome))];
   let w5 = from + SIDE;
   const h5 = HEAD2 + grid2.h + (outer === "DOWN" ? 34 : 20);
-  const heightOf2 = (i4) => HEAD2 + (i4 + 0.5) * grid2.h / ways.length;
+  const heightOf = (i4) => HEAD2 + (i4 + 0.5) * grid2.h / ways.length;
   const lanes = /* @__PURE__ */ new Map();
   for (const [i4, way] of ways.entries()) {
     const known2 = lanes.get(way.outcome);
     if (known2) known2.ways.push(i4);
-    else lanes.set(way.outcome, { x: 0, y: heightOf2(i4), ways: [i4] });
+    else lanes.set(way.outcome, { x: 0, y: heightOf(i4), ways: [i4] });
   }
   let lane = from + longest2 + 24;
   for (const outcome of outcomes) {
@@ -4974,7 +4974,7 @@ function cards(node, outer, aspect) {
     const pill = outer === "DOWN" ? { x: at.x - wide / 2, y: h5 - PILL_H / 2, w: wide, h: PILL_H } : { x: outer === null ? w5 - wide - SIDE / 2 : w5 - wide / 2, y: at.y - PILL_H / 2, w: wide, h: PILL_H };
     pills.push({ ...pill, outcome });
     for (const i4 of at.ways) {
-      const y5 = heightOf2(i4);
+      const y5 = heightOf(i4);
       const corner = { x: at.x, y: y5 };
       const end = outer === "DOWN" ? { x: at.x, y: pill.y } : { x: pill.x, y: at.y };
       const points2 = outer !== "DOWN" && y5 !== at.y ? [corner, { x: at.x, y: at.y }] : outer === "DOWN" ? [corner] : [];
@@ -7009,74 +7009,6 @@ var Strip = class {
   }
 };
 
-// src/drawing/lanes.ts
-var LANE = 19;
-var ROW = 13;
-var MOST_ROWS = 8;
-var Lanes = class {
-  all = [];
-  // in the order of the tree
-  #spansOf = /* @__PURE__ */ new Map();
-  // by path of the lane
-  #model = null;
-  #spans = null;
-  #sorted = 0;
-  // number of spans that are in lanes
-  forget() {
-    this.#model = null;
-  }
-  /** Put new spans into lanes; a container gets a lane when a state in it has run. */
-  update(model, spans) {
-    if (this.#model !== model || this.#spans !== spans) {
-      this.#spansOf.clear();
-      this.#sorted = 0;
-      this.all = [];
-    }
-    this.#model = model;
-    this.#spans = spans;
-    const before = this.#spansOf.size;
-    for (; this.#sorted < spans.length; this.#sorted++) {
-      const span = spans[this.#sorted];
-      const lane = model.get(span.path)?.parent?.path;
-      if (lane === void 0) continue;
-      const known2 = this.#spansOf.get(lane);
-      if (known2) known2.push(span);
-      else this.#spansOf.set(lane, [span]);
-    }
-    if (this.#spansOf.size !== before) this.all = model.order.filter((node) => this.#spansOf.has(node.path));
-  }
-  /**
-   * The spans of a lane in a range [ms], in order of their beginnings. Ends are only roughly in that order, so a few
-   * that ended before the range are among them.
-   */
-  spansIn(lane, from, to) {
-    const spans = this.#spansOf.get(lane.path) ?? [];
-    const ended = countWhile(spans, (span) => (span.to ?? Infinity) < from);
-    const begun = countWhile(spans, (span) => span.from <= to);
-    return spans.slice(Math.max(0, ended - 16), begun);
-  }
-  /**
-   * The lanes to show: of those with one of some words in a name, all if there is room, otherwise those with spans in a
-   * range [ms].
-   * @param words separated by spaces or commas; without any, all lanes count
-   * @param room [px]
-   */
-  shown({ from, to }, words2, room) {
-    const wanted = words2.toLowerCase().split(/[\s,]+/).filter(Boolean);
-    const isWanted = (lane) => [lane, ...lane.children].some(({ path }) => isNamed(path, wanted));
-    const lanes = wanted.length ? this.all.filter(isWanted) : this.all;
-    if (heightOf(lanes) <= room) return lanes;
-    return lanes.filter((lane) => this.spansIn(lane, from, to).some((span) => (span.to ?? Infinity) >= from));
-  }
-};
-var isNamed = (path, words2) => {
-  const name = path.slice(path.lastIndexOf("/") + 1).toLowerCase();
-  return words2.some((word) => name.includes(word));
-};
-var rowsOf = (lane) => lane.kind === "concurrence" ? lane.children.length : 1;
-var laneHeight = (lane) => lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(lane.children.length, MOST_ROWS) + 3) : LANE;
-var heightOf = (lanes) => lanes.reduce((sum, lane) => sum + laneHeight(lane), 0);
-
 // src/drawing/bars.ts
 var THINNEST = 0.5;
 var FAILED = 3;
@@ -7098,21 +7030,21 @@ var Bars = class {
   /** Draw a lane's name, bars and waits. */
   lane(lane, y5, lanes, model, scale) {
     const g5 = this.context;
-    const h5 = laneHeight(lane);
+    const h5 = lanes.heightOf(lane);
     g5.fillStyle = this.colours.of("muted");
     g5.textAlign = "left";
     const indent = 10 + Math.min(lane.depth, 6) * 9;
     clipped(g5, 0, y5, scale.left - 8, h5, () => g5.fillText(lane.name, indent, y5 + h5 / 2));
-    this.#visits(lane, y5, lanes.spansIn(lane, scale.from, scale.to), model, scale);
-    this.#waits(lane, y5, model, scale);
+    this.#visits(lane, y5, lanes, model, scale);
+    this.#waits(lane, y5, lanes, model, scale);
   }
-  #visits(lane, y5, spans, model, { from, left, right, x: x3 }) {
+  #visits(lane, y5, lanes, model, { from, to, left, right, x: x3 }) {
     const g5 = this.context;
     const now = store.playback.nowMs();
-    const isOneRow = rowsOf(lane) === 1;
+    const isOneRow = lanes.rowsOf(lane) === 1;
     let lastPx = -10;
     const failures = [];
-    for (const span of spans) {
+    for (const span of lanes.spansIn(lane, from, to)) {
       const later = span.from > now;
       const ended = span.to !== null && (later || span.to <= now);
       const until = span.to ?? Math.max(now, store.data.run.last() ?? now);
@@ -7124,7 +7056,7 @@ var Bars = class {
       if (isOneRow && end - lastPx < THINNEST && ended && !isFailure2) continue;
       lastPx = Math.max(lastPx, end);
       const wide = Math.max(isFailure2 ? FAILED : 2, end - begin);
-      const hit = { left: begin, right: begin + wide, ...rowOf(lane, node, y5), span };
+      const hit = { left: begin, right: begin + wide, ...rowOf(lanes, lane, node, span.from, y5), span };
       const paint2 = () => {
         g5.globalAlpha = later ? 0.35 : 1;
         this.#visit(hit, node, ended, x3, later ? Infinity : now);
@@ -7176,7 +7108,7 @@ var Bars = class {
     this.#text(words2, `${kind}-text`, bar);
   }
   /** Draw the times in which the lane's states were paused before they began, or asked. */
-  #waits(lane, y5, model, { from, to, left, right, x: x3 }) {
+  #waits(lane, y5, lanes, model, { from, to, left, right, x: x3 }) {
     const now = store.playback.nowMs();
     for (const wait of store.data.run.waits) {
       const until = Math.min(wait.to ?? now, now);
@@ -7185,7 +7117,7 @@ var Bars = class {
       if (!node || node.parent?.path !== lane.path) continue;
       const begin = Math.max(left, x3(wait.from));
       const end = Math.max(Math.min(right + 2, x3(until)), begin + 2);
-      const bar = { left: begin, right: end, ...rowOf(lane, node, y5) };
+      const bar = { left: begin, right: end, ...rowOf(lanes, lane, node, wait.from, y5) };
       const asks2 = wait.kind === "asks";
       this.#wait(bar, asks2);
       const words2 = asks2 ? `${node.name} ?` : wait.text;
@@ -7281,10 +7213,10 @@ var Bars = class {
     return width;
   }
 };
-function rowOf(lane, node, y5) {
-  const rows = rowsOf(lane);
-  const pitch = (laneHeight(lane) - 3) / rows;
-  const top = y5 + 1.5 + (rows > 1 ? lane.children.indexOf(node) : 0) * pitch;
+function rowOf(lanes, lane, node, t4, y5) {
+  const rows = lanes.rowsOf(lane);
+  const pitch = (lanes.heightOf(lane) - 3) / rows;
+  const top = y5 + 1.5 + (rows > 1 ? lanes.rowAt(lane, node, t4) : 0) * pitch;
   return { top, bottom: top + Math.max(1, pitch - (rows > 1 ? Math.min(1.5, pitch / 4) : 0)) };
 }
 function clipped(g5, x3, y5, w5, h5, paint2) {
@@ -7295,6 +7227,109 @@ function clipped(g5, x3, y5, w5, h5, paint2) {
   paint2();
   g5.restore();
 }
+
+// src/drawing/lanes.ts
+var LANE = 19;
+var ROW = 13;
+var MOST_ROWS = 8;
+var Lanes = class {
+  all = [];
+  // in the order of the tree
+  #spansOf = /* @__PURE__ */ new Map();
+  // by path of the lane
+  #model = null;
+  #spans = null;
+  #sorted = 0;
+  // number of spans that are in lanes
+  #planRows = /* @__PURE__ */ new Map();
+  // the newest span of each row, by path of a plan
+  #rowOf = /* @__PURE__ */ new Map();
+  // of the actions of plans
+  forget() {
+    this.#model = null;
+  }
+  /** Put new spans into lanes; a container gets a lane when a state in it has run. */
+  update(model, spans) {
+    if (this.#model !== model || this.#spans !== spans) {
+      this.#spansOf.clear();
+      this.#planRows.clear();
+      this.#rowOf.clear();
+      this.#sorted = 0;
+      this.all = [];
+    }
+    this.#model = model;
+    this.#spans = spans;
+    const before = this.#spansOf.size;
+    for (; this.#sorted < spans.length; this.#sorted++) {
+      const span = spans[this.#sorted];
+      const container = model.get(span.path)?.parent;
+      if (!container) continue;
+      const lane = container.path;
+      if (container.kind === "plan") this.#placeInPlan(lane, span);
+      const known2 = this.#spansOf.get(lane);
+      if (known2) known2.push(span);
+      else this.#spansOf.set(lane, [span]);
+    }
+    if (this.#spansOf.size !== before) this.all = model.order.filter((node) => this.#spansOf.has(node.path));
+  }
+  /** Actions of a plan that run at the same time get rows of their own. */
+  #placeInPlan(lane, span) {
+    const rows = this.#planRows.get(lane) ?? [];
+    this.#planRows.set(lane, rows);
+    const free = rows.findIndex((last) => last.to !== null && last.to <= span.from);
+    const row = free < 0 ? rows.length : free;
+    rows[row] = span;
+    this.#rowOf.set(span, row);
+  }
+  /** The number of a lane's rows. */
+  rowsOf(lane) {
+    if (lane.kind === "concurrence") return lane.children.length;
+    return this.#planRows.get(lane.path)?.length ?? 1;
+  }
+  /** The row of a state in its lane, at an instant [ms]. */
+  rowAt(lane, node, t4) {
+    if (lane.kind === "concurrence") return lane.children.indexOf(node);
+    if (!this.#planRows.has(lane.path)) return 0;
+    const span = this.#spansOf.get(lane.path)?.findLast((one) => one.path === node.path && one.from <= t4);
+    return (span && this.#rowOf.get(span)) ?? 0;
+  }
+  /** [px] */
+  heightOf(lane) {
+    const rows = this.rowsOf(lane);
+    return rows > 1 || lane.kind === "concurrence" ? Math.max(LANE, ROW * Math.min(rows, MOST_ROWS) + 3) : LANE;
+  }
+  /** Of several lanes [px]. */
+  totalOf(lanes) {
+    return lanes.reduce((sum, lane) => sum + this.heightOf(lane), 0);
+  }
+  /**
+   * The spans of a lane in a range [ms], in order of their beginnings. Ends are only roughly in that order, so a few
+   * that ended before the range are among them.
+   */
+  spansIn(lane, from, to) {
+    const spans = this.#spansOf.get(lane.path) ?? [];
+    const ended = countWhile(spans, (span) => (span.to ?? Infinity) < from);
+    const begun = countWhile(spans, (span) => span.from <= to);
+    return spans.slice(Math.max(0, ended - 16), begun);
+  }
+  /**
+   * The lanes to show: of those with one of some words in a name, all if there is room, otherwise those with spans in a
+   * range [ms].
+   * @param words separated by spaces or commas; without any, all lanes count
+   * @param room [px]
+   */
+  shown({ from, to }, words2, room) {
+    const wanted = words2.toLowerCase().split(/[\s,]+/).filter(Boolean);
+    const isWanted = (lane) => [lane, ...lane.children].some(({ path }) => isNamed(path, wanted));
+    const lanes = wanted.length ? this.all.filter(isWanted) : this.all;
+    if (this.totalOf(lanes) <= room) return lanes;
+    return lanes.filter((lane) => this.spansIn(lane, from, to).some((span) => (span.to ?? Infinity) >= from));
+  }
+};
+var isNamed = (path, words2) => {
+  const name = path.slice(path.lastIndexOf("/") + 1).toLowerCase();
+  return words2.some((word) => name.includes(word));
+};
 
 // src/drawing/time_window.ts
 var LIVE_MS = 3e4;
@@ -7461,12 +7496,12 @@ var Timeline = class {
     this.lanes.update(model, store.data.run.spans);
     this.#fitHeight();
     const lanes = this.lanes.shown(scale, store.view.laneFilter.value, room);
-    this.top = Math.max(0, Math.min(this.top, heightOf(lanes) - room));
+    this.top = Math.max(0, Math.min(this.top, this.lanes.totalOf(lanes) - room));
     let y5 = TOP - this.top;
     this.bars.forget();
     clipped(g5, 0, 0, width, room, () => {
       for (const lane of lanes) {
-        const tall = laneHeight(lane);
+        const tall = this.lanes.heightOf(lane);
         if (y5 + tall > 0 && y5 < room) this.bars.lane(lane, y5, this.lanes, model, scale);
         y5 += tall;
       }
@@ -7479,7 +7514,7 @@ var Timeline = class {
   }
   /** Tell the page the height of all lanes and the axis: more is left to the plots. */
   #fitHeight() {
-    const tallest = TOP + heightOf(this.lanes.all) + FOOT;
+    const tallest = TOP + this.lanes.totalOf(this.lanes.all) + FOOT;
     if (tallest === this.tallest) return;
     this.tallest = tallest;
     document.documentElement.style.setProperty("--lanes", `${tallest}px`);

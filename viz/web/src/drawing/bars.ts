@@ -7,7 +7,7 @@ import { COLOURS } from "#core/scene.ts";
 import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 import type { Span, StateNode } from "#core/types.ts";
-import { type Lanes, laneHeight, rowsOf } from "#drawing/lanes.ts";
+import type { Lanes } from "#drawing/lanes.ts";
 import { type Colours, FONT } from "#drawing/theme.ts";
 
 // Sizes in CSS pixels
@@ -39,22 +39,22 @@ export class Bars {
   /** Draw a lane's name, bars and waits. */
   lane(lane: StateNode, y: number, lanes: Lanes, model: Model, scale: Scale) {
     const g = this.context;
-    const h = laneHeight(lane);
+    const h = lanes.heightOf(lane);
     g.fillStyle = this.colours.of("muted");
     g.textAlign = "left";
     const indent = 10 + Math.min(lane.depth, 6) * 9;
     clipped(g, 0, y, scale.left - 8, h, () => g.fillText(lane.name, indent, y + h / 2));
-    this.#visits(lane, y, lanes.spansIn(lane, scale.from, scale.to), model, scale);
-    this.#waits(lane, y, model, scale);
+    this.#visits(lane, y, lanes, model, scale);
+    this.#waits(lane, y, lanes, model, scale);
   }
 
-  #visits(lane: StateNode, y: number, spans: Span[], model: Model, { from, left, right, x }: Scale) {
+  #visits(lane: StateNode, y: number, lanes: Lanes, model: Model, { from, to, left, right, x }: Scale) {
     const g = this.context;
     const now = store.playback.nowMs();
-    const isOneRow = rowsOf(lane) === 1;
+    const isOneRow = lanes.rowsOf(lane) === 1;
     let lastPx = -10;
     const failures: (() => void)[] = []; // drawn last, over all others
-    for (const span of spans) {
+    for (const span of lanes.spansIn(lane, from, to)) {
       const later = span.from > now; // after the instant shown
       const ended = span.to !== null && (later || span.to <= now);
       const until = span.to ?? Math.max(now, store.data.run.last() ?? now);
@@ -66,7 +66,7 @@ export class Bars {
       if (isOneRow && end - lastPx < THINNEST && ended && !isFailure) continue; // too thin to see
       lastPx = Math.max(lastPx, end);
       const wide = Math.max(isFailure ? FAILED : 2, end - begin);
-      const hit = { left: begin, right: begin + wide, ...rowOf(lane, node, y), span };
+      const hit = { left: begin, right: begin + wide, ...rowOf(lanes, lane, node, span.from, y), span };
       const paint = () => {
         g.globalAlpha = later ? 0.35 : 1;
         this.#visit(hit, node, ended, x, later ? Infinity : now);
@@ -121,7 +121,7 @@ export class Bars {
   }
 
   /** Draw the times in which the lane's states were paused before they began, or asked. */
-  #waits(lane: StateNode, y: number, model: Model, { from, to, left, right, x }: Scale) {
+  #waits(lane: StateNode, y: number, lanes: Lanes, model: Model, { from, to, left, right, x }: Scale) {
     const now = store.playback.nowMs();
     for (const wait of store.data.run.waits) {
       const until = Math.min(wait.to ?? now, now);
@@ -130,7 +130,7 @@ export class Bars {
       if (!node || node.parent?.path !== lane.path) continue;
       const begin = Math.max(left, x(wait.from));
       const end = Math.max(Math.min(right + 2, x(until)), begin + 2);
-      const bar = { left: begin, right: end, ...rowOf(lane, node, y) };
+      const bar = { left: begin, right: end, ...rowOf(lanes, lane, node, wait.from, y) };
       const asks = wait.kind === "asks";
       this.#wait(bar, asks);
       const words = asks ? `${node.name} ?` : wait.text;
@@ -233,11 +233,11 @@ export class Bars {
   }
 }
 
-/** The top and bottom of a state's row in its lane, which begins at y. */
-function rowOf(lane: StateNode, node: StateNode, y: number) {
-  const rows = rowsOf(lane);
-  const pitch = (laneHeight(lane) - 3) / rows;
-  const top = y + 1.5 + (rows > 1 ? lane.children.indexOf(node) : 0) * pitch;
+/** The top and bottom of a state's row in its lane, which begins at y, at an instant t [ms]. */
+function rowOf(lanes: Lanes, lane: StateNode, node: StateNode, t: number, y: number) {
+  const rows = lanes.rowsOf(lane);
+  const pitch = (lanes.heightOf(lane) - 3) / rows;
+  const top = y + 1.5 + (rows > 1 ? lanes.rowAt(lane, node, t) : 0) * pitch;
   // Of very many branches each bar is a line, and the lines overlap.
   return { top, bottom: top + Math.max(1, pitch - (rows > 1 ? Math.min(1.5, pitch / 4) : 0)) };
 }

@@ -8,7 +8,7 @@ import { store } from "#core/store.ts";
 import { askerText, duration } from "#core/text.ts";
 import type { Span } from "#core/types.ts";
 import { Bars, clipped, type Scale } from "#drawing/bars.ts";
-import { heightOf, Lanes, laneHeight } from "#drawing/lanes.ts";
+import { Lanes } from "#drawing/lanes.ts";
 import { Colours, FONT, fitted } from "#drawing/theme.ts";
 import { TimeWindow } from "#drawing/time_window.ts";
 import { drag } from "#drawing/viewport.ts";
@@ -117,12 +117,12 @@ export class Timeline {
     this.lanes.update(model, store.data.run.spans);
     this.#fitHeight();
     const lanes = this.lanes.shown(scale, store.view.laneFilter.value, room);
-    this.top = Math.max(0, Math.min(this.top, heightOf(lanes) - room));
+    this.top = Math.max(0, Math.min(this.top, this.lanes.totalOf(lanes) - room));
     let y = TOP - this.top;
     this.bars.forget();
     clipped(g, 0, 0, width, room, () => {
       for (const lane of lanes) {
-        const tall = laneHeight(lane);
+        const tall = this.lanes.heightOf(lane);
         if (y + tall > 0 && y < room) this.bars.lane(lane, y, this.lanes, model, scale);
         y += tall;
       }
@@ -136,7 +136,7 @@ export class Timeline {
 
   /** Tell the page the height of all lanes and the axis: more is left to the plots. */
   #fitHeight() {
-    const tallest = TOP + heightOf(this.lanes.all) + FOOT;
+    const tallest = TOP + this.lanes.totalOf(this.lanes.all) + FOOT;
     if (tallest === this.tallest) return;
     this.tallest = tallest;
     document.documentElement.style.setProperty("--lanes", `${tallest}px`);
