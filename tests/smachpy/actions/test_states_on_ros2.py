@@ -122,3 +122,72 @@ def test_mission_of_every_talking_state_runs_with_a_robot_behind_a_router(tmp_pa
     finally:
         robot.communicate("", timeout=WAIT_S)
         router.close()
+
+
+READY_MADE_ROBOT = """
+import sys
+from actionlib_core import Publisher, Service, Subscriber, init
+from actionlib_core.interfaces.nav2_msgs.srv import ClearEntireCostmap
+from actionlib_core.interfaces.ros2.std_msgs.msg import String
+from actionlib_core.interfaces.ros2.tf2_msgs.msg import TFMessage
+
+init("robot")
+cleared = [
+    Service(
+        f"{which}_costmap/clear_entirely_{which}_costmap",
+        ClearEntireCostmap,
+        lambda request: ClearEntireCostmap.Response(),
+    )
+    for which in ("global", "local")
+]
+echo = Publisher("echo", String, latch=True)
+word = Subscriber("word", String, echo.publish)
+frames = Publisher("/tf_static", TFMessage, latch=True)
+frame = {"header": {"frame_id": "map"}, "child_frame_id": "base"}
+frame["transform"] = {"translation": {"x": 2.0}, "rotation": {"w": 1.0}}
+frames.publish(TFMessage.from_dict({"transforms": [frame]}))
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+READY_MADE_MISSION = """
+import smachpy
+from actionlib_core import init
+from actionlib_core.interfaces.ros2.std_msgs.msg import String
+from smachpy.states import *
+
+init("mission")
+sm = smachpy.StateMachine(["succeeded", "aborted", "preempted", "timeout"])
+same = SetParameters("robot", {"use_sim_time": False}, timeout=30.0)
+sm.add("SET", same, {"succeeded": "SAY"})
+sm.add("SAY", Publish("word", String, {"data": "hello"}, timeout=30.0), {"succeeded": "HEAR"})
+sm.add("HEAR", AwaitMessage("echo", String, key="said", timeout=30.0), {"came": "LOOK"})
+sm.add("LOOK", LookUpTransform("at", "base", timeout=30.0), {"succeeded": "CLEAR"})
+sm.add("CLEAR", clear_costmaps(timeout=30.0))
+sm.add_cleanup("RESTORE", RestoreParameters(timeout=30.0))
+outcome = sm.execute()
+said, at = sm.userdata.said.data, sm.userdata.at.pose.position.x
+print(outcome, said, at, sm.userdata.parameters_before)
+"""
+
+
+@pytest.mark.slow
+def test_mission_of_ready_made_states_runs_with_a_robot_behind_a_router(tmp_path):
+    from actionlib_core.config import Config
+    from actionlib_core.transport.zenoh import ZenohTransport
+
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = tmp_path / "ros2.yaml"
+    config.write_text(
+        f"discovery: 'off'\nros2: {{router: {endpoint}, domain: 42, names: ['**']}}\n"
+    )
+    router = ZenohTransport(Config(mode="router", listen=(endpoint,), discovery="off"))
+    robot = start(READY_MADE_ROBOT, config)
+    try:
+        assert robot.stdout.readline() == "ready\n"
+        with start(READY_MADE_MISSION, config) as mission:
+            out, errors = mission.communicate(timeout=WAIT_S)
+        assert out.splitlines()[-1:] == ["succeeded hello 2.0 {}"], errors
+    finally:
+        robot.communicate("", timeout=WAIT_S)
+        router.close()
