@@ -125,6 +125,7 @@ class _Data(TypedDict):
     last_ns: Stamp
     outages: list[tuple[Stamp, Stamp]]
     ends: NotRequired[list[tuple[str, Stamp, Stamp, str]]]
+    emergency: NotRequired[bool]
     finished: bool
     outcome: str | None
 
@@ -162,6 +163,7 @@ class Position:
             outages: pairs [from, to] of stamps
             ends: path, begin and end [ns] and outcome of the newest visits of the root's children
                 that have ended
+            emergency: an emergency stop holds the machine
             finished, outcome: of the run
             structure: the machine that the paths belong to, if the mission began with another
     """
@@ -483,6 +485,12 @@ class Position:
         for known in self.conditions.values():
             known["events"] = [[name, at + entry["shift_ns"]] for name, at in known["events"]]
 
+    def _on_stopped(self, _entry: Mapping[str, Any]) -> None:
+        self.data["emergency"] = True
+
+    def _on_released(self, _entry: Mapping[str, Any]) -> None:
+        self.data.pop("emergency", None)
+
     def _on_finished(self, entry: Mapping[str, Any]) -> None:
         self.visits.clear()
         self.markings.clear()
@@ -504,6 +512,8 @@ class Position:
         "Recalled": _on_recalled,
         "Halted": _on_halted,
         "WentOn": _on_went_on,
+        "Stopped": _on_stopped,
+        "Released": _on_released,
         "Recovered": _on_recovered,
         "Finished": _on_finished,
     }

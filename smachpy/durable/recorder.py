@@ -314,6 +314,8 @@ class Recorder(RunJournal):
         run.watched = run.careful = True
         if self._is_resumed:
             self._write("Recovered", self._root, shift_ns=self._shift_ns, gone_ns=self._gone_ns)
+            if self._journal.position.data.get("emergency"):
+                control_of(self._machine).emergency_stop()
             # A copy: the position changes with each entry from here on.
             self._unresumed = copy.deepcopy(self._journal.position.visits)
             for path, visit in self._unresumed.items():
@@ -399,6 +401,7 @@ class Recorder(RunJournal):
                 # The end of this child may stop its siblings. They must have been entered again
                 # before, to cancel their goals.
                 self._all_back.wait(RESUME_S)
+        outcome = self._held_outcome(step, visit, outcome)
         # An outcome without a transition was accepted because the child had been asked to stop:
         # ask again, so that it is accepted now, too.
         if outcome is not None and outcome not in step.next:
@@ -406,6 +409,18 @@ class Recorder(RunJournal):
                 ask(frame, step)
             frame.run.flush()
         return outcome
+
+    def _held_outcome(
+        self, step: Step, visit: dict[str, Any] | None, outcome: str | None
+    ) -> str | None:
+        """Return 'preempted' for a state of before the resume if an emergency stop holds it.
+
+        One with a goal is executed: it is to cancel that, and was told so before it begins.
+        """
+        if visit is None or isinstance(step.state, Container) or visit["goal"] is not None:
+            return outcome
+        stopped = control_of(self._machine).emergency() is not None
+        return "preempted" if stopped and outcome is None else outcome
 
     def _write_entered(self, frame: Frame, path: str) -> bool:
         """Write that the state at `path` begins; return whether that worked."""
@@ -431,6 +446,9 @@ class Recorder(RunJournal):
     def _note_all_back(self) -> None:
         """Continue what waited until all states that were active have been entered again."""
         self._ask_again()
+        control = control_of(self._machine)
+        if control.emergency() is not None:
+            control.emergency_stop()  # for those that are back: a goal of one may be running
         self._all_back.set()
 
     def _ask_again(self) -> None:
@@ -572,6 +590,13 @@ class Recorder(RunJournal):
     def resumed_label(self, frame: Frame) -> str | None:
         children = self._children(frame.path) if self._unresumed else []
         return children[0][len(frame.path) + 1 :] if children else None
+
+    def wanted_label(self, frame: Frame) -> str | None:
+        for child in self._children(frame.path) if self._unresumed else ():
+            override = (self._unresumed[child].get("asked") or {}).get("override")
+            if override is not None and not Override(*override).if_stopped:
+                return Override(*override).label
+        return None
 
     def ending(self, frame: Frame) -> Sequence[Any] | None:
         for child in self._children(frame.path) if self._unresumed else ():
@@ -749,6 +774,17 @@ class Recorder(RunJournal):
             origins = sorted(self._heard.pop(path, ()))
             self._recalled.setdefault(path, set()).update(origins)
             self._write("Recalled", path, origins=origins)
+
+    def stopped(self) -> None:
+        if not self._journal.position.data.get("emergency"):
+            self._write("Stopped", self._root)
+
+    def released(self) -> None:
+        if self._journal.position.data.get("emergency") and not self._is_suspended:
+            self._write("Released", self._root)
+
+    def must_return(self, path: str) -> bool:
+        return path in self._unresumed
 
     def halted(self, path: str) -> None:
         if path in self._journal.position.visits:

@@ -112,10 +112,15 @@ class Control:
             self._cancel("pause")
 
     def emergency_stop(self) -> None:
-        """Stop the machine as `pause(running="cancel")` does, until that pause ends."""
+        """Stop the machine as `pause(running="cancel")` does, until that pause ends.
+
+        All running states are told before anything is written, as a journal may be slow.
+        """
         self._watch()
         self._pause(object())
-        self._cancel("emergency stop")
+        self._cancel("emergency stop", written=False)
+        if self._run is not None:
+            self._run.journal.stopped()
 
     def emergency(self) -> object | None:
         """Return the emergency stop that holds the machine, another object for each; or None."""
@@ -124,12 +129,18 @@ class Control:
     def end_emergency(self, stop: object) -> None:
         """End the pause, unless there was another emergency stop after `stop`."""
         if self._end_pause(stop):
+            self._note_release()
             self._call_listeners()
 
     def resume(self) -> None:
         """Continue after a pause."""
         if self._end_pause():
+            self._note_release()
             self._call_listeners()
+
+    def _note_release(self) -> None:
+        if self._run is not None:
+            self._run.journal.released()
 
     def step(self) -> None:
         """Run one state, then pause again."""
@@ -246,6 +257,7 @@ class Control:
     def stop(self, run: Run) -> None:
         """End the pause, as the root is asked to stop; with the run's lock held."""
         if self._end_pause():
+            run.pending.append(run.journal.released)
             run.pending.append(self._call_listeners)
 
     def pass_gate(self, frame: Frame, step: Step) -> None:
@@ -254,6 +266,8 @@ class Control:
         Blocks: until a command lets the step run, or a preempt arrives.
         """
         path = f"{frame.path}/{step.label}"
+        if self._stop is not None and frame.run.journal.must_return(path):
+            return  # it has a goal, perhaps, which it is to cancel
         # A breakpoint pauses the whole machine, not only this branch.
         if (path, None) in self._breakpoints:
             self._pause()
@@ -299,12 +313,13 @@ class Control:
         if changed:
             self._call_listeners()
 
-    def _cancel(self, why: str) -> None:
+    def _cancel(self, why: str, *, written: bool = True) -> None:
         with asking("operator", "", why):
             for frame, step in self._active():
                 if not step.state._smachpy_is_container:
                     # Also in the journal: a resumed run asks it again, which runs it again.
-                    self._ask(frame, step, Override(label=step.label, if_stopped=True))
+                    again = Override(label=step.label, if_stopped=True)
+                    (self._ask if written else ask_child)(frame, step, again)
 
     def _end_pause(self, stop: object | None = None) -> bool:
         """Let all waiting states go on, if `stop` is None or holds them; return whether any did."""

@@ -96,7 +96,17 @@ class RunJournal:
         A resumed run asks it again.
         """
 
+    def stopped(self) -> None:
+        """Write that an emergency stop holds the machine: a resumed run is stopped, too."""
+
+    def released(self) -> None:
+        """Write that no emergency stop holds the machine any more."""
+
     # -- the position before the resume --------------------------------------------------------
+
+    def must_return(self, path: str) -> bool:  # noqa: ARG002
+        """Return whether the state at `path` was active before the resume, and is not back yet."""
+        return False
 
     def has_begun(self, path: str) -> bool:  # noqa: ARG002
         """Return whether children of the container at `path` had begun before the resume."""
@@ -104,6 +114,9 @@ class RunJournal:
 
     def resumed_label(self, frame: Frame) -> str | None:
         """Return the child in which the state machine of `frame` resumes; None if it starts."""
+
+    def wanted_label(self, frame: Frame) -> str | None:
+        """Return the child to which a request leads that was made before the resume, or None."""
 
     def ending(self, frame: Frame) -> Sequence[Any] | None:
         """Return the fields of the `Ending` for which the clean-up of `frame` began, or None."""

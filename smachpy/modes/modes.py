@@ -168,40 +168,47 @@ class Modes(StateMachine):
             return False
         values = data_of(self.userdata)
         with asking("program", by or f"event {event}"):
-            with frame.run.lock:
-                stop = self.control.emergency()
-                here = self.__emergency if stop else self.__mode
-                target = self.__table.next(here, event, values) if here else None
-                if target is None or self.__frame is not frame:
-                    return False
-                step = self.__leave_for(frame, target)
-            self.__note(frame, step, target)
+            written: tuple[Step | None, str] | None = None
+            while True:
+                with frame.run.lock:
+                    stop = self.control.emergency()
+                    here = self.__emergency if stop else self.__mode
+                    target = self.__table.next(here, event, values) if here else None
+                    if target is None or self.__frame is not frame:
+                        return False
+                    step: Step | None = frame.step
+                    if written == (step, target):
+                        self.__leave_for(frame, step, target)
+                        break
+                # Written before it has an effect, and outside of the lock: then all is looked at
+                # again. A process that is killed between the two does this when it goes on.
+                self.__write(frame, step, target)
+                written = (step, target)
+            frame.run.flush_soon()
             if stop:
                 self.control.end_emergency(stop)
         return True
 
-    def __leave_for(self, frame: Frame, target: str) -> Step | None:
-        """Ask the present mode to stop, and begin `target` then; with the run's lock held.
-
-        Returns:
-            The step that was asked; None if none runs, and `target` is the next one.
-        """
-        step: Step | None = frame.step
-        self.__mode = self.__wanted = target
-        if step is None:
-            return None
-        running = getattr(step.state._smachpy, "live", None)
-        if running is not None and running.frame is not None and running.frame.tidying is not None:
-            return None  # it has ended, and cleans up: `target` follows
-        if self.__table.modes[step.label].resume and target != step.label:
-            remember(step.state)
-        return step if ask_child(frame, step, Override(label=target)) else None
-
-    def __note(self, frame: Frame, step: Step | None, target: str) -> None:
-        """Write the event to the journal, outside of the lock, and publish what was queued."""
+    @staticmethod
+    def __write(frame: Frame, step: Step | None, target: str) -> None:
+        """Write to the journal that `target` follows."""
         if step is not None:
             frame.run.journal.asked_one(frame, step, Override(label=target))
-        frame.run.flush_soon()
+
+    def __leave_for(self, frame: Frame, step: Step | None, target: str) -> None:
+        """Ask the present mode to stop, and begin `target` then; with the run's lock held."""
+        self.__mode = self.__wanted = target
+        if step is None:
+            return
+        running = getattr(step.state._smachpy, "live", None)
+        if running is not None and running.frame is not None and running.frame.tidying is not None:
+            # It has ended, and cleans up: `target` follows, whatever its outcome leads to.
+            if frame.visit is not None:
+                frame.visit.override = Override(label=target)
+            return
+        if self.__table.modes[step.label].resume and target != step.label:
+            remember(step.state)
+        ask_child(frame, step, Override(label=target))
 
     def emergency_stop(self, why: str = "") -> None:
         """Stop everything at once: states are preempted, goals are cancelled, and nothing starts.
@@ -234,9 +241,10 @@ class Modes(StateMachine):
             return False
         if frame is not None and target is not None:
             with asking("operator", by, "release"):
+                self.__write(frame, frame.step, target)
                 with frame.run.lock:
-                    step = self.__leave_for(frame, target)
-                self.__note(frame, step, target)
+                    self.__leave_for(frame, frame.step, target)
+                frame.run.flush_soon()
         self.control.end_emergency(stop)
         return True
 
@@ -272,6 +280,7 @@ class Modes(StateMachine):
             journal.resumed_label(frame) or data.next_initial or data.initial or "",
             None,
         )
+        wanted = journal.wanted_label(frame) or ""  # what an event had led to before a resume
         frame.run.watched = frame.run.careful = True
         for state in data.children.values():
             forget(state)  # the last run ended in another mode
@@ -285,8 +294,8 @@ class Modes(StateMachine):
             while True:
                 # From here to the end of the visit an event asks this mode; before, it is `wanted`.
                 with frame.run.lock:
-                    label, self.__wanted = self.__wanted or label, ""
-                    self.__mode = label
+                    label, self.__wanted, wanted = self.__wanted or label, wanted, ""
+                    self.__mode = self.__wanted or label
                     step = plan.steps[label]
                     if frame.visit is not None and frame.visit.step is not step:
                         frame.visit = None  # of a jump to the same mode, before another event
@@ -294,13 +303,14 @@ class Modes(StateMachine):
                 why, target, _ = run_child(frame, step)
                 if why is Why.STOPPED and self._preempt_requested:
                     return frame.end_preempted(label)
-                if why is Why.STOPPED:  # an operator has ended the mission alone
-                    label = data.initial or label
-                elif why is Why.JUMPED:
+                if why is Why.JUMPED:
                     frame.emit_own(Jumped, target)
                     label = target
-                elif target.final:
-                    return str(target.outcome)
+                elif why is Why.STOPPED or target.final:
+                    # An operator has ended the mission alone, or it says 'preempted' by itself.
+                    if self._preempt_requested:
+                        return str(target.outcome)
+                    label = data.initial or label
                 else:
                     label = target.label
                 self.call_transition_cbs()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,6 +15,7 @@ from actionlib_core.interfaces.actionlib.msg import TestAction as Action
 from actionlib_core.interfaces.actionlib.msg import TestFeedback as Feedback
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node
 from smachpy import CBState, Concurrence, SimpleActionState, StateMachine, events
 from smachpy.durable.journal import read_position
@@ -348,3 +350,25 @@ def test_a_kill_at_each_write_executes_each_goal_once(world: World) -> None:
                 run(kill_at, written=written)
             assert run(0, written=False) == "succeeded"
             assert len(world.ids) == 1, (kill_at, written)
+
+
+def test_a_mission_that_is_stopped_cancels_its_goal_when_it_is_back_and_sends_no_other(world):
+    """The emergency stop was lost with the process: the robot drove again."""
+    world.serve()
+    world.kill()
+    stamp_ns = json.loads(world.store.entries["m"][-1])["stamp_ns"]
+    stopped = {"kind": "Stopped", "path": "/M", "stamp_ns": stamp_ns}
+    world.store.entries["m"].append(json.dumps(stopped).encode())
+    machine, seen = world.machine(), []
+
+    def look() -> None:
+        seen.append((machine.control.is_paused(), len(world.handles)))
+        seen.append(world.handles[0].get_goal_status().status)
+
+    world.clock.call_later(20.0, look)
+    world.clock.call_later(30.0, machine.control.resume)
+    world.end_soon(40.0)
+    assert world.run(machine) == "succeeded"
+    assert seen == [(True, 1), GoalStatus.PREEMPTED]
+    assert len(world.handles) == 2
+    assert "emergency" not in read_position(world.store, "m").data
