@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
-from smachpy.base.problems import Problems, name_of
+from smachpy.base.problems import Problems, name_of, no_coroutine
 from smachpy.machines.state import State
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class ConditionState(State):
                 return "preempted"
             if checks and until is not None and clock.now() >= until:
                 return "false"
-            if self.__cond_cb(ud):
+            if no_coroutine(self.__cond_cb(ud)):
                 return "true"
             checks += 1
             if self.__max_checks != -1 and checks >= self.__max_checks:

@@ -9,7 +9,7 @@ from actionlib_core.pubsub.topic import NotingSubscriber
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.base import log
-from smachpy.base.problems import Problems, name_of
+from smachpy.base.problems import Problems, name_of, no_coroutine
 from smachpy.engine.frame import current_scope
 from smachpy.events import CallbackFailed
 from smachpy.exceptions import error_text
@@ -128,7 +128,7 @@ class MonitorState(State):
 
     def __check(self, ud: Any, message: Any) -> bool:
         try:
-            return bool(self.__cond_cb(ud, message))
+            return bool(no_coroutine(self.__cond_cb(ud, message)))
         except Exception as error:  # noqa: BLE001  as in SMACH: a check that raises has failed
             text = error_text(error)
             scope = current_scope()

@@ -196,6 +196,18 @@ class Problems:
         return given
 
 
+def no_coroutine(answer: Any) -> Any:
+    """Return what a function of the user has answered.
+
+    Raises:
+        TypeError: it is a coroutine, which nothing would await, and which counts as true.
+    """
+    if inspect.iscoroutine(answer):
+        answer.close()
+        raise TypeError("got a coroutine; expected an answer. Try a function that is not async.")
+    return answer
+
+
 def _is(function: Any, *tests: Callable[[Any], bool]) -> bool:
     """Return whether a test holds for `function`, or for the method of an object that is called."""
     method = getattr(type(function), "__call__", None)  # noqa: B004  the function itself is needed

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.base import log
-from smachpy.base.problems import Problems, name_of, plain, unknown_name
+from smachpy.base.problems import Problems, name_of, no_coroutine, plain, unknown_name
 from smachpy.base.slips import accepts
 from smachpy.engine.callback import call_bounded
 from smachpy.engine.described import ContainerData
@@ -353,6 +353,7 @@ class Concurrence(Container):
             answer = call_bounded(
                 self, group.frame, self._smachpy.child_termination_cb, (_outcomes(group),)
             )
+            no_coroutine(answer)
         except Exception as error:
             raise raised(group.frame.path, "child_termination_cb", error) from error
         with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):

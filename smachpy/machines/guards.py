@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from smachpy.base.problems import Problems, name_of, plain
+from smachpy.base.problems import Problems, name_of, no_coroutine, plain
 from smachpy.engine.errors import raised
 from smachpy.exceptions import InvalidUserCodeError, error_text
 from smachpy.userdata.user_data import data_of
@@ -50,7 +50,7 @@ class When:
         if self._expression is not None:
             return bool(self._expression(data_of(userdata)))
         assert not isinstance(self.condition, str)
-        return bool(self.condition(userdata))
+        return bool(no_coroutine(self.condition(userdata)))
 
 
 Target: TypeAlias = "str | Sequence[When | str | None] | None"

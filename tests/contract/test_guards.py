@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
+import math
 from typing import Any
 
 import pytest
@@ -45,6 +47,21 @@ def test_the_first_case_that_holds_counts(value, outcome):
     assert machine_of([LOW, HIGH, "NEXT"], value).execute() == outcome
 
 
+@pytest.mark.parametrize("text", ["value < 1", "value >= 1", "value == value"])
+def test_no_comparison_with_nan_holds(text):
+    assert machine_of([when(text, "LOW"), "NEXT"], math.nan).execute() == "done"
+
+
+def test_a_condition_of_a_preempt_decides_what_tidies_up():
+    sm = StateMachine(["done", "low", "preempted"], name="M", userdata={"value": 0.1})
+    sm.add("WORK", Step(seconds=60.0), {"preempted": [when("value < 0.3", "LOW"), "preempted"]})
+    sm.add("LOW", Step(), {"done": "low"})
+    with mission_kit() as mission:
+        mission.preempt(at=2.0)
+        run = mission(sm)
+    assert (run.outcome, run.path) == ("low", ("/M/WORK", "/M/LOW"))
+
+
 def test_it_is_asked_anew_after_each_visit():
     @smachpy.state(["done"], io_keys=["count"])
     def count(userdata):
@@ -84,6 +101,7 @@ def test_a_sequence_may_have_them():
         ("valu < 1", "'valu' is not there"),
         ("len(value)", "has no len"),
         (lambda userdata: userdata.value.nothing, "nothing"),
+        (lambda userdata: asyncio.sleep(0), "got a coroutine; expected an answer"),
     ],
 )
 def test_a_condition_that_cannot_be_evaluated_ends_the_machine_with_its_place(condition, problem):

@@ -481,3 +481,18 @@ def test_errors_of_functions_made_in_c_are_no_outcomes(fails):
             container.execute()
         assert "raised" in str(raised.value)
         assert "unknown outcome" not in str(raised.value)
+
+
+def test_a_function_that_answers_with_a_coroutine_is_an_error():
+    """Nothing awaits the coroutine, which counted as true."""
+
+    async def later():
+        return False
+
+    asks = smachpy.StateMachine(["true", "false", "preempted"], name="C")
+    asks.add("A", smachpy.ConditionState(lambda userdata: later()))
+    stops = smachpy.Concurrence(["ok"], "ok", child_termination_cb=lambda ended: later(), name="C")
+    stops.add("A", smachpy.CBState(lambda userdata: "ok", outcomes=["ok"]))
+    for container in (asks, stops):
+        with pytest.raises(smachpy.InvalidUserCodeError, match="got a coroutine; expected an ans"):
+            container.execute()

@@ -98,6 +98,15 @@ def test_a_timeout_ends_it_though_messages_keep_coming(world):
     assert world.clock.now() == 6.0
 
 
+def test_a_condition_that_answers_with_a_coroutine_is_invalid(world, caplog):
+    async def later():
+        return True
+
+    world.say(1, at=1.0)
+    assert world.state(lambda userdata, message: later()).execute(UserData()) == "invalid"
+    assert "got a coroutine; expected an answer" in caplog.text
+
+
 def test_a_condition_that_raises_is_invalid_and_reported(world, caplog):
     def broken(userdata, message):
         raise LookupError("no map")
