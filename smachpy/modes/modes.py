@@ -18,7 +18,7 @@ from smachpy.machines.guards import when
 from smachpy.machines.history import forget, remember
 from smachpy.machines.state import State, get_options, set_options
 from smachpy.machines.state_machine import StateMachine
-from smachpy.modes.table import ModesError, Table, rows_of
+from smachpy.modes.table import ModesError, Table, name_of, rows_of, states_of
 from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
@@ -112,20 +112,23 @@ class Modes(StateMachine):
         """Return modes with the table of a machine of the package `transitions`.
 
         Args:
-            machine: The machine; its callbacks and conditions are not used.
-            missions: Mode -> mission.
+            machine: The machine, nested or not. Its callbacks are not used, nor the events
+                `to_MODE` that `transitions` adds.
+            missions: Mode -> mission; a mode in a mode is "manual_slow".
             **options: Those of `Modes`.
 
         Raises:
             ModesError: it has conditions, or a mode is unknown.
         """
-        given = missions or {}
-        states = [{"name": name, "mission": given.get(name)} for name in machine.states]
-        unknown = [name for name in given if name not in machine.states]
+        given, known = missions or {}, list[str]()
+        states = states_of(machine, given, known)
+        unknown = [name for name in given if name not in known]
         if unknown:
-            raise ModesError([f"missions: got {unknown}; expected some of {[*machine.states]}."])
-        options.setdefault("initial", machine.initial)
-        return cls(states, list(rows_of(machine)), **options)
+            raise ModesError([f"missions: got {unknown}; expected some of {known}."])
+        rows = list(rows_of(machine, known))
+        if isinstance(machine.initial, str):
+            options.setdefault("initial", name_of(machine, machine.initial))
+        return cls(states, rows, **options)
 
     def __add(self, name: str, mission: Any) -> None:
         events = self.__table.events(name)

@@ -231,16 +231,61 @@ class Table:
         return tuple(event for here, event in self.ways if here == mode)
 
 
-def rows_of(machine: Any) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a machine of `transitions`.
+# -- machines of the package `transitions` ---------------------------------------------------------
+
+
+def name_of(machine: Any, name: str) -> str:
+    """Return the name of a mode: machines can separate those of nested states by something else."""
+    return name.replace(getattr(machine.state_cls, "separator", BETWEEN), BETWEEN)
+
+
+def states_of(
+    machine: Any,
+    missions: Mapping[str, Any],
+    known: list[str],
+    around: str = "",
+    states: Any = None,
+) -> list[dict[str, Any]]:
+    """Return the modes of a machine, nested as its states are.
+
+    Args:
+        machine: The machine.
+        missions: Mode -> mission.
+        known: Gets the names of all modes.
+        around: What the names begin with.
+        states: Name -> state; None: those of the machine.
+    """
+    found: list[dict[str, Any]] = []
+    for name, state in (machine.states if states is None else states).items():
+        whole = f"{around}{name}"
+        known.append(whole)
+        one = {"name": name, "mission": missions.get(whole)}
+        inner = getattr(state, "states", None)
+        if inner:
+            one["children"] = states_of(machine, missions, known, f"{whole}{BETWEEN}", inner)
+            one["initial"] = state.initial or next(iter(inner))
+        found.append(one)
+    return found
+
+
+def rows_of(machine: Any, known: Iterable[str]) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a machine, without those of its events `to_MODE`.
+
+    Args:
+        machine: The machine.
+        known: The names of all modes.
 
     Raises:
         ModesError: it has conditions, which are code.
     """
+    jumps = {f"to_{name}" for name in known} if machine.auto_transitions else set()
     for name, event in machine.events.items():
+        if name_of(machine, name) in jumps:
+            continue
         for ways in event.transitions.values():
             for way in ways:
                 if way.conditions:
                     problem = f"{name}: got conditions, which are code; expected none. Try `when`."
                     raise ModesError([problem])
-                yield {"trigger": name, "source": way.source, "dest": way.dest or way.source}
+                source, target = name_of(machine, way.source), way.dest or way.source
+                yield {"trigger": name, "source": source, "dest": name_of(machine, target)}

@@ -437,6 +437,33 @@ def test_a_machine_of_transitions_can_be_given():
         Modes.from_machine(machine, {"aut": mission})
 
 
+@pytest.mark.parametrize("separator", ["_", "."])
+def test_a_nested_machine_of_transitions_can_be_given(separator):
+    from transitions.extensions import HierarchicalMachine
+    from transitions.extensions.nesting import NestedState
+
+    class Separated(NestedState):
+        pass
+
+    class Nested(HierarchicalMachine):
+        state_cls = Separated
+
+    Separated.separator = separator
+    states = ["idle", {"name": "manual", "children": ["slow", "fast"], "initial": "slow"}]
+    ways = [
+        ["take", "idle", "manual"],
+        ["faster", f"manual{separator}slow", f"manual{separator}fast"],
+        ["leave", "manual", "idle"],
+    ]
+    machine = Nested(states=states, transitions=ways, initial="idle")
+    modes = Modes.from_machine(machine, {"manual_fast": mission}, name="ROBOT")
+    run = run_of(modes, (1.0, "take"), (2.0, "faster"), (5.0, "leave"), end=20.0)
+    assert leaves(run) == ["idle", "manual_slow", "manual_fast/A", "manual_fast/DOCK", "idle"]
+    assert {event for _, event in modes._Modes__table.ways} == {"take", "faster", "leave"}
+    with pytest.raises(ModesError, match="'manual_slow', 'manual_fast'"):
+        Modes.from_machine(machine, {"manual_quick": mission})
+
+
 def test_a_way_is_not_for_a_mode_whose_name_only_begins_with_that_of_its_source():
     ways = [["stop", "auto", "idle"]]
     table = Table(["auto", "auto_return", {"name": "manual", "children": ["slow"]}, "idle"], ways)
