@@ -35,7 +35,7 @@ LARGEST: Final = 20_000_000
 """Largest file that is read [bytes]."""
 
 MAX_FILES: Final = 2_000
-"""Number of files of a mission that are looked at."""
+"""Largest number of files of a mission: all of them are in its hash."""
 
 LIBRARY: Final = ("actionlib_core", "smachpy")
 
@@ -71,19 +71,25 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
         text: As the user named it.
 
     Raises:
-        TargetError: its module has no file.
+        TargetError: its module has no file, or it has more than `MAX_FILES`.
     """
     place = text.partition(":")[0]
     if place.endswith(DATA):
         folder = Path(place).resolve().parent
         found = [path for path in sorted(folder.rglob("*")) if path.suffix in {*DATA, ".py"}]
-        files = {str(path.relative_to(folder)): path for path in found[:MAX_FILES]}
+        files = {str(path.relative_to(folder)): path for path in found}
     else:
         module = sys.modules.get(target.source.partition(":")[0])
         file = getattr(module, "__file__", None)
         if file is None:
             raise TargetError(text, "its module has no file; expected one that can be hashed.")
         files = _imported(target.source.partition(":")[0], Path(file).resolve(), names_file(place))
+    if len(files) > MAX_FILES:
+        raise TargetError(
+            text,
+            f"got more than {MAX_FILES} files; expected fewer, as all are in its hash. Try the "
+            "mission in a folder of its own.",
+        )
     hashes = {name: _hash(path) for name, path in sorted(files.items())}
     name = Path(place).name if place.endswith(DATA) else target.source.partition(":")[2]
     return {"target": text, "name": name, "hash": _whole({**hashes, ":": name}), "files": hashes}
@@ -175,7 +181,7 @@ def _imported(name: str, file: Path, is_file: bool) -> dict[str, Path]:
     path = [str(file.parent), *sys.path] if is_file else sys.path
     found = {file.stem if is_file else name: file}
     waiting = [(name, file)]
-    while waiting and len(found) < MAX_FILES:
+    while waiting and len(found) <= MAX_FILES:
         for word in _names_in(*waiting.pop()):
             for one, where in _found(word, path):
                 first = one.partition(".")[0]

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from smachpy.command import main
+from smachpy.command import evidence, main
 from smachpy.command.evidence import library_facts, mission_facts
-from smachpy.command.targets import load_target
+from smachpy.command.targets import TargetError, load_target
 
 MISSION = """
 import evidence_helper
@@ -48,6 +48,12 @@ def folder(tmp_path, monkeypatch):
 
 def hash_of(text):
     return mission_facts(load_target(text), text)["hash"]
+
+
+def test_a_mission_of_more_files_than_are_hashed_is_refused(monkeypatch):
+    monkeypatch.setattr(evidence, "MAX_FILES", 5)
+    with pytest.raises(TargetError, match="got more than 5 files; expected fewer"):
+        hash_of("good.py")
 
 
 def test_the_hash_is_of_all_that_the_mission_imports():
