@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import os
+import re
 import signal
 from collections import defaultdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import shutdown
@@ -138,6 +141,9 @@ def register_runner(subparsers: Any) -> None:
     add_keep(parser, "missions")
     add_allow(parser, "run missions of this place, too")
     add_require_evidence(parser)
+    parser.add_argument(
+        "--record", type=Path, metavar="DIR", help="write each mission to a file in this folder"
+    )
     parser.set_defaults(run=_run)
 
 
@@ -210,6 +216,7 @@ def _run(args: argparse.Namespace) -> int:
                 lease_s=args.lease,
                 allow=args.allow,
                 evidence=args.require_evidence,
+                record=args.record,
                 until_empty=args.until_empty,
                 prune=None if args.prune is None else (args.prune, args.keep),
             )
@@ -274,6 +281,12 @@ class _Rest:
         self.until = now + min(rest, MAX_REST_S)
 
 
+def recording_name(run: str) -> str:
+    """Return the name of a run's file; the run's name comes from the queue, and may be anything."""
+    words = re.sub(r"[^A-Za-z0-9_-]+", "_", run)[:100].strip("_")
+    return f"{words}-{hashlib.sha256(run.encode('utf-8', 'replace')).hexdigest()[:8]}.jsonl"
+
+
 class Runner:
     """Takes missions from a queue and runs each in a process of its own, which holds its lease.
 
@@ -286,6 +299,7 @@ class Runner:
         allow: Places whose missions are run besides the installed ones, see
             `smachpy.command.queued`.
         evidence: Files and folders: a mission without evidence in them is not begun; none: any is.
+        record: Folder for recordings; None: there are none.
         until_empty: Whether it gives up missions that fail again and again.
         prune: Each hour missions are deleted that have been over for so long [s], except those that
             the second word keeps, see `smachpy.command.pruning`; None: never.
@@ -308,6 +322,7 @@ class Runner:
         lease_s: float,
         allow: Sequence[str] = (),
         evidence: Sequence[str] = (),
+        record: Path | None = None,
         until_empty: bool = False,
         prune: tuple[float, str] | None = None,
     ) -> None:
@@ -320,6 +335,7 @@ class Runner:
         self._lease_s = lease_s
         self._allow = allow
         self._evidence = evidence
+        self._record = record
         self._allowed = Allowed(allow)
         self._refused: dict[str, None] = {}  # targets that are not allowed here, in their order
         self._given_up: set[str] = set()  # missions that are left to other runners
@@ -459,6 +475,8 @@ class Runner:
         lease = self._leases[row.id]
         words = [*run_words(self._address, row.id, self._allow, self._evidence), "--plain"]
         words += [f"--lease={self._lease_s}", f"--reserved={lease.runner}:{lease.fence}"]
+        if self._record is not None:
+            words.append(f"--record={self._record / recording_name(row.run)}")
         verb = "begins" if row.status == "queued" else "is resumed"
         print(printable(f"mission {row.id}: {verb}"), flush=True)
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import signal
 import sqlite3
 import subprocess
@@ -17,8 +18,9 @@ import pytest
 from actionlib_core import node
 from smachpy.command import main
 from smachpy.command.durable import whole_target
-from smachpy.command.fleet import MAX_UNFIT_STARTS, _Rest
+from smachpy.command.fleet import MAX_UNFIT_STARTS, _Rest, recording_name
 from smachpy.durable.store import open_store
+from smachpy.events.recording import read_recording
 from tests.smachpy.durable.test_stores import ROW
 
 pytestmark = pytest.mark.timeout(240)  # several processes after one another, on a busy computer
@@ -140,9 +142,12 @@ def test_a_runner_takes_what_was_submitted(errand, tmp_path, capsys):
         (tmp_path / f"go_{name}").touch()
     submit(errand, place, "later", "--at", "2100-01-01T00:00Z")
     assert main(["missions", "cancel", "later", "--durable", place]) == 0
-    process = runner(place, "--until-empty")
+    process = runner(place, "--until-empty", "--record", str(tmp_path / "runs"))
     output, _ = process.communicate(timeout=WITHIN_S)
     assert process.returncode == 0, output
+    found = [read_recording(path) for path in (tmp_path / "runs").iterdir()]
+    assert sorted(one.origin["mission"]["words"] for one in found) == [["a"], ["b"]]
+    assert all(one.events[-1]["outcome"] == "done" for one in found)
     assert statuses(place) == {
         "a": ("ended", "done"),
         "b": ("ended", "done"),
@@ -245,6 +250,14 @@ def test_a_mission_that_cannot_run_here_is_left_to_others(errand, tmp_path, caps
     capsys.readouterr()
     assert main(["missions", "list", "--durable", place]) == 0
     assert "exit code 2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("run", ["../../etc/x 17", "", "/", "x" * 5000, "a\0b", "ä\ud800", ".."])
+def test_a_recording_stays_in_its_folder_whatever_a_row_says(run):
+    name = recording_name(run)
+    assert re.fullmatch(r"[A-Za-z0-9_-]*\.jsonl", name)
+    assert len(name) < 130
+    assert name != recording_name(f"{run}_")
 
 
 def test_pauses_grow_with_each_attempt_that_fails():
