@@ -619,7 +619,7 @@ def test_threads_that_still_send_as_the_interpreter_ends_do_not_abort_the_proces
     for _ in range(5):
         with child(LATE) as process:
             _, errors = process.communicate(timeout=WAIT_S * 2)
-            assert (process.returncode, errors) == (0, "")
+            assert process.returncode == 0, errors
 
 
 def test_time_in_which_the_process_was_stopped_is_not_waiting(monkeypatch):
