@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from smachpy.command import evidence, main
+from smachpy.command import main
 from smachpy.command.evidence import library_facts, mission_facts
 from smachpy.command.targets import TargetError, load_target
 
@@ -51,7 +51,7 @@ def hash_of(text):
 
 
 def test_a_mission_of_more_files_than_are_hashed_is_refused(monkeypatch):
-    monkeypatch.setattr(evidence, "MAX_FILES", 5)
+    monkeypatch.setattr("smachpy.command.evidence.MAX_FILES", 5)
     with pytest.raises(TargetError, match="got more than 5 files; expected fewer"):
         hash_of("good.py")
 
