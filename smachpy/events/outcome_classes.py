@@ -14,7 +14,7 @@ OutcomeClass = Literal["success", "failure", "preempted", "other"]
 
 SUCCESS: Final = frozenset(
     {"succeeded", "success", "successful", "done", "ok", "yes", "true", "valid"}
-    | {"complete", "completed", "finished", "reached", "arrived"}
+    | {"complete", "completed", "finished", "reached", "arrived", "goal"}
 )
 FAILURE: Final = frozenset(
     {"abort", "aborted", "fail", "failed", "failure", "error", "exception", "invalid", "no"}

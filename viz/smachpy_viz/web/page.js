@@ -1736,7 +1736,7 @@ var innermost = (list, pathOf2) => list.filter((one) => !list.some((other) => pa
 // src/core/outcomes.ts
 var words = (text2) => text2.split(" ");
 var SUCCESS = words(
-  "succeeded success successful done ok yes true valid complete completed finished reached arrived"
+  "succeeded success successful done ok yes true valid complete completed finished reached arrived goal"
 );
 var FAILURE = words(
   "abort aborted fail failed failure error exception invalid no false timeout timed_out lost rejected denied impossible unreachable unreached"
@@ -9997,6 +9997,10 @@ function requestText(e4) {
 function lineOf(e4, node) {
   const line = LINES[e4.kind];
   const [text2, kind] = line?.(e4) ?? [e4.kind, "other"];
+  if (e4.kind === "Fired") {
+    const name = node?.children.find(({ label }) => label === e4.transition)?.name;
+    return { text: name ? `${name} fired` : text2, kind };
+  }
   return { text: text2, kind: e4.kind === "Left" ? endClass(node, e4.outcome) : kind };
 }
 var KINDS_OF = {

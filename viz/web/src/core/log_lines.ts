@@ -58,6 +58,10 @@ function requestText(e: EventOf<"PreemptRequested">) {
 export function lineOf(e: RunEvent, node?: StateNode | null) {
   const line = LINES[e.kind] as ((e: RunEvent) => [string, string]) | undefined;
   const [text, kind] = line?.(e) ?? [e.kind, "other"];
+  if (e.kind === "Fired") {
+    const name = node?.children.find(({ label }) => label === e.transition)?.name;
+    return { text: name ? `${name} fired` : text, kind };
+  }
   return { text, kind: e.kind === "Left" ? endClass(node, e.outcome) : kind };
 }
 

@@ -6,7 +6,7 @@ import type { OutcomeClass, StateNode } from "#core/types.ts";
 const words = (text: string) => text.split(" ");
 
 export const SUCCESS = words(
-  "succeeded success successful done ok yes true valid complete completed finished reached arrived",
+  "succeeded success successful done ok yes true valid complete completed finished reached arrived goal",
 );
 export const FAILURE = words(
   "abort aborted fail failed failure error exception invalid no false timeout timed_out lost rejected denied" +
