@@ -630,10 +630,26 @@ class _Reader:
                 return finish(make_registered(name, arguments, place), origin, options, place)
         except SmachError as error:  # also of a plan
             text = str(error).removeprefix(f"{place.where}: ").removeprefix(f"{kind}: ")
-            field, known, rest = text.partition("with: ")
-            entry.report("with" if known and not field else kind, rest if not field else text)
+            if not self._report_arguments(entry, error, arguments):
+                field, known, rest = text.partition("with: ")
+                entry.report("with" if known and not field else kind, rest if not field else text)
             return None
         return self._reference(entry, name, arguments, options, origin, place, around)
+
+    def _report_arguments(
+        self, entry: Section, error: SmachError, arguments: Mapping[str, Any]
+    ) -> bool:
+        """Report what is wrong with arguments and options at their places; return whether it is."""
+        found = [
+            one.partition(": ")
+            for one in getattr(error.__cause__ or error, "problems", ())
+            if isinstance(one, str)
+        ]
+        if not found or not all(key in {*arguments, *OPTIONS} for key, _, _ in found):
+            return False
+        for key, _, text in found:
+            (entry.section("with") if key in arguments else entry).report(key, text)
+        return True
 
     def _where(self, entry: Section, kind: str) -> str:
         path = entry.path(kind)

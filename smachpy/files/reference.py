@@ -370,10 +370,16 @@ def _called(thing: Any, name: str, arguments: Mapping[str, Any], place: Naming) 
         raise MissionError(
             f"{place.where}: got {name!r} with arguments; expected none, it is ready."
         )
-    known = _parameters(thing)
-    for argument in arguments:
-        if known is not None and argument not in known:
+    known, hints = _parameters(thing), getattr(thing, "__annotations__", {})
+    for argument, value in arguments.items():
+        if known is None:
+            break
+        if argument not in known:
             raise MissionError(f"{place.where}: with: {unknown_name(name, argument, known)}")
+        wants_text = hints.get(argument) in {"str", "str | None"}
+        if wants_text and not isinstance(value, str | None):
+            what = f"with: {argument}: got {value!r}; expected a text."
+            raise MissionError(f"{place.where}: {what}")
     try:
         state = thing(**arguments)
     except Exception as error:

@@ -386,6 +386,29 @@ def test_what_would_have_no_effect_is_refused(file, states, problem):
     assert any(problem in one for one in found), found
 
 
+@pytest.mark.parametrize(
+    ("state", "problem"),
+    [
+        (
+            "state: wait, with: {seconds: -1}",
+            "3:27: states.A.with.seconds: got -1.0; expected seconds",
+        ),
+        ("state: wait, with: {seconds: 1}, timeout: soon", "3:40: states.A.timeout: got 'soon'"),
+        (
+            "state: ask, with: {question: 3}",
+            "3:19: states.A.with: question: got 3; expected a text.",
+        ),
+        (
+            "state: service, with: {name: x, type: 3}",
+            "3:23: states.A.with: type: got 3; expected a text.",
+        ),
+    ],
+)
+def test_a_wrong_argument_has_its_own_place(file, state, problem):
+    (found,) = problems_of(file(f"outcomes: [done, preempted]\nstates:\n  A: {{{state}}}\n"))
+    assert found.startswith(problem)
+
+
 def test_what_would_have_no_effect_in_a_clean_up_is_refused(file):
     text = "outcomes: [done, preempted]\nstates: {A: {state: wait}}\ncleanup: {C: {state: wait, on: {done: done}}}\n"
     (problem,) = problems_of(file(text))
