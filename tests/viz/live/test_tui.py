@@ -362,3 +362,28 @@ def test_narrow_terminals_stack_the_tree_and_the_log(tmp_path, clock, width, sta
     assert min(tree.height, log.height) >= 5
     assert min(tree.width, log.width) >= 34
     assert any("FIRST  succeeded \u2192 IN" in line for line in found["lines"])
+
+
+@pytest.mark.slow
+def test_goals_say_where_to_and_how_far_and_the_keys_fit_into_80_columns(tmp_path, clock):
+    fields = {"station": "dock 2"}
+    sent = {"action": "go", "goal_id": "g", "goal": {"$msg": "G", "fields": fields}}
+    progress = {"fraction": 0.5, "distance": 3.14, "text": ""}
+    events = [event(1, "GoalSent", **sent), event(2, "GoalFeedback", action="go", goal_id="g")]
+    events[-1] |= {"feedback": None, "progress": progress}
+    machine = watched(tmp_path, events)
+    assert "\u2192 dock 2 3.1 m left" in seen(machine)["goals"]
+    machines, found = Machines(), {}
+    machines.obtain("job").reset(recorded(tmp_path / "keys").history())
+
+    async def look():
+        app = MissionApp(machines, None)
+        async with app.run_test(size=(80, 24)) as pilot:
+            await pilot.pause()
+            keys = list(app.query("FooterKey"))
+            found["right"] = max(key.region.right for key in keys)
+            found["count"] = len(keys)
+
+    asyncio.run(look())
+    assert found["count"] == 9
+    assert found["right"] <= 80

@@ -18,6 +18,7 @@ from smachpy.events.outcome_classes import outcome_class
 from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
 from smachpy.userdata.shown import literal
+from smachpy_viz.model.destination import destination
 from smachpy_viz.model.labels import GLYPHS, cleanups, innermost, shorten, tidies, visible
 from smachpy_viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING
 
@@ -75,16 +76,17 @@ class MissionApp(App[None]):
         (NARROW, "-wide"),
     ]
     BINDINGS: ClassVar = [
+        # All of them fit into 80 columns.
         ("q", "quit", "Quit"),
-        ("n", "next", "Next machine"),
+        ("n", "next", "Next"),
         ("o", "follow", "Follow"),
-        ("slash", "search", "Search"),
+        ("slash", "search", "Find"),
         Binding("space", "pause", "Pause", priority=True),  # otherwise the tree would take it
         ("s", "step", "Step"),
-        ("comma", "go_by(-1)", "Event back"),
-        ("full_stop", "go_by(1)", "Event on"),
+        ("comma", "go_by(-1)", "Back"),
+        ("full_stop", "go_by(1)", "On"),
         ("l", "live", "Now"),
-        ("escape", "leave", "Back"),
+        Binding("escape", "leave", "Leave", show=False),
     ]
 
     def __init__(
@@ -121,7 +123,7 @@ class MissionApp(App[None]):
                 yield Static(id="goals")
                 yield DataTable(id="userdata", cursor_type="row")
                 yield RichLog(id="log", max_lines=LOGGED_LINES, wrap=True, min_width=20)
-        yield Footer()
+        yield Footer(compact=True, show_command_palette=False)
 
     def on_mount(self) -> None:
         """Begin with the updates."""
@@ -353,6 +355,7 @@ class MissionApp(App[None]):
     def _draw_goals(self) -> None:
         lines = Text()
         goals = list(self._state.data["goals"].values())
+        written = self._state.data["userdata"].values()
         goals.sort(key=lambda goal: goal["ended"] is None)  # running ones last: those are shown
         name, bar = (20, BAR) if self.size.width >= WIDE else (14, BAR // 3)
         if len(goals) > MAX_GOALS and (hidden := _running(goals[:-MAX_GOALS])):
@@ -366,7 +369,14 @@ class MissionApp(App[None]):
             lines.append("\u2501" * filled, style)
             lines.append("\u2501" * (bar - filled), "dim")
             words = goal["text"] or progress.get("text") or ""
-            lines.append(f" {part:4.0%} {goal['status'].lower()} {shorten(words, 40)}\n")
+            where = destination(goal["goal"], [one["value"] for one in written])
+            left = progress.get("distance")
+            told = [
+                f"\u2192 {where}" if where else "",
+                "" if left is None else f"{left:.1f} m left",
+            ]
+            told += ["" if goal["ended"] is None else goal["status"].lower(), shorten(words, 40)]
+            lines.append(f" {part:4.0%} {' '.join(filter(None, told))}\n")
         widget = self.query_one("#goals", Static)
         widget.display = bool(lines)
         widget.update(_clean(lines))
