@@ -1691,7 +1691,7 @@ var Clock = class {
   choose(name) {
     this.chosen.value = name;
     save("clock", name);
-    this.#playback.slowTick.value += 1;
+    this.#playback.updateSlow();
   }
   /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */
   instantText(t4, digits = 1) {
@@ -2818,7 +2818,7 @@ var Panels = class {
   }
   // -- plots ------------------------------------------------------------------------------------
   plotsShown = O(() => {
-    this.#playback.slowTick.value;
+    this.#playback.watchSlowly();
     if (this.plotsChosen.value) return this.plotsChosen.value;
     const found = usualPlots(this.#playback.shown(), this.#data.scene.series.keys());
     const isMore = found.flat().length > this.#usualPlots.flat().length;
@@ -2858,10 +2858,10 @@ var Panels = class {
 // src/core/store/playback.ts
 var SHORTEST_MS = 20;
 var Playback = class {
-  tick = y3(0);
-  // counts the changes that panels should show
-  slowTick = y3(0);
-  // the same, for panels with much text
+  /** The run changes in place, and often: these count the updates of what is drawn of it. */
+  #updates = y3(0);
+  #slowUpdates = y3(0);
+  // of panels with much text
   cursor = y3(null);
   // the instant shown [ms]; null: now
   /** number of events up to there: several may have the same instant */
@@ -2918,15 +2918,31 @@ var Playback = class {
   }
   /** Whether the instant shown moves by itself: a run is played, or a running one is shown live. */
   goes = O(() => {
-    this.tick.value;
+    this.watch();
     const { run, facts, connection } = this.#data;
     const isOver = run.now.ended != null || facts.value?.recorded || facts.value?.stale != null;
     return this.playing.value !== null || this.cursor.value === null && !isOver && connection.value !== "file";
   });
-  /** Have all panels drawn again. */
+  /** Have the panel or computed value that calls this updated with the run shown. Returns the number of updates. */
+  watch() {
+    return this.#updates.value;
+  }
+  /** The same less often, for a panel with much text. */
+  watchSlowly() {
+    return this.#slowUpdates.value;
+  }
+  /** Update who watches. */
+  update() {
+    this.#updates.value += 1;
+  }
+  /** Update who watches slowly. */
+  updateSlow() {
+    this.#slowUpdates.value += 1;
+  }
+  /** Update all. */
   renew() {
-    this.tick.value += 1;
-    this.slowTick.value += 1;
+    this.update();
+    this.updateSlow();
   }
   #show(t4, count) {
     this.#stateAtCursor = count === null ? null : this.#data.run.after(count);
@@ -3100,7 +3116,7 @@ var Status = class {
     this.#playback = playback;
   }
   activePaths = O(() => {
-    this.#playback.tick.value;
+    this.#playback.watch();
     return Object.entries(this.#playback.shown().states).filter(([, state]) => state.since != null).map(([path]) => path);
   });
   activeLeaves = O(() => innermost(this.activePaths.value, (path) => path));
@@ -3122,7 +3138,7 @@ var Status = class {
     return [newest3[0]];
   });
   runStatus = O(() => {
-    this.#playback.tick.value;
+    this.#playback.watch();
     const data = this.#playback.shown();
     const about = this.#data.facts.value;
     const connection = this.#data.connection.value;
@@ -4077,7 +4093,7 @@ function reproduction() {
   return one && one.epoch === store.data.facts.value?.epoch ? one : null;
 }
 function canReproduce() {
-  store.playback.tick.value;
+  store.playback.watch();
   const facts = store.data.facts.value;
   if (!facts || isFile() || !hasToken() || !store.data.settings.value.reproduces) return false;
   if (facts.name.includes(AGAIN)) return false;
@@ -6794,11 +6810,11 @@ var Scheduler = class {
     clearTimeout(this.#panelsDue);
     this.#panelsDue = 0;
     this.#panelsAt = moment;
-    store.playback.tick.value += 1;
+    store.playback.update();
     store.panels.hasMap.value = !store.data.scene.isEmpty;
     if (moment - this.#textAt > TEXT_MS) {
       this.#textAt = moment;
-      store.playback.slowTick.value += 1;
+      store.playback.updateSlow();
       const newest3 = store.data.run.events.at(-1)?.seq ?? 0;
       const isBusy = newest3 - this.#newestSeq > 3 * BUSY * (TEXT_MS / 1e3);
       this.#newestSeq = newest3;
@@ -8816,7 +8832,7 @@ function ServerGoals({ name }) {
 var senderText = (goal) => shorten(goal.mission || (goal.sender ? `node /${goal.sender}` : "an unknown client"), 80);
 function SentGoals() {
   const goals = store.data.actions.value?.goals ?? [];
-  store.playback.tick.value;
+  store.playback.watch();
   return /* @__PURE__ */ a4("section", { "aria-label": "goals sent from here", children: [
     /* @__PURE__ */ a4("h2", { children: [
       "Goals sent from here ",
@@ -8908,7 +8924,7 @@ function Command({
   );
 }
 function OperatorBar() {
-  store.playback.tick.value;
+  store.playback.watch();
   const facts = control();
   if (!facts || store.view.pageShown.value !== "machine") return null;
   const { paused } = facts;
@@ -8986,7 +9002,7 @@ function askForPreempt(target) {
   });
 }
 function ConfirmationSheet() {
-  store.playback.tick.value;
+  store.playback.watch();
   const box = T2(null);
   const before = T2(null);
   const given = confirmation.value;
@@ -9751,7 +9767,7 @@ function OpenHome() {
     const timer = setInterval(refreshRuns, REFRESH_MS3);
     return () => clearInterval(timer);
   }, [journals.length > 0]);
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const pins2 = store.view.pins.value;
   const rows = chosen(runs2, filter, pins2);
   const change2 = (some) => {
@@ -10024,7 +10040,7 @@ var LINES2 = 70;
 var LOOKED_AT = 6e3;
 var LONGEST = 200;
 function Log({ page: page2 }) {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const [text2, setText] = d2("");
   const [pages, setPages] = d2(1);
   const end = store.playback.eventsShown();
@@ -10316,7 +10332,7 @@ function Notes2() {
 
 // src/panels/numbers.tsx
 function Numbers() {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   if (store.view.numbers.value === "none") return null;
   const { taken, all } = coverage(store.data.model.value, store.playback.shown().states);
   const recorded = store.data.statistics.value;
@@ -11164,7 +11180,7 @@ function Step({ step, first, page: page2 }) {
 // src/panels/inspector.tsx
 var MOST_PROBLEMS = 30;
 function Inspector({ page: page2 }) {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const model = store.data.model.value;
   if (!model) return /* @__PURE__ */ a4("aside", { class: "inspector" });
   const shared = { page: page2, data: store.playback.shown(), now: store.playback.nowMs() };
@@ -11220,7 +11236,7 @@ function Problems({ page: page2 }) {
 var NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the topic map.";
 var MOST_ROBOTS = 5;
 function MapPanel({ page: page2, children }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const { map } = page2;
   const names = [...store.data.scene.robots].filter(([, robot]) => robot.poses.length).map(([name]) => name).sort();
   const noMap = !store.data.scene.maps.length;
@@ -11368,7 +11384,7 @@ function RestartBanner({ before }) {
   ] });
 }
 function PreemptBanner({ page: page2 }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const now = store.playback.nowMs();
   const found = store.data.run.now.ended == null ? store.data.run.preemptAt(now) : null;
   const before = store.data.facts.value?.before;
@@ -11445,7 +11461,7 @@ function Legend() {
       change2
     ] })) });
   }
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const scale = heatScale(store.view.numbers.value, store.playback.shown().states, store.data.model.value);
   return /* @__PURE__ */ a4("div", { class: "legend", "aria-hidden": "true", children: [
     scale && /* @__PURE__ */ a4("span", { class: "scale", children: [
@@ -11738,7 +11754,7 @@ var IconButton = ({
   ...more
 }) => /* @__PURE__ */ a4("button", { class: "icon-button", title, "aria-label": title, ...more, children: /* @__PURE__ */ a4("svg", { viewBox: "0 0 16 16", "aria-hidden": "true", children: /* @__PURE__ */ a4("path", { d: ICONS2[name] }) }) });
 function PlayBar({ page: page2 }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const first = store.data.run.first();
   if (first === null) return null;
   const goes = store.playback.goes.value;
@@ -11807,7 +11823,7 @@ function LoopButton() {
   );
 }
 function Clock2() {
-  store.playback.tick.value;
+  store.playback.watch();
   const last = store.data.run.last() ?? 0;
   const [typed, setTyped] = d2(null);
   const onChange = (e4) => {
@@ -11844,7 +11860,7 @@ function Clock2() {
   ] });
 }
 function Jumps() {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const keys2 = [...store.data.marks.keys].sort();
   const key = store.playback.followedKey.value ?? keys2[0];
   const choose2 = (e4) => {
@@ -16367,7 +16383,7 @@ function Line({
   colour,
   onRemove
 }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const samples = T2(null);
   samples.current ??= new Samples(idOf(origin));
   const list = samples.current.update(store.data.run, store.data.scene.series);
@@ -16473,7 +16489,7 @@ function questionsShown() {
   return questionsOf(store.data.run.now, store.data.liveMs());
 }
 function Questions({ page: page2 }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const shown = store.data.model.value ? questionsShown() : [];
   const held = control() && store.playback.cursor.value === null ? heldStates(store.data.run.now) : [];
   const facts = store.data.facts.value;
@@ -16997,7 +17013,7 @@ function RunsButton() {
   );
 }
 function canAskWhy() {
-  store.playback.tick.value;
+  store.playback.watch();
   const { now } = store.data.run;
   const about = store.data.facts.value;
   return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
@@ -17131,7 +17147,7 @@ function Tree({ page: page2 }) {
   const [folded, setFolded] = d2(() => /* @__PURE__ */ new Map());
   const [chosen2, setChosen] = d2(null);
   const box = T2(null);
-  store.playback.tick.value;
+  store.playback.watch();
   const model = store.data.model.value;
   if (!model) return /* @__PURE__ */ a4("aside", { class: "tree" });
   const states2 = store.playback.shown().states;

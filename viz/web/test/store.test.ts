@@ -81,7 +81,7 @@ test("how the run stands, in one word", () => {
   store.data.facts.value = { ...FACTS, stale: 1 };
   assert.equal(store.status.runStatus.value.word, "stale");
   store.addEvents([event("Finished", "/JOB", { outcome: "done" })]);
-  store.playback.tick.value += 1;
+  store.playback.update();
   assert.equal(store.status.runStatus.value.word, "ended: done");
   store.data.facts.value = null;
   assert.equal(store.status.runStatus.value.word, "waiting");
@@ -115,7 +115,7 @@ test("where a run ended is in the state that was left last, not in one whose nam
   const ends = [event("Left", "/JOB/A", { outcome: "ok" }), event("Left", "/JOB/AB/X", { outcome: "ok" })];
   ends[1].stamp_ns = ends[0].stamp_ns;
   store.startRun(null, [...began, ...ends]);
-  store.playback.tick.value += 1;
+  store.playback.update();
   assert.deepEqual(store.status.lastLeaves.value, ["/JOB/A"]);
 });
 

@@ -35,7 +35,7 @@ export function reproduction() {
 
 /** Whether the run shown is over, and this page may have it run again. */
 export function canReproduce() {
-  store.playback.tick.value;
+  store.playback.watch();
   const facts = store.data.facts.value;
   if (!facts || isFile() || !hasToken() || !store.data.settings.value.reproduces) return false;
   if (facts.name.includes(AGAIN)) return false;

@@ -106,11 +106,11 @@ export class Scheduler {
     clearTimeout(this.#panelsDue);
     this.#panelsDue = 0;
     this.#panelsAt = moment;
-    store.playback.tick.value += 1;
+    store.playback.update();
     store.panels.hasMap.value = !store.data.scene.isEmpty;
     if (moment - this.#textAt > TEXT_MS) {
       this.#textAt = moment;
-      store.playback.slowTick.value += 1;
+      store.playback.updateSlow();
       const newest = store.data.run.events.at(-1)?.seq ?? 0;
       const isBusy = newest - this.#newestSeq > 3 * BUSY * (TEXT_MS / 1000);
       this.#newestSeq = newest;

@@ -170,7 +170,7 @@ const senderText = (goal: ServerGoal) =>
 
 function SentGoals() {
   const goals = store.data.actions.value?.goals ?? [];
-  store.playback.tick.value;
+  store.playback.watch();
   return (
     <section aria-label="goals sent from here">
       <h2>

@@ -64,7 +64,7 @@ function Command({
 
 /** The commands to the machine on view, always at the same place. */
 export function OperatorBar() {
-  store.playback.tick.value;
+  store.playback.watch();
   const facts = control();
   if (!facts || store.view.pageShown.value !== "machine") return null;
   const { paused } = facts;
@@ -137,7 +137,7 @@ function askForPreempt(target: string) {
 
 /** The question before a command that cannot be undone. It is withdrawn when what it is about changes. */
 export function ConfirmationSheet() {
-  store.playback.tick.value;
+  store.playback.watch();
   const box = useRef<HTMLElement | null>(null);
   const before = useRef<Element | null>(null);
   const given = confirmation.value;

@@ -38,7 +38,7 @@ function OpenHome() {
     const timer = setInterval(refreshRuns, REFRESH_MS);
     return () => clearInterval(timer);
   }, [journals.length > 0]);
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const pins = store.view.pins.value;
   const rows = chosen(runs, filter, pins);
   const change = (some: Partial<Filter>) => {

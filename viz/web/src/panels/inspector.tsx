@@ -19,7 +19,7 @@ import { WhyPanel } from "#panels/why.tsx";
 const MOST_PROBLEMS = 30;
 
 export function Inspector({ page }: { page: Page }) {
-  store.playback.slowTick.value; // read, so that this component is drawn again when the signal changes
+  store.playback.watchSlowly();
   const model = store.data.model.value;
   if (!model) return <aside class="inspector" />;
   const shared = { page, data: store.playback.shown(), now: store.playback.nowMs() };

@@ -13,7 +13,7 @@ const LOOKED_AT = 6000; // events that are searched for these lines
 const LONGEST = 200; // characters
 
 export function Log({ page }: { page: Page }) {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const [text, setText] = useState("");
   const [pages, setPages] = useState(1);
   const end = store.playback.eventsShown();

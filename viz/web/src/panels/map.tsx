@@ -9,7 +9,7 @@ const NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the to
 const MOST_ROBOTS = 5; // robots with a button of their own
 
 export function MapPanel({ page, children }: { page: Page; children?: ComponentChildren }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const { map } = page;
   const names = [...store.data.scene.robots]
     .filter(([, robot]) => robot.poses.length)

@@ -109,7 +109,7 @@ function RestartBanner({ before }: { before: string }) {
 
 /** The banner of a running preempt: its origin, and the states for which it waits. */
 function PreemptBanner({ page }: { page: Page }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const now = store.playback.nowMs();
   const found = store.data.run.now.ended == null ? store.data.run.preemptAt(now) : null;
   const before = store.data.facts.value?.before;
@@ -203,7 +203,7 @@ export function Legend() {
       </div>
     );
   }
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const scale = heatScale(store.view.numbers.value, store.playback.shown().states, store.data.model.value);
   return (
     <div class="legend" aria-hidden="true">

@@ -6,7 +6,7 @@ import { duration } from "#core/text.ts";
 import { Pill, Section } from "#panels/components.tsx";
 
 export function Numbers() {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   if (store.view.numbers.value === "none") return null;
   const { taken, all } = coverage(store.data.model.value, store.playback.shown().states);
   const recorded = store.data.statistics.value;

@@ -47,7 +47,7 @@ const IconButton = ({
 );
 
 export function PlayBar({ page }: { page: Page }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const first = store.data.run.first();
   if (first === null) return null;
   const goes = store.playback.goes.value;
@@ -114,7 +114,7 @@ function LoopButton() {
 
 /** The instant shown, as a text field. */
 function Clock() {
-  store.playback.tick.value; // read, so that this component without properties is drawn again when the signal changes
+  store.playback.watch();
   const last = store.data.run.last() ?? 0;
   // The run must not overwrite what is being typed.
   const [typed, setTyped] = useState<string | null>(null);
@@ -149,7 +149,7 @@ function Clock() {
 }
 
 function Jumps() {
-  store.playback.slowTick.value;
+  store.playback.watchSlowly();
   const keys = [...store.data.marks.keys].sort();
   const key = store.playback.followedKey.value ?? keys[0];
   const choose = (e: Event) => {

@@ -79,7 +79,7 @@ function Line({
   colour: number;
   onRemove: () => void;
 }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const samples = useRef<Samples | null>(null);
   samples.current ??= new Samples(idOf(origin));
   const list = samples.current.update(store.data.run, store.data.scene.series);

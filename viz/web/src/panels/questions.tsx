@@ -34,7 +34,7 @@ function questionsShown() {
 }
 
 export function Questions({ page }: { page: Page }) {
-  store.playback.tick.value;
+  store.playback.watch();
   const shown = store.data.model.value ? questionsShown() : [];
   const held = control() && store.playback.cursor.value === null ? heldStates(store.data.run.now) : [];
   const facts = store.data.facts.value;

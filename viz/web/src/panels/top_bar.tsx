@@ -98,7 +98,7 @@ function RunsButton() {
 
 /** Whether the run is over: it has ended, or its program is gone. */
 function canAskWhy() {
-  store.playback.tick.value;
+  store.playback.watch();
   const { now } = store.data.run;
   const about = store.data.facts.value;
   return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());

@@ -30,7 +30,7 @@ export function Tree({ page }: { page: Page }) {
   const [folded, setFolded] = useState(() => new Map() as Map<string, boolean>); // by the user
   const [chosen, setChosen] = useState<string | null>(null);
   const box = useRef<HTMLDivElement | null>(null);
-  store.playback.tick.value; // read, so that this component is drawn again when the signal changes
+  store.playback.watch();
   const model = store.data.model.value;
   if (!model) return <aside class="tree" />;
   const states = store.playback.shown().states;

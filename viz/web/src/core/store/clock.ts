@@ -22,7 +22,7 @@ export class Clock {
   choose(name: ClockName) {
     this.chosen.value = name;
     save("clock", name);
-    this.#playback.slowTick.value += 1;
+    this.#playback.updateSlow();
   }
 
   /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */

@@ -50,7 +50,7 @@ export class Panels {
   // -- plots ------------------------------------------------------------------------------------
 
   readonly plotsShown = computed(() => {
-    this.#playback.slowTick.value;
+    this.#playback.watchSlowly();
     if (this.plotsChosen.value) return this.plotsChosen.value;
     const found = usualPlots(this.#playback.shown(), this.#data.scene.series.keys());
     const isMore = found.flat().length > this.#usualPlots.flat().length; // a plot never disappears during a run

@@ -13,8 +13,9 @@ import type { RunState } from "#core/types.ts";
 const SHORTEST_MS = 20; // the shortest stretch that can be selected
 
 export class Playback {
-  readonly tick = signal(0); // counts the changes that panels should show
-  readonly slowTick = signal(0); // the same, for panels with much text
+  /** The run changes in place, and often: these count the updates of what is drawn of it. */
+  readonly #updates = signal(0);
+  readonly #slowUpdates = signal(0); // of panels with much text
   readonly cursor: Signal<number | null> = signal(null); // the instant shown [ms]; null: now
   /** number of events up to there: several may have the same instant */
   readonly #position: Signal<number | null> = signal(null);
@@ -73,16 +74,36 @@ export class Playback {
 
   /** Whether the instant shown moves by itself: a run is played, or a running one is shown live. */
   readonly goes = computed(() => {
-    this.tick.value;
+    this.watch();
     const { run, facts, connection } = this.#data;
     const isOver = run.now.ended != null || facts.value?.recorded || facts.value?.stale != null;
     return this.playing.value !== null || (this.cursor.value === null && !isOver && connection.value !== "file");
   });
 
-  /** Have all panels drawn again. */
+  /** Have the panel or computed value that calls this updated with the run shown. Returns the number of updates. */
+  watch() {
+    return this.#updates.value;
+  }
+
+  /** The same less often, for a panel with much text. */
+  watchSlowly() {
+    return this.#slowUpdates.value;
+  }
+
+  /** Update who watches. */
+  update() {
+    this.#updates.value += 1;
+  }
+
+  /** Update who watches slowly. */
+  updateSlow() {
+    this.#slowUpdates.value += 1;
+  }
+
+  /** Update all. */
   renew() {
-    this.tick.value += 1;
-    this.slowTick.value += 1;
+    this.update();
+    this.updateSlow();
   }
 
   #show(t: number | null, count: number | null) {

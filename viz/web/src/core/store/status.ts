@@ -18,7 +18,7 @@ export class Status {
   }
 
   readonly activePaths = computed(() => {
-    this.#playback.tick.value;
+    this.#playback.watch();
     return Object.entries(this.#playback.shown().states)
       .filter(([, state]) => state.since != null)
       .map(([path]) => path);
@@ -46,7 +46,7 @@ export class Status {
   });
 
   readonly runStatus = computed(() => {
-    this.#playback.tick.value;
+    this.#playback.watch();
     const data = this.#playback.shown();
     const about = this.#data.facts.value;
     const connection = this.#data.connection.value;
