@@ -9598,6 +9598,24 @@ function outageText({ outages }) {
   return `resumed after ${times}${duration(gone)}`;
 }
 
+// src/core/share.ts
+async function copyText(text2, told = "Copied", otherwise = "mark the text and copy it") {
+  try {
+    await navigator.clipboard.writeText(text2);
+    store.view.notify(told);
+  } catch {
+    store.view.notify(`This browser lets no page copy here: ${otherwise}`, "error");
+  }
+}
+var KEPT_MS = 1e4;
+function saveFile(content, name) {
+  const link2 = document.createElement("a");
+  link2.href = URL.createObjectURL(content);
+  link2.download = name;
+  link2.click();
+  setTimeout(() => URL.revokeObjectURL(link2.href), KEPT_MS);
+}
+
 // src/panels/run_rows.tsx
 var SIGNS = {
   live: "●",
@@ -9823,13 +9841,12 @@ var JournalChip = ({ name, problem }) => /* @__PURE__ */ a4("span", { class: pro
 ] });
 function NoRuns() {
   const text2 = "smachpy run patrol --start-robot --view";
-  const copy2 = () => navigator.clipboard?.writeText(text2).then(() => store.view.notify("copied"));
   return /* @__PURE__ */ a4("div", { class: "empty-list", children: [
     /* @__PURE__ */ a4("p", { children: "No runs yet. Make one:" }),
     /* @__PURE__ */ a4("p", { children: [
       /* @__PURE__ */ a4("code", { children: text2 }),
       " ",
-      /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy" })
+      /* @__PURE__ */ a4("button", { class: "small", onClick: () => copyText(text2), children: "Copy" })
     ] })
   ] });
 }
@@ -10141,7 +10158,7 @@ async function saveFilm(page2) {
   store.playback.filmed.value = 0;
   try {
     const film = await draw(page2, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
-    if (film) save2(film, name);
+    if (film) saveFile(film, name);
   } catch (error) {
     store.view.notify(`No film: ${messageOf(error)}`, "error");
   } finally {
@@ -10237,25 +10254,11 @@ async function styleText() {
   });
   return text2.replace(address, data);
 }
-function save2(content, name) {
-  const link2 = document.createElement("a");
-  link2.href = URL.createObjectURL(content);
-  link2.download = name;
-  link2.click();
-  setTimeout(() => URL.revokeObjectURL(link2.href), 1e4);
-}
 
 // src/panels/notes.tsx
 function ShareButtons({ page: page2 }) {
-  const copy2 = async () => {
-    const address = page2.address.text;
-    try {
-      await navigator.clipboard.writeText(address);
-      store.view.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
-    } catch {
-      store.view.notify("This browser lets no page copy here: the address bar shows the link", "error");
-    }
-  };
+  const told = isFile() ? "Link copied, for who has this file" : "Link copied";
+  const copy2 = () => copyText(page2.address.text, told, "the address bar shows the link");
   const share = () => {
     const saved2 = document.createElement("a");
     saved2.href = link("export", `&format=html&view=${encoded(page2.address.fragment)}`);
@@ -10605,27 +10608,13 @@ function Lines({ title, lines }) {
   ] });
 }
 function WrittenTest({ found }) {
-  const copy2 = async () => {
-    try {
-      await navigator.clipboard.writeText(found.test);
-      store.view.notify("Copied");
-    } catch {
-      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
-    }
-  };
-  const save3 = () => {
-    const link2 = document.createElement("a");
-    link2.href = URL.createObjectURL(new Blob([found.test], { type: "text/x-python" }));
-    link2.download = found.file;
-    link2.click();
-    URL.revokeObjectURL(link2.href);
-  };
+  const save2 = () => saveFile(new Blob([found.test], { type: "text/x-python" }), found.file);
   const outcomes = store.data.model.value?.root.outcomes ?? [];
   return /* @__PURE__ */ a4($, { children: [
     /* @__PURE__ */ a4("p", { class: "again-actions", children: [
       /* @__PURE__ */ a4("b", { children: found.file }),
-      /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy" }),
-      /* @__PURE__ */ a4("button", { class: "small", onClick: save3, children: "Save" }),
+      /* @__PURE__ */ a4("button", { class: "small", onClick: () => copyText(found.test), children: "Copy" }),
+      /* @__PURE__ */ a4("button", { class: "small", onClick: save2, children: "Save" }),
       /* @__PURE__ */ a4("label", { children: [
         "expects",
         " ",
@@ -10965,7 +10954,7 @@ async function copyCard(page2, why) {
       await navigator.clipboard.write([new ClipboardItem({ "image/png": blob })]);
       store.view.notify("Copied");
     } catch {
-      save2(blob, `${page2.fileName()}.png`);
+      saveFile(blob, `${page2.fileName()}.png`);
     }
   } catch (error) {
     store.view.notify(`No card: ${messageOf(error)}`, "error");
@@ -11019,7 +11008,7 @@ async function draw2(page2, why) {
   if (heights.map) g5.drawImage(floor3, EDGE, y5, wide, heights.map);
   const began = why.began === null ? "" : new Date(why.began / 1e6).toISOString().slice(0, 16).replace("T", " ");
   const about = `${store.data.facts.value?.name ?? ""}, began ${began}, made with smachpy`;
-  write2(about, EDGE, height - EDGE, "11px Inter, Arial, sans-serif", "muted");
+  write2(about, EDGE, height - EDGE, FONT, "muted");
   return canvas2;
 }
 
@@ -11107,18 +11096,10 @@ function FactLine({ fact }) {
 function WhyPanel({ page: page2 }) {
   const why = store.data.why.value;
   if (!why) return null;
-  const copy2 = async () => {
-    try {
-      await navigator.clipboard.writeText(why.text);
-      store.view.notify("Copied");
-    } catch {
-      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
-    }
-  };
   const title = why.outcome === null ? "Why has it no end?" : "Why did it end so?";
   return /* @__PURE__ */ a4(Section, { title, children: /* @__PURE__ */ a4("div", { class: "why", children: [
     /* @__PURE__ */ a4("span", { class: "why-tools", children: [
-      /* @__PURE__ */ a4("button", { class: "small", onClick: copy2, children: "Copy as text" }),
+      /* @__PURE__ */ a4("button", { class: "small", onClick: () => copyText(why.text), children: "Copy as text" }),
       /* @__PURE__ */ a4(
         "button",
         {

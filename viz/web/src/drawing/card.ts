@@ -1,11 +1,13 @@
 // The causes of a run's end as a picture to pass on: what happened, the diagram, the map, and which run it was.
 
 import { messageOf } from "#core/requests.ts";
+import { saveFile } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Why } from "#core/types.ts";
-import { pictureOf, save, styleText } from "#drawing/film.ts";
+import { pictureOf, styleText } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";
+import { FONT } from "#drawing/theme.ts";
 
 const WIDTH = 800; // [px]
 const EDGE = 24;
@@ -23,7 +25,7 @@ export async function copyCard(page: Page, why: Why) {
       await navigator.clipboard.write([new ClipboardItem({ "image/png": blob })]);
       store.view.notify("Copied");
     } catch {
-      save(blob, `${page.fileName()}.png`);
+      saveFile(blob, `${page.fileName()}.png`);
     }
   } catch (error) {
     store.view.notify(`No card: ${messageOf(error)}`, "error");
@@ -79,6 +81,6 @@ async function draw(page: Page, why: Why) {
   if (heights.map) g.drawImage(floor, EDGE, y, wide, heights.map);
   const began = why.began === null ? "" : new Date(why.began / 1e6).toISOString().slice(0, 16).replace("T", " ");
   const about = `${store.data.facts.value?.name ?? ""}, began ${began}, made with smachpy`;
-  write(about, EDGE, height - EDGE, "11px Inter, Arial, sans-serif", "muted");
+  write(about, EDGE, height - EDGE, FONT, "muted");
   return canvas;
 }

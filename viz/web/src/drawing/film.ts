@@ -4,6 +4,7 @@ import { makeWorker } from "#core/page_file.ts";
 import type { Stretch } from "#core/playback.ts";
 import { FILM_FRAME_MS, framesOf } from "#core/playback.ts";
 import { messageOf } from "#core/requests.ts";
+import { saveFile } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import type { Page } from "#drawing/page.ts";
 import { isDark } from "#drawing/theme.ts";
@@ -25,7 +26,7 @@ export async function saveFilm(page: Page) {
   store.playback.filmed.value = 0;
   try {
     const film = await draw(page, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
-    if (film) save(film, name);
+    if (film) saveFile(film, name);
   } catch (error) {
     store.view.notify(`No film: ${messageOf(error)}`, "error");
   } finally {
@@ -131,12 +132,4 @@ export async function styleText() {
     reader.readAsDataURL(font);
   });
   return text.replace(address, data);
-}
-
-export function save(content: Blob, name: string) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(content);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

@@ -5,6 +5,7 @@ import { showPage } from "#core/pages.ts";
 import type { Filter } from "#core/run_list.ts";
 import { chosen, countsOf, filterText, SHOWN, SHOWN_NAMES, standing, tally } from "#core/run_list.ts";
 import { refreshRuns } from "#core/run_requests.ts";
+import { copyText } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import { lastWord, shorten } from "#core/text.ts";
 import type { RunRow } from "#core/types.ts";
@@ -103,13 +104,12 @@ const JournalChip = ({ name, problem }: { name: string; problem: string }) => (
 
 function NoRuns() {
   const text = "smachpy run patrol --start-robot --view";
-  const copy = () => navigator.clipboard?.writeText(text).then(() => store.view.notify("copied"));
   return (
     <div class="empty-list">
       <p>No runs yet. Make one:</p>
       <p>
         <code>{text}</code>{" "}
-        <button class="small" onClick={copy}>
+        <button class="small" onClick={() => copyText(text)}>
           Copy
         </button>
       </p>

@@ -3,21 +3,15 @@
 import { useState } from "preact/hooks";
 import { isFile } from "#core/page_file.ts";
 import { encoded, link } from "#core/requests.ts";
+import { copyText } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import { saveFilm } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";
 import { Dialog, fieldValue, Section } from "#panels/components.tsx";
 
 export function ShareButtons({ page }: { page: Page }) {
-  const copy = async () => {
-    const address = page.address.text;
-    try {
-      await navigator.clipboard.writeText(address);
-      store.view.notify(isFile() ? "Link copied, for who has this file" : "Link copied");
-    } catch {
-      store.view.notify("This browser lets no page copy here: the address bar shows the link", "error");
-    }
-  };
+  const told = isFile() ? "Link copied, for who has this file" : "Link copied";
+  const copy = () => copyText(page.address.text, told, "the address bar shows the link");
   const share = () => {
     const saved = document.createElement("a");
     saved.href = link("export", `&format=html&view=${encoded(page.address.fragment)}`);

@@ -14,6 +14,7 @@ import {
   stopReproduction,
   twoRunsShown,
 } from "#core/reproduction.ts";
+import { copyText, saveFile } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import { duration, shorten } from "#core/text.ts";
 import type { Bar, Lane } from "#core/two_runs.ts";
@@ -166,27 +167,13 @@ function Lines({ title, lines }: { title: string; lines: string[] }) {
 }
 
 function WrittenTest({ found }: { found: Found }) {
-  const copy = async () => {
-    try {
-      await navigator.clipboard.writeText(found.test);
-      store.view.notify("Copied");
-    } catch {
-      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
-    }
-  };
-  const save = () => {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([found.test], { type: "text/x-python" }));
-    link.download = found.file;
-    link.click();
-    URL.revokeObjectURL(link.href);
-  };
+  const save = () => saveFile(new Blob([found.test], { type: "text/x-python" }), found.file);
   const outcomes = store.data.model.value?.root.outcomes ?? [];
   return (
     <>
       <p class="again-actions">
         <b>{found.file}</b>
-        <button class="small" onClick={copy}>
+        <button class="small" onClick={() => copyText(found.test)}>
           Copy
         </button>
         <button class="small" onClick={save}>

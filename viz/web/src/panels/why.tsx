@@ -1,6 +1,7 @@
 // The causes of the run's end, from the first one to the outcome; a click on a step goes to its instant.
 
 import { showWhy } from "#core/connection.ts";
+import { copyText } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import type { Cause } from "#core/types.ts";
 import { copyCard } from "#drawing/card.ts";
@@ -11,20 +12,12 @@ import { GoodRunsPart } from "#panels/good_runs.tsx";
 export function WhyPanel({ page }: { page: Page }) {
   const why = store.data.why.value;
   if (!why) return null;
-  const copy = async () => {
-    try {
-      await navigator.clipboard.writeText(why.text);
-      store.view.notify("Copied");
-    } catch {
-      store.view.notify("This browser lets no page copy here: mark the text and copy it", "error");
-    }
-  };
   const title = why.outcome === null ? "Why has it no end?" : "Why did it end so?";
   return (
     <Section title={title}>
       <div class="why">
         <span class="why-tools">
-          <button class="small" onClick={copy}>
+          <button class="small" onClick={() => copyText(why.text)}>
             Copy as text
           </button>
           <button
