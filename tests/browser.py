@@ -11,3 +11,16 @@ def wait_for(page, condition, timeout=30.0):
     while not page.evaluate(f"() => Boolean({condition})"):
         assert time.monotonic() < deadline, f"never true: {condition}"
         page.wait_for_timeout(50)
+
+
+def draw(page):
+    """Wait until the page has drawn what has happened so far."""
+    page.evaluate(
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))"
+    )
+
+
+def hear(page, count):
+    """Wait until the page has got that many more events."""
+    heard = page.evaluate("() => smachpy.store.data.run.events.at(-1)?.seq ?? 0")
+    wait_for(page, f"smachpy.store.data.run.events.at(-1)?.seq >= {heard + count}")

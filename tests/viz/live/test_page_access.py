@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.browser import wait_for
+from tests.browser import draw, wait_for
 from tests.places import ROOT
 
 pytestmark = pytest.mark.browser
@@ -53,7 +53,7 @@ def test_axe_finds_nothing_serious(served, look, size, colours):
     }.items():
         open_it()
         wait_for(page, "document.readyState === 'complete'")
-        page.wait_for_timeout(100)
+        draw(page)
         seen = page.evaluate(
             "() => axe.run({ resultTypes: ['violations'] }).then(({ violations }) => violations)"
         )

@@ -14,7 +14,7 @@ import pytest
 from smachpy import CBState, Concurrence, ConditionState, StateMachine
 from smachpy_viz.live import app, streams
 from smachpy_viz.live.machines import MAX_KEPT_RUNS
-from tests.browser import wait_for
+from tests.browser import draw, wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -205,7 +205,7 @@ def test_the_tree_by_keyboard(served, look):
     def press(*keys):
         for key in keys:
             page.keyboard.press(key)
-        page.wait_for_timeout(50)
+        draw(page)
         return page.evaluate(here)
 
     assert page.evaluate(here) == "/JOB"
@@ -311,15 +311,16 @@ def test_the_machine_chosen_last_is_shown_however_late_the_first_answers(served,
     choose = "(name) => smachpy.choose(name)"
     page.evaluate(choose, "two")
     page.wait_for_selector('g[data-path="/TWO/Z"]')
-    page.evaluate(choose, "one")
-    wait_for(page, "smachpy.store.data.facts.value?.name === 'one'")
+    with page.expect_request("**/api/model?machine=one*"):
+        page.evaluate(choose, "one")
     page.evaluate(choose, "two")
     page.wait_for_selector('g[data-path="/TWO/Z"]')
     wait_for(page, "smachpy.store.data.facts.value?.name === 'two'")
-    page.wait_for_timeout(100)
-    assert len(held) == 1
-    held[0].continue_()
-    page.wait_for_timeout(300)
+    [late] = held
+    with page.expect_response("**/api/model?machine=one*") as answer:
+        late.continue_()
+    answer.value.finished()
+    draw(page)
     assert page.evaluate("() => smachpy.store.data.model.value.root.path") == "/TWO"
     assert page.query_selector('g[data-path="/TWO/Z"]') is not None
 
@@ -382,7 +383,7 @@ def test_clocks_that_differ_do_not_show_as_time_spent(served, look, hours):
         done = [("Iterated", "/JOB/A", {"number": seq, "at": since})]
         machine.add(served.events(done, after=seq))
         seq += 1
-        page.wait_for_timeout(100)
+        draw(page)
     wait_for(
         page, "smachpy.store.playback.nowMs() - smachpy.store.data.run.last() > 200"
     )  # it goes on
