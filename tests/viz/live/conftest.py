@@ -258,7 +258,7 @@ def look(chromium):
         )
         page.goto(address)
         if drawn:
-            page.wait_for_selector("html[data-drawn]", timeout=20_000)
+            page.wait_for_selector("html[data-drawn]", timeout=60_000)
         return page
 
     yield look
@@ -281,7 +281,7 @@ def first_page(chromium, delivery):
         ),
     )
     page.goto(delivery.base + "?machine=delivery")
-    page.wait_for_selector("html[data-drawn]", timeout=20_000)
+    page.wait_for_selector("html[data-drawn]", timeout=60_000)
     yield page
     context.close()
 
