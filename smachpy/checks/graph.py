@@ -68,10 +68,20 @@ class Graph:
     loose: set[int] = field(default_factory=set)
     start: int = 0
     ends: dict[str, int] = field(default_factory=dict)
+    _begins: dict[str, set[int]] = field(default_factory=dict)  # by path
+
+    def add(self, record: StateRecord, outcome: str | None) -> Node:
+        """Add a moment, without successors."""
+        node = Node(len(self.nodes), record, outcome)
+        self.nodes.append(node)
+        self.edges.append([])
+        if outcome is None:
+            self._begins.setdefault(record.path, set()).add(node.number)
+        return node
 
     def begins(self, path: str) -> set[int]:
         """Return the moments at which the state at `path` begins."""
-        return {n.number for n in self.nodes if n.outcome is None and n.record.path == path}
+        return set(self._begins.get(path, ()))
 
     def after(self, number: int, *, preempt: bool = True, framework: bool = True) -> Iterator[int]:
         """Yield the possible successors of a moment.
@@ -341,10 +351,7 @@ class _Builder:
             self._edge(part.enter, part.ends[PREEMPTED], preempt=True, framework=True)
 
     def _node(self, record: StateRecord, outcome: str | None) -> Node:
-        node = Node(len(self.graph.nodes), record, outcome)
-        self.graph.nodes.append(node)
-        self.graph.edges.append([])
-        return node
+        return self.graph.add(record, outcome)
 
     def _edge(
         self, source: Node, target: Node, *, preempt: bool = False, framework: bool = False

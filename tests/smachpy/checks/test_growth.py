@@ -10,6 +10,7 @@ import pytest
 
 import smachpy
 from smachpy import CBState, Concurrence, StateMachine
+from smachpy.checks import graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,6 +78,23 @@ def wide(size: int) -> Concurrence:
     for number in range(size):
         both.add(f"S{number}", CBState(work, outcomes=["ok"]))
     return both
+
+
+def test_where_a_state_begins_is_found_without_a_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[graph.Graph] = []
+    real = graph.Graph
+
+    def keep() -> graph.Graph:
+        made.append(real())
+        return made[-1]
+
+    monkeypatch.setattr(graph, "Graph", keep)
+    smachpy.check(chain(5))
+    found = made[0]
+    begins = {node.record.path: {node.number} for node in found.nodes if node.outcome is None}
+    found.nodes.clear()
+    assert {path: found.begins(path) for path in begins} == begins
+    assert found.begins("/BIG/OTHER") == set()
 
 
 @pytest.mark.parametrize("make", [chain, ring, unset, wide])
