@@ -58,7 +58,6 @@ from actionlib_core.transport.zenoh._declared import (
     Subscriber,
     Token,
     kept,
-    undeclare,
 )
 from actionlib_core.transport.zenoh._process import process
 from actionlib_core.transport.zenoh._shared import Watches
@@ -293,12 +292,15 @@ class ZenohTransport:
         try:
             with inside:
                 liveliness = self.session.liveliness()
-                history = liveliness.declare_subscriber(
-                    pattern, direct(on_token, freed.set), history=True
-                )
+                history = [
+                    liveliness.declare_subscriber(
+                        pattern, direct(on_token, freed.set), history=True
+                    )
+                ]
                 liveliness.get(pattern, direct(on_reply, done.set), timeout=timeout)
             done.wait(timeout)
-            undeclare(history)
+            with inside:  # where it is freed, too, see `Declared.close`
+                history.pop().undeclare()  # type: ignore[no-untyped-call]  # zenoh's stub
             freed.wait(max(0.0, deadline - self.clock.now()))
         except zenoh.ZError as error:
             raise TransportError(f"{pattern}: cannot ask: {error}") from error

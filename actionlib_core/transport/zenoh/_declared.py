@@ -56,16 +56,6 @@ class _Undeclarable(Protocol):
     def undeclare(self) -> Any: ...
 
 
-def undeclare(handle: _Undeclarable) -> None:
-    """Undeclare what was declared, unless the session or the interpreter does it at its end."""
-    try:
-        # It fails only if the session was closed in the meantime, which undeclares all.
-        with inside, contextlib.suppress(zenoh.ZError):
-            handle.undeclare()
-    except TransportError:
-        kept.append(handle)
-
-
 class Declared:
     """A declaration of a session, which keeps it until it is closed."""
 
@@ -79,9 +69,21 @@ class Declared:
 
     def close(self) -> None:
         self._inlet.closed = True
-        if self._transport.forget(self):
-            for handle in reversed(self._handles):
-                undeclare(handle)
+        if not self._transport.forget(self):
+            return
+        try:
+            # It frees the objects within `inside`, too: that releases the GIL for a moment.
+            with inside:
+                while self._handles:
+                    # It fails only if the session was closed meanwhile, which undeclares all.
+                    with contextlib.suppress(zenoh.ZError):
+                        self._handles.pop().undeclare()
+                self._free()
+        except TransportError:
+            kept.append(self)
+
+    def _free(self) -> None:
+        """Drop further references to Zenoh's objects."""
 
 
 class Publisher(Declared):
@@ -109,6 +111,9 @@ class Publisher(Declared):
         self._inlet.closed = True
         if not self._users:
             super().close()
+
+    def _free(self) -> None:
+        del self._port  # nobody uses it once this is closed
 
     def _check_open(self) -> None:
         process.check(self._key)
@@ -276,6 +281,10 @@ class CachingPublisher(Publisher):
             ),
         )
         self._keep(self._cache)
+
+    def _free(self) -> None:
+        super()._free()
+        del self._cache
 
     def _send(self, payload: bytes, attachment: bytes | None) -> None:
         self._cache.put(payload, attachment=attachment)
