@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces._sources import BUNDLED
+from smachpy.base.problems import unknown_name
 from smachpy.command.arguments import Text, parameters_of, read_words
 from smachpy.command.durable import whole_target
 from smachpy.command.targets import MISSION_FILES, PLANS, load_target
@@ -93,10 +94,11 @@ def write_test(
         recording: The recording.
         mission: The mission, as for `reproduce`.
         allow: As for `reproduce`.
-        expect: The outcome that the mission ought to have had: the test fails until it is mended.
+        expect: The outcome that the mission ought to have had, one of its outcomes: the test fails
+            until it is mended.
 
     Raises:
-        ReproductionError: the recording does not say enough.
+        ReproductionError: the recording does not say enough, or `expect` is no outcome.
 
     Blocks: until it is shortened, `MOST_S` at most.
     """
@@ -106,11 +108,14 @@ def write_test(
     make = maker(recording, mission, allow)
     try:
         with MissionKit():
-            check_machine(recording, events[0]["path"], describe(make()))
+            record = describe(make())
+            check_machine(recording, events[0]["path"], record)
     except ReproductionError:
         raise
     except (SmachError, ActionlibError) as error:
         raise ReproductionError(recording.path, str(error)) from error
+    if expect and expect not in record.outcomes:
+        raise ReproductionError(recording.path, unknown_name("expect", expect, record.outcomes))
     world = world_of(recording)
     recorded = _recorded_way(recording, events)
     namespace = str(recording.origin.get("namespace") or "")

@@ -634,6 +634,17 @@ def test_expect_needs_a_file_to_write(night, capsys):
     assert "--expect: got it without -o" in capsys.readouterr().err
 
 
+def test_an_expected_outcome_that_the_machine_does_not_have_writes_no_test(night, tmp_path, capsys):
+    _, path = night
+    test = tmp_path / "test_incident.py"
+    words = [str(path), f"--allow={path.parent}", "-o", str(test), "--expect", "suceeded"]
+    assert main(["runs", "reproduce", *words]) == 2
+    error = capsys.readouterr().err
+    assert "expect: got 'suceeded'; expected one of [" in error
+    assert "Did you mean 'succeeded'?" in error
+    assert not test.exists()
+
+
 def test_results_of_once_come_from_the_recording(tmp_path):
     dice = iter(range(100))
 
