@@ -25,9 +25,10 @@ if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
 # Runs that are viewed are kept, but not those of tests; a folder that cannot be made keeps none.
 os.environ["SMACHPY_RUNS"] = os.devnull
 
-# A shell's background job ignores Ctrl-C and SIGQUIT, and so would all that it starts.
+# A shell's background job ignores Ctrl-C and SIGQUIT, a job of `nohup` SIGHUP, and so would all that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGQUIT, signal.SIG_DFL)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # A busy computer is no failure: pytest's timeout is the only one.
 settings.register_profile(
