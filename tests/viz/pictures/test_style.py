@@ -131,3 +131,21 @@ def test_taken_arrows_are_thick_and_counted():
     assert float(taken["penwidth"]) > 2
     assert "a&#160;\u00d72" in taken["label"]
     assert spare["color"] != taken["color"]
+
+
+@pytest.mark.parametrize("taken", [0, 1, 3])
+@pytest.mark.parametrize("labelled", [True, False])
+def test_an_arrow_with_a_condition_has_no_empty_font(taken, labelled):
+    """Graphviz 2.43 drew no picture: a syntax error."""
+    look = style.transition(
+        ["done", "failed"],
+        STATE,
+        LIGHT,
+        Marks(),
+        counts={"done": taken},
+        labelled=labelled,
+        implicit=False,
+        remark="x above 1",
+    )
+    assert "></font>" not in look["label"]
+    assert "x above 1" in look["label"]

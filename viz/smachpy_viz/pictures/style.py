@@ -284,6 +284,7 @@ def transition(
         attributes |= {"penwidth": f"{wide:.2g}"}
     if labelled or taken > 1 or remark:
         lines = [_outcome_line(o, node, theme, marks, counts, labelled=labelled) for o in outcomes]
+        lines = [line for line in lines if line] or [""]
         if remark:
             lines[-1] += f'<font color="{theme.muted}">&#160;{markup(remark)}</font>'
         attributes["label"] = _beside(lines)
@@ -418,8 +419,8 @@ def _outcome_line(
     found = end_class(node.kind, outcome, node.success)
     plain_ink = found == "other" or (marks.has_run and not count)
     ink = theme.muted if plain_ink else theme.outcome(found).text
-    name = markup(outcome) if labelled else ""
-    return f'<font color="{ink}">{name}{_times(count)}</font>'
+    text = f"{markup(outcome) if labelled else ''}{_times(count)}"
+    return f'<font color="{ink}">{text}</font>' if text else ""  # some Graphviz takes no empty one
 
 
 def _identity(node: Node, diagram: Diagram) -> dict[str, str]:

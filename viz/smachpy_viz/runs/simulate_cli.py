@@ -284,7 +284,7 @@ class _RunCounter:
         if self._shown:
             rate = self._done / max(1e-3, self._clock.now() - self._begun)
             done = f"{self._done:d} of {self._runs:d} runs, {rate:.2g} per s"
-            sys.stderr.write(f"\r{done}{self._processes}\x1b[K")
+            sys.stderr.write(f"\r{printable(done + self._processes)}\x1b[K")
             sys.stderr.flush()
 
     def end(self) -> None:
