@@ -117,6 +117,8 @@ def test_a_server_restarts_under_a_running_mission(
 
 def crash_after(server: PostgresServer, kill_at: int) -> bool:
     """Crash the server after that statement of one of four runners; return whether it came to it."""
+    import psycopg
+
     url = server.new_database(f"queue_{kill_at}")
     names = [f"m{n}" for n in range(8)]
     with contextlib.closing(open_store(url)) as store:
@@ -127,7 +129,7 @@ def crash_after(server: PostgresServer, kill_at: int) -> bool:
     left = [kill_at]
     barrier = threading.Barrier(4)
 
-    def runner(left: list[int] | None) -> None:
+    def runner(left: list[int] | None, *, alone: bool = False) -> None:
         with contextlib.closing(open_store(url, patience=PATIENCE_S)) as store:
             do = store._do
 
@@ -142,7 +144,8 @@ def crash_after(server: PostgresServer, kill_at: int) -> bool:
 
             if left is not None:
                 store._do = counted
-            barrier.wait(PATIENCE_S)
+            if not alone:
+                barrier.wait(PATIENCE_S)
             while (found := store.reserve(this_runner(), seconds=LONG_S)) is not None:
                 row, lease = found
                 lease = store.claim(row.id, this_runner(), seconds=LONG_S, reserved=lease)
@@ -155,6 +158,18 @@ def crash_after(server: PostgresServer, kill_at: int) -> bool:
         thread.start()
     for thread in threads:
         thread.join(4 * PATIENCE_S)
+        assert not thread.is_alive()
+    # A runner whose answer was lost with the server has a reservation of which it does not know.
+    lost = sorted(set(names) - set(ran))
+    with psycopg.connect(url, autocommit=True) as connection:
+        ended = connection.execute(
+            "UPDATE smachpy_missions SET lease_end = 0 "
+            "WHERE owner IS NOT NULL AND status = 'queued' RETURNING id"
+        )
+        assert sorted(row[0] for row in ended) == lost
+    with contextlib.closing(open_store(url)) as store:
+        store.look()
+    runner(None, alone=True)
     assert sorted(ran) == names
     with contextlib.closing(open_store(url)) as store:
         assert {row.status for row in store.missions()} == {"ended"}

@@ -53,6 +53,11 @@ def recorded(mission, path, *options):
     return read_recording(path)
 
 
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # photos
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("mission", VIRTUAL)
 def test_a_shipped_mission_recorded_in_virtual_time_is_reproduced(mission, tmp_path):

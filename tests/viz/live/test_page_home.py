@@ -254,12 +254,12 @@ def test_live_runs_together_have_cards_lanes_and_one_map(served, look):
     page = look(served.start(home=True), drawn=False)
     page.click("button:has-text('Fleet')")
     page.wait_for_selector(".fleet-map canvas")
-    assert page.locator(".fleet .cards button").count() == 2
-    assert page.locator(".fleet .lanes rect.active").count() == 2
+    for part in (".cards button", ".lanes rect.active"):
+        page.wait_for_function(f"() => document.querySelectorAll('.fleet {part}').length === 2")
     assert "<b>two" in page.locator(".fleet .cards").inner_text()
     page.wait_for_function(
         "() => document.querySelector('.fleet-map canvas').getAttribute('aria-label')"
     )
     page.click(".fleet .cards button:has-text('two')")
     page.wait_for_function("() => smachpy.store.data.facts.value?.name === '<b>two'")
-    assert page.query_selector(".fleet") is None
+    page.wait_for_selector(".fleet", state="detached")
