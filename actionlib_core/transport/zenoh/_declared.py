@@ -71,6 +71,7 @@ class Declared:
         self._inlet.closed = True
         if not self._transport.forget(self):
             return
+        self._before_close()
         try:
             # It frees the objects within `inside`, too: that releases the GIL for a moment.
             with inside:
@@ -81,6 +82,9 @@ class Declared:
                 self._free()
         except TransportError:
             kept.append(self)
+
+    def _before_close(self) -> None:
+        """Do what comes before it is undeclared; called once."""
 
     def _free(self) -> None:
         """Drop further references to Zenoh's objects."""
@@ -590,14 +594,17 @@ class Token(Declared):
     def __init__(self, transport: ZenohTransport, key: str) -> None:
         super().__init__(transport)
         self._key = key
-        self._keep(transport.session.liveliness().declare_token(key))
+        # Before the network can tell the watches of this session, which else take this token for
+        # the former one of its name, of whose end they have not heard.
         transport.watches.note_own(key, 1)
+        try:
+            self._keep(transport.session.liveliness().declare_token(key))
+        except BaseException:
+            transport.watches.note_own(key, -1)
+            raise
 
-    def close(self) -> None:
-        was_open = not self._inlet.closed
-        super().close()
-        if was_open:
-            self._transport.watches.note_own(self._key, -1)
+    def _before_close(self) -> None:
+        self._transport.watches.note_own(self._key, -1)
 
 
 def _convert_encoding(raw: zenoh.Encoding) -> str:

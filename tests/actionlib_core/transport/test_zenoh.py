@@ -713,3 +713,23 @@ def test_a_thousand_watches_of_single_names_have_few_subscribers():
         assert transport.watches.known("@test/*/7") == []
     finally:
         transport.close()
+
+
+def test_own_tokens_are_noted_before_the_network_tells_of_them(monkeypatch):
+    """A token that was declared again just after its end was sometimes not heard by own watches."""
+    transport = ZenohTransport(Config(discovery="off"))
+    try:
+        note, seen = transport.watches.note_own, []
+
+        def noted(key, change):
+            answers = transport.session.liveliness().get(key, timeout=WAIT_S)
+            seen.append((change, [str(answer.ok.key_expr) for answer in answers]))
+            note(key, change)
+
+        monkeypatch.setattr(transport.watches, "note_own", noted)
+        token = transport.declare_alive("@test/a/1")
+        token.close()
+        token.close()
+        assert seen == [(1, []), (-1, ["@test/a/1"])]
+    finally:
+        transport.close()
