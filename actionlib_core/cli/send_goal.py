@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
@@ -102,23 +103,33 @@ def _drive(
 ) -> int:
     if not args.json:
         print_message("Sending goal:", goal)
-    handle: SentGoal[Any, Any] = client.send(goal, timeout=timeout)
+    sent: list[SentGoal[Any, Any]] = []
     interrupted: KeyboardInterrupt | None = None
     timed_out = False
     with while_read():
         try:
-            _follow(handle, args)
+            # In a thread, as a signal interrupts this one only: else the goal may be at the server
+            # and nobody here knows it.
+            with ThreadPoolExecutor(1) as pool:
+                pool.submit(lambda: sent.append(client.send(goal, timeout=timeout))).result()
+            _follow(sent[0], args)
         except KeyboardInterrupt as error:  # Ctrl-C or `Terminated`; raised again after the cancel
+            if not sent:
+                raise
             interrupted = error
-            _cancel(handle, args)
+            _cancel(sent[0], args)
         except TimeoutError:
+            if not sent:
+                raise
             timed_out = True
-            _cancel(handle, args)
+            _cancel(sent[0], args)
         except BaseException:  # for example, the reader of the output is gone
             # A robot must not go on with a goal that no program follows any more.
-            handle.cancel()
-            handle.wait(CANCEL_S)
+            for handle in sent:
+                handle.cancel()
+                handle.wait(CANCEL_S)
             raise
+        handle = sent[0]
         _print_end(handle, args)
     # On standard error, as standard output may be read by a program.
     if timed_out:
