@@ -177,8 +177,15 @@ class SimpleActionClient(Generic[A_co]):
             TypeMismatchError: the action's server has another type.
             TransportError: the client is stopped.
         """
-        make = partial(self.action_client.make_goal, cancel_on_client_lost=cancel_on_client_lost)
-        self._begin(make, goal, done_cb, active_cb, feedback_cb, ack_timeout)
+        self._begin(
+            self.action_client.make_goal,
+            goal,
+            done_cb,
+            active_cb,
+            feedback_cb,
+            ack_timeout,
+            cancel_on_client_lost=cancel_on_client_lost,
+        )
 
     def attach(
         self: SimpleActionClient[Spec[G, R, F]],
@@ -199,19 +206,20 @@ class SimpleActionClient(Generic[A_co]):
 
     def _begin(
         self,
-        make: Callable[[Any, float | None], ClientGoalHandle],
+        make: Callable[..., ClientGoalHandle],
         goal: Any,
         done_cb: Callable[[int, Any], object] | None,
         active_cb: Callable[[], object] | None,
         feedback_cb: Callable[[Any], object] | None,
         ack_timeout: float | Duration | None,
+        **options: bool,
     ) -> None:
         """Send a goal, or query the server for it, and follow it instead of the previous one."""
         where = f"action '{self.action_client.ns}'"
         if done_cb is not None or active_cb is not None or feedback_cb is not None:
             check_functions(where, done_cb=done_cb, active_cb=active_cb, feedback_cb=feedback_cb)
         limit = None if ack_timeout is None else check_limit(where, "ack_timeout", ack_timeout)
-        handle = make(goal, limit)
+        handle = make(goal, limit, **options)
         # Without callbacks, no thread is needed for them: the network's thread wakes the waiters.
         if done_cb is not None or active_cb is not None or self._condition is not None:
             handle.on_state = self._make_on_state(handle, done_cb, active_cb)
