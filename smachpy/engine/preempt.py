@@ -65,8 +65,12 @@ PATIENCE_S = 0.1  # time for an interrupted state to unwind its `finally` blocks
 MAX_PATIENCE_S = 1.0  # between two interruptions of a thread that cannot be left behind
 
 
-ANSWER_S = 0.1
+ANSWER_S = 0.25
 """Longest wait of a request in the main thread until another thread has passed it on [s]."""
+
+ANSWER_LOOKS = 50
+"""Looks at the answer in `ANSWER_S`. Between two of them the other thread can run. One long wait
+would be over at once if the computer had been too busy for both threads."""
 
 FLAGS = threading.RLock()
 """Held to set or read the flag of a state together with what follows from it outside of a visit:
@@ -656,7 +660,7 @@ def request_now(container: Parent, by: str = "") -> None:
         except RuntimeError:  # no thread can be started, at the interpreter's exit for one
             ask_it()
         else:
-            told.wait(ANSWER_S)
+            any(told.wait(ANSWER_S / ANSWER_LOOKS) for _ in range(ANSWER_LOOKS))
     else:
         ask_it()
 

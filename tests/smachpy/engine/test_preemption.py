@@ -172,7 +172,8 @@ def nested_and_deaf():
     reason="Debian's Python 3.11.2 itself ends with a segmentation fault while it traces threads",
 )
 @pytest.mark.parametrize("watched", [False, True])
-def test_preempt_at_every_line_of_the_machinery(watched):
+def test_preempt_at_every_line_of_the_machinery(watched, monkeypatch):
+    monkeypatch.setattr(preempt, "ANSWER_S", 0.02)  # waited in vain at each line that holds a lock
     n = 0
     cuts = Counter()
     sm = nested_and_deaf()
@@ -226,6 +227,30 @@ def test_request_of_the_main_thread_that_is_passed_on_late_never_meets_another_r
     assert_clean(sm)
     assert [*found, sm.execute()] == outcomes
     assert held == []
+
+
+def test_request_of_the_main_thread_waits_on_although_one_wait_was_too_short(monkeypatch):
+    """On a busy computer, all the time was over before the other thread had run at all."""
+    held, waits = [], []
+
+    class Busy:
+        def set(self):
+            pass
+
+        def wait(self, seconds):
+            waits.append(seconds)
+            if len(waits) == 3:
+                held.pop()()
+            return not held
+
+    sm = chain(Work(0.0))
+    with monkeypatch.context() as patch:
+        patch.setattr(RealClock, "event", lambda _clock: Busy())
+        patch.setattr(RealClock, "spawn", lambda _clock, target, **_: held.append(target))
+        sm.request_preempt()
+    assert sm.preempt_requested()
+    assert len(waits) == 3
+    assert max(waits) < preempt.ANSWER_S / 10
 
 
 @pytest.mark.parametrize(
