@@ -10,8 +10,10 @@ from actionlib_core.process.output import printable
 from smachpy.checks import check
 from smachpy.checks.report import FORMATS
 from smachpy.checks.suppression import read_settings
+from smachpy.command.queued import add_allow_packages
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import load_any
+from smachpy.command.run import add_input, built_to_look
 from smachpy.exceptions import did_you_mean
 
 if TYPE_CHECKING:
@@ -46,13 +48,8 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="RULE",
         help="switch on a rule that is off by default: no-timeout (repeatable)",
     )
-    parser.add_argument(
-        "--allow",
-        action="append",
-        default=[],
-        metavar="PACKAGE",
-        help="the packages that `smachpy run` of a mission file will be allowed (repeatable)",
-    )
+    add_input(parser)
+    add_allow_packages(parser)
     parser.add_argument("--pictures", metavar="FOLDER", help="draw the runs that show problems")
     add_ros1_options(parser, loads=True)
     parser.set_defaults(run=run)
@@ -85,7 +82,7 @@ def _tell_unused(settings: Settings, checked: list[str]) -> None:
 
 def _check(text: str, args: argparse.Namespace, settings: Settings) -> Report:
     target = load_any(text, args)
-    machine = target.build()
+    machine = built_to_look(target, args)
     name = machine.name or target.name
     own = [p for machine_name, texts in settings.properties if machine_name == name for p in texts]
     return check(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.process.output import printable
 from smachpy.command import UsageError
+from smachpy.command.run import add_input, built_to_look
 from smachpy.command.targets import load_target
 
 if TYPE_CHECKING:
@@ -32,17 +33,18 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         default="pnp",
         help="pnp: for the tools of PNP; 2009: PNML 2009, for others (default: %(default)s)",
     )
+    add_input(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the file."""
     if args.output is not None:
-        return _write_file(args.target, args.output)
+        return _write_file(args)
     from smachpy.pnp.export import export_net
     from smachpy.pnp.pnml import write_pnml
 
-    exported = export_net(load_target(args.target, imports=False).build())
+    exported = export_net(built_to_look(load_target(args.target, imports=False), args))
     try:
         print(printable(write_pnml(exported.net, args.pnml, dialect=args.dialect)))
     except OSError as error:
@@ -52,12 +54,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_file(target: str, output: str) -> int:
+def _write_file(args: argparse.Namespace) -> int:
     """Write a mission file."""
     from smachpy.files import NotWrittenError, write
     from smachpy.machines.state_machine import StateMachine
 
-    machine = load_target(target, imports=False).build()
+    target, output = args.target, args.output
+    machine = built_to_look(load_target(target, imports=False), args)
     if type(machine) is not StateMachine:
         got = type(machine).__name__
         raise UsageError(f"smachpy export: got a {got}; expected a state machine for a file.")

@@ -20,7 +20,7 @@ from actionlib_core.process.output import printable, tell
 from smachpy.command import EXIT_ERROR
 from smachpy.command.durable import JOURNAL, LEASE_S, whole_target, words_of
 from smachpy.command.pruning import add_keep, age, is_kept
-from smachpy.command.queued import Allowed, add_allow, run_words
+from smachpy.command.queued import Allowed, add_allow, add_allow_packages, run_words
 from smachpy.command.run import add_input, add_require_evidence, read_inputs
 from smachpy.command.warm import Starter
 from smachpy.durable.store import for_child, store_name
@@ -96,6 +96,7 @@ def register_submit(subparsers: Any) -> None:
         metavar="NAME",
         help="one mission of a group runs at a time, such as those that use the lift",
     )
+    add_allow_packages(parser)
     parser.set_defaults(run=_submit, words=())
 
 
@@ -177,7 +178,8 @@ def _submit(args: argparse.Namespace) -> int:
         raise MissionError(f"--not-after: got {got}; expected {expected}.")
     if args.every is not None:
         due = next_due(args.every, now)
-    machine = build(load_target(args.target), read_inputs(args.input), args.words, kept=True)
+    target = load_target(args.target, allow=args.allow)
+    machine = build(target, read_inputs(args.input), args.words, kept=True)
     space = robot or load_config().namespace
     names = [resolve_name(name, namespace=space) for name in needed_servers(describe(machine))]
     row = dataclasses.replace(

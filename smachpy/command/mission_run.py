@@ -183,7 +183,12 @@ def show_run(record: StateRecord, options: RunOptions) -> Any:
 
 
 def build(
-    target: Target, inputs: Mapping[str, object], words: Sequence[str] = (), *, kept: bool = False
+    target: Target,
+    inputs: Mapping[str, object],
+    words: Sequence[str] = (),
+    *,
+    kept: bool = False,
+    to_run: bool = True,
 ) -> Container:
     """Build the machine.
 
@@ -192,6 +197,7 @@ def build(
         inputs: Arguments of its function, or values of its userdata keys, by name.
         words: Arguments of its function, the words after `--`.
         kept: They are kept in a journal or queue, where no secret is to be.
+        to_run: False to look at it only: input keys need no values.
 
     Raises:
         MissionError: an argument does not fit, is missing or unknown.
@@ -209,7 +215,7 @@ def build(
         if key not in parameters:
             machine.userdata[key] = _fit_userdata(machine, key, value, kept=kept)
     missing = sorted(key for key in keys if key not in machine.userdata)
-    if missing:
+    if missing and to_run:
         raise MissionError(
             f"mission {target.name!r}: input keys {missing} have no value; expected one for each. "
             f"Try --input {missing[0]}=VALUE."

@@ -14,6 +14,17 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add `--allow`."""
+    parser.getgroup("smachpy").addoption(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="PACKAGE",
+        help="let a mission file name code of this package, as for smachpy run (repeatable)",
+    )
+
+
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Take the mission files that are named on the command line."""
     if file_path.suffix not in MISSION_FILES or not parent.session.isinitpath(file_path):
@@ -50,7 +61,7 @@ class Checked(_Item):
         from smachpy.checks import check
         from smachpy.files import load
 
-        check(load(self.path)).assert_ok()
+        check(load(self.path, allow=self.config.getoption("allow"))).assert_ok()
 
 
 class Explored(_Item):

@@ -56,6 +56,18 @@ def add_allow(parser: Any, why: str) -> None:
     )
 
 
+def add_allow_packages(parser: Any) -> None:
+    """Add the option `--allow` of commands that a person gives a mission file."""
+    parser.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="PACKAGE",
+        help="let a mission file name code of this package, besides modules in its own folder "
+        "(repeatable)",
+    )
+
+
 class Allowed:
     """The missions that a row may name: the installed ones, and those of some places.
 

@@ -20,6 +20,7 @@ from smachpy.command.arguments import Text, parameters_of, read_words, usage, wa
 from smachpy.command.durable import add_options as add_durable_options
 from smachpy.command.durable import durable_options
 from smachpy.command.logs import add_log_options, logging_as
+from smachpy.command.queued import add_allow_packages
 from smachpy.command.robot import add_robot_options
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import options_of
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from smachpy.command.mission_run import RunOptions
     from smachpy.command.surroundings import Pace, RobotOptions
     from smachpy.command.targets import Target
+    from smachpy.machines.container import Container
 
 
 def register_list(subparsers: Any) -> None:
@@ -148,14 +150,7 @@ def register(subparsers: Any) -> None:
     )
     # For what rows of a store name; the target on the command line is then only shown.
     parser.add_argument("--queued", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument(
-        "--allow",
-        action="append",
-        default=[],
-        metavar="PACKAGE",
-        help="let a mission file name code of this package, besides modules in its own folder "
-        "(repeatable)",
-    )
+    add_allow_packages(parser)
     add_require_evidence(parser)
     parser.set_defaults(run=_run, words=())
 
@@ -437,6 +432,18 @@ def add_input(parser: argparse.ArgumentParser) -> None:
         type=_read_input,
         help="an argument of the mission's function by name, or a userdata key",
     )
+
+
+def built_to_look(target: Target, args: argparse.Namespace) -> Container:
+    """Return a machine that is only looked at, with the arguments of `--input`, if there are any.
+
+    Raises:
+        MissionError, TargetError: it cannot be made.
+    """
+    from smachpy.command.mission_run import build
+
+    inputs = read_inputs(args.input)
+    return build(target, inputs, to_run=False) if inputs else target.build()
 
 
 def read_inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:

@@ -12,6 +12,7 @@ from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.process.output import printable
 from smachpy.command import UsageError
 from smachpy.command.ros1_options import add_options as add_ros1_options
+from smachpy.command.run import add_input, built_to_look
 
 if TYPE_CHECKING:
     from smachpy.events.introspection import StateRecord
@@ -79,6 +80,7 @@ def register_render(
         default="time",
         help="the statistic of --runs by which states are coloured (default: %(default)s)",
     )
+    add_input(parser)
     add_ros1_options(parser, loads=True)
     parser.set_defaults(run=_run)
 
@@ -156,7 +158,7 @@ def read_record(text: str, args: argparse.Namespace | None = None) -> StateRecor
 
     if not text.endswith(".json"):
         target = load_target(text, imports=False) if args is None else load_any(text, args)
-        return describe(target.build())
+        return describe(target.build() if args is None else built_to_look(target, args))
     try:
         return StateRecord.from_json(read_limited(text, json_text.MAX_JSON_LENGTH).decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:

@@ -162,7 +162,7 @@ def test_a_factory_that_gives_no_machine_is_an_error(file):
 
 def test_a_factory_that_needs_arguments_is_named_with_them_where_there_are_none():
     target = Target("go", "here:go", "", lambda robot, x, y=0.0, **more: None)
-    with pytest.raises(TargetError, match=r"here:go needs robot, x; expected .* Try a function"):
+    with pytest.raises(TargetError, match=r"here:go needs robot, x; expected .* or a function"):
         target.build()
 
 

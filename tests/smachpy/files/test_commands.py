@@ -71,6 +71,50 @@ def test_simulate_takes_a_file_and_the_packages_that_it_may_name(folder, capsys)
     assert "done x2" in capsys.readouterr().out
 
 
+NAMES_CODE = """\
+outcomes: [done, preempted]
+states:
+  A: {state: 'smachpy.states:Wait', with: {seconds: 0.0}, on: {done: done}}
+"""
+
+
+def test_submit_and_its_runner_take_the_packages_that_a_file_may_name(folder, capsys):
+    (folder / "code.yaml").write_text(NAMES_CODE)
+    words = ["submit", "code.yaml", "--db", "queue.db"]
+    assert main(words) == 2
+    assert "Try --allow smachpy" in capsys.readouterr().err
+    assert main([*words, "--mission", "m1", "--allow", "smachpy"]) == 0
+    capsys.readouterr()
+    # What the computer that runs it allows counts there, and the row does not say it.
+    queued = ["run", "x", "--queued", "--durable", "queue.db", "--mission", "m1", "--plain"]
+    assert main([*queued, f"--allow={folder}"]) == 2
+    assert "Try --allow smachpy" in capsys.readouterr().err
+    assert main([*queued, f"--allow={folder}", "--allow=smachpy"]) == 0
+
+
+@pytest.mark.slow
+def test_test_takes_the_packages_that_a_file_may_name(folder):
+    (folder / "code.yaml").write_text(NAMES_CODE)
+    command = [sys.executable, "-m", "smachpy.command", "test", "-q", "code.yaml"]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode == 1
+    assert "Try --allow smachpy" in refused.stdout
+    allowed = [*command, "--allow", "smachpy"]
+    assert subprocess.run(allowed, capture_output=True, check=False).returncode == 0
+
+
+def test_a_file_with_a_required_parameter_is_checked_drawn_and_exported(folder, capsys):
+    text = GOOD.replace("seconds: {type: number, default: 2.0", "seconds: {type: number")
+    assert text != GOOD
+    (folder / "rounds.yaml").write_text(text)
+    for words in (["check"], ["render", "-o", "a.svg"], ["export", "-o", "b.yaml"]):
+        assert main([words[0], "rounds.yaml", *words[1:]]) == 2
+        assert "Try --input seconds=VALUE" in capsys.readouterr().err
+        assert main([words[0], "rounds.yaml", *words[1:], "--input", "seconds=3"]) == 0
+    assert main(["check", "rounds.yaml", "--input", "seconds=long"]) == 2
+    assert "--input seconds: got 'long'" in capsys.readouterr().err
+
+
 def test_states_are_listed_and_shown(capsys):
     assert main(["states", "list"]) == 0
     assert "drive_to" in capsys.readouterr().out

@@ -14,6 +14,7 @@ from actionlib_core.clock import RealClock
 from actionlib_core.command_line.numbers import between, seconds
 from actionlib_core.process.output import printable
 from smachpy.command import UsageError
+from smachpy.command.queued import add_allow_packages
 from smachpy.command.run import add_input, read_inputs
 from smachpy.userdata.secret import MASK, hides, holds_secret
 
@@ -94,13 +95,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--jobs", type=between(1), metavar="N", help="at the same time (default: all cores)"
     )
-    parser.add_argument(
-        "--allow",
-        action="append",
-        default=[],
-        metavar="PACKAGE",
-        help="as for `smachpy run`: packages of which a mission file may name code (repeatable)",
-    )
+    add_allow_packages(parser)
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="a new file, .json"
     )

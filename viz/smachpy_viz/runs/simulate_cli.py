@@ -17,6 +17,7 @@ from actionlib_core.process.output import printable
 from actionlib_core.process.private_files import make_private_folder
 from smachpy.base.workers import cores
 from smachpy.command import UsageError
+from smachpy.command.queued import add_allow_packages
 from smachpy.command.run import time_span
 
 if TYPE_CHECKING:
@@ -91,13 +92,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         help="a function that returns the concurrent.futures.Executor for the runs, such as that "
         "of a cluster (default: processes on this computer)",
     )
-    parser.add_argument(
-        "--allow",
-        action="append",
-        default=[],
-        metavar="PACKAGE",
-        help="as for `smachpy run`: packages of which a mission file may name code (repeatable)",
-    )
+    add_allow_packages(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object per run, for programs")
     parser.add_argument(
         "--record", type=Path, metavar="DIR", help="keep the recordings in this new folder"
