@@ -127,7 +127,8 @@ class Target:
             raise TargetError(
                 self.name,
                 f"{self.source} needs {', '.join(missing)}; expected what needs no arguments. "
-                f"Try --input {missing[0]}=VALUE, or a function of your own that calls it with some.",
+                f"Try --input {missing[0]}=VALUE, or a function of your own that calls it with "
+                "some.",
             )
         try:
             signature.bind(**arguments)
