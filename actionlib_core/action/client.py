@@ -704,6 +704,19 @@ class GoalManager:
         elif duty is Duty.ASK:
             self._fulfil(handle, duty)
 
+    def give_up(self, handle: ClientGoalHandle) -> None:
+        """Cancel a goal if `begin` was interrupted once it was followed: nobody has its handle.
+
+        A goal that was sent earlier is only no longer followed.
+        """
+        if self._goals.get(handle.goal.id) is not handle:
+            return
+        if handle.goal.attached:
+            self.forget(handle)
+            return
+        with contextlib.suppress(TransportError):  # the session is closed, the reason to give up
+            self.cancel(handle)
+
     def _count(self, owner: Owner, more: int) -> None:
         """Count the goals of a client; a dropped one ends with the last. Needs the lock."""
         owner.running += more
@@ -1440,7 +1453,7 @@ class ActionClient(Generic[A_co]):
         if feedback_cb is not None:
             handle.on_feedback = partial(handle.call_with_feedback, partial(feedback_cb, handle))
         handle.calls_back = transition_cb is not None or feedback_cb is not None
-        handle.manager.begin(handle)
+        self._follow(handle)
         return handle
 
     def send(
@@ -1476,8 +1489,15 @@ class ActionClient(Generic[A_co]):
 
     def _send(self, handle: ClientGoalHandle, timeout: float | None) -> SentGoal[Any, Any]:
         sent: SentGoal[Any, Any] = SentGoal(handle, timeout)
-        handle.manager.begin(handle)
+        self._follow(handle)
         return sent
+
+    def _follow(self, handle: ClientGoalHandle) -> None:
+        try:
+            handle.manager.begin(handle)
+        except BaseException:  # for example Ctrl-C: the goal may be at the server already
+            handle.manager.give_up(handle)
+            raise
 
     def cancel_all_goals(self) -> None:
         """Ask the server to cancel all goals, also those of other clients."""

@@ -228,16 +228,16 @@ class SimpleActionClient(Generic[A_co]):
         handle.calls_back = handle.on_state is not None or feedback_cb is not None
         # Set before sending: a callback may come at once and must see its own goal.
         former, self._handle = self._handle, handle
-        begun = False
         try:
             handle.manager.begin(handle)
-            begun = True
-        finally:
-            if not begun and self._handle is handle:
+            # Only now: if sending has raised an error, the previous goal is still followed.
+            if former is not None and not former.goal.over:
+                former.manager.forget(former)
+        except BaseException:  # for example Ctrl-C: the goal may be at the server already
+            if self._handle is handle:
                 self._handle = former
-        # Only now: if sending has raised an error, the previous goal is still followed.
-        if former is not None and not former.goal.over:
-            former.manager.forget(former)
+            handle.manager.give_up(handle)
+            raise
 
     def _make_on_state(
         self,
@@ -282,6 +282,8 @@ class SimpleActionClient(Generic[A_co]):
             when another goal was sent meanwhile or `stop_tracking_goal` called: the wait then ends
             and nothing is cancelled.
 
+        What interrupts the wait, such as Ctrl-C, cancels the goal.
+
         Blocks: until the goal is over or both times have passed.
         """
         # Both are checked first: a wrong argument must not leave a robot moving.
@@ -289,10 +291,15 @@ class SimpleActionClient(Generic[A_co]):
         preempt = self._check_wait("preempt_timeout", preempt_timeout)
         self.send_goal(goal)
         handle = self._handle
-        # The wait also ends when another thread has sent the next goal: that one is not cancelled.
-        if not self.wait_for_result(execute) and handle is not None and not handle.forgotten:
-            handle.cancel()
-            self.wait_for_result(preempt)
+        try:
+            # It also ends when another thread has sent the next goal: that one is not cancelled.
+            if not self.wait_for_result(execute) and handle is not None and not handle.forgotten:
+                handle.cancel()
+                self.wait_for_result(preempt)
+        except BaseException:  # for example Ctrl-C
+            if handle is not None and not handle.forgotten:
+                handle.cancel()
+            raise
         return self._state_of(handle)
 
     def wait_for_result(self, timeout: float | Duration | None = 0.0) -> bool:

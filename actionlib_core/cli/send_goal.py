@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.cli import EXIT_FAILED, UsageError
@@ -101,35 +100,30 @@ def _split(words: list[str], *, stdin: bool) -> tuple[str, str]:
 def _drive(
     client: ActionClient[Any], goal: Any, timeout: float | None, args: argparse.Namespace
 ) -> int:
+    from actionlib_core.action.sent_goal import SentGoal
+
     if not args.json:
         print_message("Sending goal:", goal)
-    sent: list[SentGoal[Any, Any]] = []
+    # Made before it is sent, for a signal that comes when the server has the goal already.
+    unsent = client.make_goal(goal)
+    handle: SentGoal[Any, Any] = SentGoal(unsent, timeout)
     interrupted: KeyboardInterrupt | None = None
     timed_out = False
     with while_read():
         try:
-            # In a thread, as a signal interrupts this one only: else the goal may be at the server
-            # and nobody here knows it.
-            with ThreadPoolExecutor(1) as pool:
-                pool.submit(lambda: sent.append(client.send(goal, timeout=timeout))).result()
-            _follow(sent[0], args)
+            unsent.manager.begin(unsent)
+            _follow(handle, args)
         except KeyboardInterrupt as error:  # Ctrl-C or `Terminated`; raised again after the cancel
-            if not sent:
-                raise
             interrupted = error
-            _cancel(sent[0], args)
+            _cancel(handle, args)
         except TimeoutError:
-            if not sent:
-                raise
             timed_out = True
-            _cancel(sent[0], args)
+            _cancel(handle, args)
         except BaseException:  # for example, the reader of the output is gone
             # A robot must not go on with a goal that no program follows any more.
-            for handle in sent:
-                handle.cancel()
-                handle.wait(CANCEL_S)
+            handle.cancel()
+            handle.wait(CANCEL_S)
             raise
-        handle = sent[0]
         _print_end(handle, args)
     # On standard error, as standard output may be read by a program.
     if timed_out:

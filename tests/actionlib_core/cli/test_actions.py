@@ -11,6 +11,7 @@ import threading
 import pytest
 
 from actionlib_core import Abort, Preempted, Reject, server
+from actionlib_core.action.client import GoalManager
 from actionlib_core.action.server import ActionServer
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.cli import main
@@ -151,6 +152,19 @@ def test_a_signal_cancels_the_goal_first(shell, counting, monkeypatch, number, c
     assert signal.getsignal(signal.SIGTERM) is before
     assert "Canceling goal...\nGoal canceled.\n" in out
     assert out.endswith("Goal finished with status: PREEMPTED (stopped)\n")
+
+
+def test_a_signal_as_the_goal_is_sent_cancels_it(shell, counting, monkeypatch):
+    """The server had the goal, and the command no handle of it: the robot drove on."""
+    begin = GoalManager.begin
+
+    def begin_and_raise(manager, handle):
+        begin(manager, handle)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(GoalManager, "begin", begin_and_raise)
+    out = shell("send_goal", "robot/count", "{goal: 1000}", code=130)
+    assert "Canceling goal...\nGoal canceled.\n" in out
 
 
 def test_goal_that_ends_in_spite_of_the_cancel_is_not_called_canceled(shell, network, clock):
