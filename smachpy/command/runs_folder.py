@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from actionlib_core.process.private_files import make_private_folder
 from smachpy.base import log
-from smachpy.events.recording import run_of
+from smachpy.events.recording import delete_recording, run_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,7 +64,7 @@ def new_file(mission: str, stamp_ns: int, run: str = "") -> Path | None:
             return known
         ours.sort(key=lambda path: path.stat().st_mtime)
         for path in ours[: max(0, len(ours) - MAX_KEPT_RECORDINGS + 1)]:
-            path.unlink(missing_ok=True)
+            delete_recording(path)
         if not os.access(folder, os.W_OK):
             raise PermissionError(13, "no permission to write")
     except (OSError, RuntimeError) as error:  # RuntimeError: this user has no home

@@ -223,6 +223,7 @@ class Recorder:
                 # "x": an existing file is never overwritten, even if two processes begin at once.
                 make_private_folder(self.path.parent)
                 self._file = open_private(self.path, "x")
+                notes_file(self.path).unlink(missing_ok=True)  # on an earlier file of that name
                 made_ns = RealClock().time_ns()
                 record = describe(machine)
                 facts = None
@@ -846,6 +847,21 @@ def find_recordings(places: Iterable[str | Path]) -> list[Path]:
         else:
             raise RecordingError(place, "no such file or folder; expected recorded runs.")
     return found
+
+
+def notes_file(recording: Path) -> Path:
+    """Return the file with people's notes on a recording, beside it; it need not exist."""
+    return recording.with_suffix(".notes.json")
+
+
+def delete_recording(recording: Path) -> None:
+    """Delete a recording, and the notes on it.
+
+    Raises:
+        OSError: they cannot be deleted.
+    """
+    recording.unlink(missing_ok=True)
+    notes_file(recording).unlink(missing_ok=True)
 
 
 class Streamed:

@@ -224,6 +224,13 @@ READERS = {
         path = file("r.jsonl", b"x" * 2 * MAX_LINE_LENGTH)
         reading(lambda: read_recording(path), "expected at most 32,000,000")
     """,
+    "notes on a recording": """
+        from smachpy_viz.runs.notes import MAX_NOTES, MAX_NOTES_LENGTH, read_notes
+        path = file("r.notes.json", b" " * 2 * MAX_NOTES_LENGTH)
+        reading(lambda: read_notes(path.with_name("r.jsonl")), "at most 1,000,000")
+        path.write_text(f"[{','.join(['{}'] * 2 * MAX_NOTES)}]")
+        reading(lambda: read_notes(path.with_name("r.jsonl")), "no notes")
+    """,
     "a structure in a file": """
         from actionlib_core.inputs.json_text import MAX_JSON_LENGTH
         from smachpy_viz.cli import read_record
@@ -390,6 +397,7 @@ def test_limits_in_the_docs_are_those_of_the_code():
     from smachpy.sim import world_file
     from smachpy.states import questions
     from smachpy_viz.live import answers, machines, server, streams
+    from smachpy_viz.runs import notes
 
     numbers = {
         *(
@@ -417,6 +425,7 @@ def test_limits_in_the_docs_are_those_of_the_code():
         ),
         *(network.MAX_EVENT_LENGTH, network.MAX_OBSERVED_LENGTH, network.MAX_EVENTS),
         *(machines.MAX_MACHINES, machines.MAX_STATES, machines.MAX_TOTAL_BYTES),
+        *(notes.MAX_NOTES_LENGTH, notes.LONGEST_NOTE, notes.MAX_NOTES),
         *(answers.MAX_COMMAND_LENGTH, server.REQUEST_S, server.MAX_CONNECTIONS),
         *(streams.MAX_STRANGERS, streams.MAX_STREAMS_PER_ADDRESS, streams.MAX_STREAMS),
         *(rpc.LARGEST_REQUEST, rpc.REQUEST_S, rpc.LARGEST_ANSWER, node.LARGEST_REQUEST),

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from smachpy.command import runs_folder
+from smachpy.events import recording
 from smachpy.events.recording import read_recording
 
 pytestmark = pytest.mark.zenoh
@@ -203,12 +204,14 @@ def test_the_folder_of_runs_keeps_the_newest_and_what_is_not_its_own(tmp_path, m
     for number in range(runs_folder.MAX_KEPT_RECORDINGS + 3):
         path = tmp_path / f"nap-20260101-000000-{number}.jsonl"
         path.write_text("")
+        recording.notes_file(path).write_text("[]")
         os.utime(path, (number, number))
     (tmp_path / "mine.jsonl").write_text("")
     new = runs_folder.new_file("../a b", 1_700_000_000_000_000_000)
     assert new.parent == tmp_path
     assert new.name.startswith(".._a_b-2023111")
-    left = {path.name for path in tmp_path.iterdir()}
+    assert not recording.notes_file(tmp_path / "nap-20260101-000000-3.jsonl").exists()
+    left = {path.name for path in tmp_path.glob("*.jsonl")}
     assert len(left) == runs_folder.MAX_KEPT_RECORDINGS  # with mine, and room for the new one
     assert "mine.jsonl" in left
     assert "nap-20260101-000000-3.jsonl" not in left

@@ -41,7 +41,7 @@ def pin(page, text):
 
 
 def test_a_link_shows_another_browser_the_same(address, look):
-    page = look(f"{address}#token=t")
+    page = look(address)
     page.evaluate(
         "async () => { smachpy.page.layouts.setDepth(9); await smachpy.page.layouts.running; }"
     )
@@ -75,6 +75,24 @@ def test_notes_are_kept_by_the_browser_until_they_are_removed(address, look):
     page.goto(address)
     page.wait_for_selector("html[data-drawn]")
     assert page.locator(".notes").count() == 0
+
+
+def test_all_pages_share_the_notes_of_those_that_may_command(address, look, tmp_path):
+    page, other, stranger = look(f"{address}#token=t"), look(f"{address}#token=t"), look(address)
+    pin(page, "<b>here</b> it hesitates")
+    for one in (page, other, stranger):
+        one.wait_for_selector(".notes li")
+        assert one.text_content(".notes li span") == "<b>here</b> it hesitates"
+    assert "note=" not in page.url  # the server has it
+    assert stranger.locator(".notes [aria-label^=remove]").count() == 0
+    with stranger.expect_download() as saved:
+        stranger.get_by_role("button", name="Share").click()
+    file = tmp_path / "shared.html"
+    saved.value.save_as(file)
+    assert "hesitates" in look(file.as_uri()).inner_text(".notes")
+    other.click(".notes [aria-label^=remove]")
+    for one in (page, other, stranger):
+        one.wait_for_selector(".notes", state="detached")
 
 
 def test_a_link_to_what_is_not_there_says_so(address, look):

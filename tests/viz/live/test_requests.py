@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import io
 import ipaddress
+import json
+import re
 import socket
 import threading
 import urllib.error
@@ -15,13 +19,16 @@ from types import SimpleNamespace
 import pytest
 import segno
 
+from smachpy import CBState, StateMachine
 from smachpy.command import main
+from smachpy.events.recording import Recorder, notes_file, read_recording
 from smachpy_viz.live import server as server_module
 from smachpy_viz.live.app import Viewer
 from smachpy_viz.live.cli import print_qr
 from smachpy_viz.live.machines import Machines
 from smachpy_viz.live.server import EVERYWHERE, AddressError, PageServer, outward_address
 from smachpy_viz.runs import html
+from smachpy_viz.runs.notes import read_notes
 
 
 @pytest.mark.parametrize("last", ["x:²", "x:٣", "x:-1", "x", "x:", f"x:{'9' * 5000}", "x:1.0"])
@@ -42,7 +49,13 @@ def test_the_id_of_an_event_is_taken(served, last):
         assert answer.status == 200
 
 
-PLACES = ["api/control?machine=one", "api/action", "api/simulate", "api/mission"]
+PLACES = [
+    "api/control?machine=one",
+    "api/action",
+    "api/simulate",
+    "api/mission",
+    "api/notes?machine=one",
+]
 
 
 def commanded(served, body):
@@ -227,3 +240,100 @@ def test_the_server_answers_while_a_run_is_exported(served, monkeypatch, form):
         finally:
             go_on.set()
         assert export.result()
+
+
+def asked(address, body=None, **headers):
+    """(status, JSON) of a request."""
+    data = None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+    request = urllib.request.Request(address, data, headers)
+    try:
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return answer.status, json.load(answer)
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, json.load(error)
+
+
+def recorded_job(path):
+    """A recording of a short run."""
+    machine = StateMachine(["done"], name="JOB")
+    machine.add("A", CBState(lambda _: "done", outcomes=["done"]))
+    with Recorder(path, machine):
+        machine.execute()
+    return path
+
+
+NOTE = {"stamp_ns": 5_000_000_000, "text": "here"}
+
+
+def test_notes_are_written_beside_the_recording_with_the_token_only(served, tmp_path):
+    file = recorded_job(tmp_path / "run.jsonl")
+    served.machines.obtain("one").load(read_recording(file))
+    base = served.start(token="t")
+    place, own = f"{base}api/notes?machine=one", {"origin": base.rstrip("/")}
+    known = {**own, "x-smachpy-token": "t"}
+    add = {"command": "add", "note": NOTE}
+    for headers in (own, {"x-smachpy-token": "t"}, {**own, "x-smachpy-token": "u"}):
+        assert asked(place, add, **headers)[0] == 403
+    assert asked(place) == (200, [])
+    assert asked(place, add, **known) == (200, {"ok": True, "text": ""})
+    assert asked(place, {"command": "add", "note": {**NOTE, "by": "Ada"}}, **known)[0] == 200
+    assert asked(place)[1] == [{**NOTE, "by": "Ada"}]
+    assert [one["text"] for one in read_notes(file)] == ["here"]
+    assert served.machines.get("one").facts()["noted"] == 2
+    with urllib.request.urlopen(f"{base}api/export?machine=one", timeout=10) as answer:
+        [data] = re.findall(r'id="run-data">([^<]*)<', answer.read().decode())
+        assert json.loads(gzip.decompress(base64.b64decode(data)))["notes"] == asked(place)[1]
+    assert asked(place, {"command": "remove", "note": NOTE}, **known)[0] == 200
+    assert not notes_file(file).exists()
+    assert asked(f"{base}api/notes?machine=two", add, **known)[0] == 404
+
+
+@pytest.mark.parametrize(
+    ("command", "status"),
+    [
+        ({"command": "add"}, 400),
+        ({"command": "clear", "note": NOTE}, 400),
+        ({"command": "add", "note": "here"}, 400),
+        ({"command": "add", "note": {**NOTE, "text": " "}}, 400),
+        ({"command": "add", "note": {**NOTE, "stamp_ns": -1}}, 400),
+        ({"command": "add", "note": {**NOTE, "file": "/etc/passwd"}}, 400),
+    ],
+)
+def test_what_is_no_note_is_refused(served, command, status):
+    served.add("one")
+    base = served.start(token="t")
+    headers = {"origin": base.rstrip("/"), "x-smachpy-token": "t"}
+    found = asked(f"{base}api/notes?machine=one", command, **headers)
+    assert found[0] == status
+    assert "expected" in found[1]["text"]
+    assert asked(f"{base}api/notes?machine=one") == (200, [])
+
+
+def test_notes_on_a_run_without_a_recording_end_with_it(served):
+    machine = served.add("one", events=[("Started", "/JOB")])
+    base = served.start(token="t")
+    place, headers = f"{base}api/notes?machine=one", {"origin": base.rstrip("/")}
+    for number in range(101):
+        note = {"stamp_ns": number * 1_000_000, "text": "x"}
+        add = {"command": "add", "note": note}
+        status, answer = asked(place, add, **headers, **{"x-smachpy-token": "t"})
+        assert status == (200 if number < 100 else 409), answer
+    assert len(asked(place)[1]) == 100
+    served.add("one", label="NEXT", events=[("Started", "/NEXT")])
+    assert asked(place)[1] == []
+    earlier = urllib.parse.quote(machine.before)
+    assert len(asked(f"{base}api/notes?machine={earlier}")[1]) == 100
+
+
+def test_notes_that_cannot_be_read_or_written_are_told(served, tmp_path):
+    file = recorded_job(tmp_path / "run.jsonl")
+    notes_file(file).write_text("damaged")
+    served.machines.obtain("one").load(read_recording(file))
+    base = served.start(token="t")
+    headers = {"origin": base.rstrip("/"), "x-smachpy-token": "t"}
+    for body in (None, {"command": "add", "note": NOTE}):
+        status, answer = asked(f"{base}api/notes?machine=one", body, **headers)
+        assert status == 409
+        assert "run.notes.json" in answer["text"]
+    assert notes_file(file).read_text() == "damaged"

@@ -520,7 +520,7 @@ def test_a_disk_that_refuses_a_deletion_ends_no_pruning(record, monkeypatch):
     path = record("one.jsonl")
     os.utime(path, (1000, 1000))
 
-    def refuse(_path):
+    def refuse(_path, **_how):
         raise OSError(30, "Read-only file system")
 
     monkeypatch.setattr(Path, "unlink", refuse)

@@ -26,6 +26,8 @@
     GET  /api/action          the data for a goal's form
     POST /api/action          check, send or cancel a goal
     GET  /api/goals           the running goals of an action's server, whoever sent them
+    GET  /api/notes           the notes on a machine's newest run
+    POST /api/notes           add or remove one
 
 Answers are JSON with the types of `wire.ANSWERS`, or files. Every error is a `wire.Failure`.
 """
@@ -56,6 +58,7 @@ from smachpy_viz.live.answers import (
 from smachpy_viz.live.command_routes import CommandRoutes
 from smachpy_viz.live.machine_routes import MachineRoutes
 from smachpy_viz.live.machines import MAX_KEPT_EVENTS
+from smachpy_viz.live.notes import Notes
 from smachpy_viz.live.reproduction_routes import ReproductionRoutes
 from smachpy_viz.live.run_routes import RunRoutes
 from smachpy_viz.live.runs import Runs
@@ -125,13 +128,15 @@ class Viewer:
         }
         self._streams = Streams(machines, dict(settings), actions, access)
         runs = Runs(machines) if runs is None else runs
+        notes = Notes(runs, access)
         self.app = Starlette(
             routes=[
                 Route("/", self._index),
                 Route("/theme.css", self._theme),
                 Route("/api/login", self._log_in, methods=["POST"]),
                 *self._streams.routes,
-                *MachineRoutes(machines, statistics, value, picture).routes,
+                *MachineRoutes(machines, statistics, value, picture, notes.of).routes,
+                *notes.routes,
                 *RunRoutes(runs, simulations, access).routes,
                 *ReproductionRoutes(reproductions, access).routes,
                 *CommandRoutes(send, actions, access, machines.sender_of).routes,

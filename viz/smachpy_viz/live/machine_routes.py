@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from smachpy.events.introspection import StateRecord
     from smachpy_viz.live.machines import Machine, Machines
+    from smachpy_viz.runs.notes import RunNote
 
 PICTURES: Final = {
     "svg": "image/svg+xml",
@@ -49,6 +50,7 @@ class MachineRoutes:
         value: Reads the value of a userdata key, by machine, container and key; blocks.
         picture: Reads the picture of a question, by machine and path; returns media type and bytes,
             or None; blocks.
+        notes: Reads the notes on a machine's newest run; blocks.
     """
 
     def __init__(
@@ -57,11 +59,13 @@ class MachineRoutes:
         statistics: Callable[[StateRecord], dict[str, Any] | None],
         value: Callable[[str, str, str], str] | None,
         picture: Callable[[str, str], tuple[str, bytes] | None] | None,
+        notes: Callable[[Machine], list[RunNote]],
     ) -> None:
         self._machines = machines
         self._statistics_of = statistics
         self._value_of = value
         self._picture_of = picture
+        self._notes_of = notes
         self._drawing = asyncio.Semaphore(1)  # one `dot` at a time, whatever pages ask for
         self.routes = [
             Route("/api/machines", self._list),
@@ -145,7 +149,8 @@ class MachineRoutes:
             raise RequestError(
                 f"view: got {len(view)} characters; expected at most {LONGEST_VIEW}."
             )
-        data = await run_in_threadpool(make, machine, record, view)
+        notes = await run_in_threadpool(self._notes_of, machine)
+        data = await run_in_threadpool(make, machine, record, view, notes)
         name = "run" if form == "jsonl" else file_name(machine)
         return download(data, media, f"{name}.{form}")
 
@@ -162,14 +167,16 @@ def _one_of(request: Request, usual: str, known: dict[str, Any]) -> str:
     return form
 
 
-def _export_page(machine: Machine, record: StateRecord, view: str = "") -> bytes:
+def _export_page(machine: Machine, record: StateRecord, view: str, notes: list[RunNote]) -> bytes:
     """The run as one file that opens without a server."""
     from smachpy_viz.runs.html import page_of
 
-    return page_of(machine, record, view=view).encode("utf-8", "replace")
+    return page_of(machine, record, view=view, notes=notes).encode("utf-8", "replace")
 
 
-def _export_recording(machine: Machine, record: StateRecord, _view: str = "") -> bytes:
+def _export_recording(
+    machine: Machine, record: StateRecord, _view: str, _notes: list[RunNote]
+) -> bytes:
     """The run as a recording, in the format of `Recorder`."""
     from smachpy.events.recording import recording_lines
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from smachpy.events.recording import Recording
+    from smachpy_viz.runs.notes import RunNote
 
 logger = logging.getLogger("smachpy_viz.live")
 
@@ -95,6 +96,8 @@ class Machine:
         version: Number of its newest change, counted over all machines of a `Machines`.
         refused: Number of messages, or parts of them, that were left out because they were wrong.
         refusal: What was wrong with the newest of these, and who sent it; "" for none.
+        notes: Notes on the run that are kept beside no recording.
+        noted: Number of changes of its notes, wherever they are kept.
 
     Threads: every method may be called from any thread.
     """
@@ -128,6 +131,8 @@ class Machine:
         self.version = 0
         self.refused = 0
         self.refusal = ""
+        self.notes: list[RunNote] = []
+        self.noted = 0
         # Of a resumed mission: base and events from its earlier processes.
         self._earlier: tuple[dict[str, Any], list[dict[str, Any]]] | None = None
         self._shift = (
@@ -180,6 +185,8 @@ class Machine:
             self._earlier = self.history() if same_run and _begins_in_the_middle(history) else None
             if not same_run and self._now.data["started"] is not None:
                 self.before = self._keep(self._split_off()) or self.before
+            if not same_run:
+                self.notes = []
         with self._lock:
             self.run = str(history.get("run") or "")
             self.epoch = str(history["epoch"])
@@ -219,7 +226,7 @@ class Machine:
             kept.record, kept.revision, kept.problems = self.record, self.revision, self.problems
             # The epoch must differ, or a page would take its last event's number for one of this.
             kept.recorded, kept.node, kept.epoch = True, self.node, f"kept {self.epoch}"
-            kept.run = self.run
+            kept.run, kept.notes = self.run, self.notes
             kept.before, kept.after = self.before, self.name
             kept._base, kept._now, kept._bytes = self._base, self._now, self._bytes
             kept._seq, kept._folded = self._seq, self._folded
@@ -318,6 +325,12 @@ class Machine:
         self.stale = since
         self._on_change(self)
 
+    def set_notes(self, notes: list[RunNote]) -> None:
+        """Set the notes that are kept beside no recording, after any change of the run's notes."""
+        self.notes = notes
+        self.noted += 1
+        self._on_change(self)
+
     def set_control(self, state: dict[str, Any]) -> None:
         """Set pause and breakpoints, from the machine's state message."""
         self.control = {"paused": state["paused"], "breakpoints": state["breakpoints"]}
@@ -407,6 +420,7 @@ class Machine:
             "after": self.after,
             "refused": self.refused,
             "refusal": self.refusal,
+            "noted": self.noted,
         }
 
     def _set_record(self, record: StateRecord) -> None:

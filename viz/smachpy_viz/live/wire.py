@@ -15,6 +15,7 @@ from smachpy.network.reading import CheckProblem, ControlState
 from smachpy_viz.model.machine import Node
 from smachpy_viz.model.why import Cause
 from smachpy_viz.runs.good_runs import GoodRuns
+from smachpy_viz.runs.notes import RunNote
 
 EventRecord: TypeAlias = dict[str, Any]
 """An event: `kind`, the fields of its kind in `smachpy.events`, `seq`; after a gap `dropped`."""
@@ -67,7 +68,8 @@ class MachineFacts(TypedDict):
 
     stale: when its program disappeared. behind: how far its clock is behind the server's. before,
     after: names of the machines that show its previous and its next program. refused: number of its
-    messages that were wrong and left out; refusal: what was wrong with the newest one.
+    messages that were wrong and left out; refusal: what was wrong with the newest one. noted:
+    number of changes of its notes; after another one, pages read them again.
     """
 
     name: str
@@ -83,6 +85,7 @@ class MachineFacts(TypedDict):
     after: str | None
     refused: int
     refusal: str
+    noted: int
 
 
 class MachineSummary(MachineFacts):
@@ -505,10 +508,12 @@ ANSWERS: dict[str, Any] = {
     "GET /api/reproduction": Reproduction,
     "GET /api/action": GoalForm,
     "GET /api/goals": list[ServerGoal],
+    "GET /api/notes": list[RunNote],
     "POST /api/control": Done,
     "POST /api/action": CheckedGoal | GoalAccepted | Done,
     "POST /api/simulate": BatchStarted | Done,
     "POST /api/mission": Done,
+    "POST /api/notes": Done,
     "POST /api/reproduce": ReproductionStarted | Done,
 }
 """What each route answers, unless it fails; the others answer with files."""

@@ -9,14 +9,16 @@ from smachpy_viz.live import assets
 from smachpy_viz.live.machines import Machine
 from smachpy_viz.model.why import why
 from smachpy_viz.runs.floor import read_floor
+from smachpy_viz.runs.notes import read_notes
 from smachpy_viz.runs.statistics import StatisticsOfFiles
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from smachpy.events.introspection import StateRecord
     from smachpy.events.recording import Recording
+    from smachpy_viz.runs.notes import RunNote
 
 
 def standalone_page(
@@ -30,13 +32,14 @@ def standalone_page(
         floor: A map_server YAML file, used if the recording has no map.
 
     Raises:
-        RecordingError: a file of `runs` cannot be read.
+        RecordingError: a file of `runs`, or that with the recording's notes, cannot be read.
         InputFileError: `floor` is not a valid map.
     """
     map_of_file = None if floor is None else read_floor(floor)
     machine = Machine(recording.path.name, lambda _machine: None, floor=map_of_file)
     machine.load(recording)
-    return page_of(machine, recording.record, StatisticsOfFiles(runs).of(recording.record))
+    statistics = StatisticsOfFiles(runs).of(recording.record)
+    return page_of(machine, recording.record, statistics, notes=read_notes(recording.path))
 
 
 def page_of(
@@ -44,6 +47,7 @@ def page_of(
     record: StateRecord,
     statistics: dict[str, Any] | None = None,
     view: str = "",
+    notes: Sequence[RunNote] = (),
 ) -> str:
     """Return the page of a machine as it is now.
 
@@ -52,6 +56,7 @@ def page_of(
         record: Its structure.
         statistics: Those of recorded runs.
         view: What the page shows at first: the fragment of an address, with instant and notes.
+        notes: The notes that all pages share.
     """
     run = {
         "model": assets.model(record),
@@ -59,6 +64,7 @@ def page_of(
         "observed": machine.observed(),
         "statistics": statistics,
         "view": view,
+        "notes": list(notes),
         "why": why(record, machine.events()).to_json(),
     }
     return assets.standalone(run, record.label)

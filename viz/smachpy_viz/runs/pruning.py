@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from actionlib_core.clock import RealClock
 from smachpy.command.pruning import is_kept
-from smachpy.events.recording import RecordingError, find_recordings, read_summary
+from smachpy.events.recording import (
+    RecordingError,
+    delete_recording,
+    find_recordings,
+    read_summary,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -31,7 +36,7 @@ def prune_recordings(
     keep: str,
     on_problem: Callable[[str], object],
 ) -> Pruned:
-    """Delete recordings that nothing was written to for so long.
+    """Delete recordings that nothing was written to for so long, and their notes.
 
     Args:
         places: Files and folders.
@@ -54,7 +59,7 @@ def prune_recordings(
             found = read_summary(path)
             if is_kept(keep, found.outcome, success=found.success):
                 continue
-            path.unlink()
+            delete_recording(path)
         except (OSError, RecordingError) as error:
             on_problem(f"{error} It is left.")
             continue

@@ -1378,7 +1378,7 @@ var CHANGE_SIGNS = {
   changed: "≠",
   numbers: "×"
 };
-var signed = (change2, name) => change2 ? `${CHANGE_SIGNS[change2]} ${name}` : name;
+var signed = (change3, name) => change3 ? `${CHANGE_SIGNS[change3]} ${name}` : name;
 var KIND_NAMES = {
   state: "state",
   callback: "function",
@@ -1487,11 +1487,11 @@ var ALL_LEVELS = 99;
 var hasManyBranches = ({ kind, children }) => kind === "concurrence" && children.length >= MANY;
 function joinsOf(node) {
   const labels = new Set(node.children.map((child) => child.label));
-  return node.rules.flatMap(({ outcome, conditions, text: text2, change: change2 }) => {
+  return node.rules.flatMap(({ outcome, conditions, text: text2, change: change3 }) => {
     const known2 = conditions.filter(([label]) => labels.has(label));
     if (new Set(known2.map(([label]) => label)).size < 2 || text2.startsWith("any of")) return [];
     const quorum = /^(\d+) of /.exec(text2);
-    return [{ outcome, text: text2, change: change2, conditions: known2, need: quorum ? Number(quorum[1]) : known2.length }];
+    return [{ outcome, text: text2, change: change3, conditions: known2, need: quorum ? Number(quorum[1]) : known2.length }];
   });
 }
 function joinText({ need, conditions }, met) {
@@ -2736,10 +2736,10 @@ function viewOf(text2) {
   if (words2.has("plot")) view2.plots = knownPlots(words2.getAll("plot").map((plot) => plot.split(";")));
   return view2;
 }
-function withNotes(notes, more) {
-  const clean = more.map(({ at, text: text2 }) => ({ at, text: text2.trim().slice(0, LONGEST_NOTE) })).filter((one) => one.text);
+function withNotes(notes, more, most = MOST_NOTES) {
+  const clean = more.map((one) => ({ ...one, text: one.text.trim().slice(0, LONGEST_NOTE) })).filter((one) => one.text);
   const isKnown = (one) => notes.some((other) => other.text === one.text && same(other, one));
-  const all = [...notes, ...clean.filter((one) => !isKnown(one))].slice(-MOST_NOTES);
+  const all = [...notes, ...clean.filter((one) => !isKnown(one))].slice(-most);
   return all.sort((a5, b3) => a5.at - b3.at);
 }
 var same = (a5, b3) => Math.abs(a5.at - b3.at) < 0.01;
@@ -2747,7 +2747,10 @@ var same = (a5, b3) => Math.abs(a5.at - b3.at) < 0.01;
 // src/core/store/notes.ts
 var NOTED_RUNS = 30;
 var Notes = class {
-  all = y3([]);
+  shared = y3([]);
+  own = y3([]);
+  /** All of them, in the order of their instants. */
+  all = O(() => withNotes(this.shared.value, this.own.value, Infinity));
   writtenAt = y3(null);
   // instant of the note that is being written [ms]
   #data;
@@ -2760,20 +2763,22 @@ var Notes = class {
   begin() {
     if (this.#data.run.first() !== null) this.writtenAt.value = this.#playback.nowMs();
   }
-  /** Load the notes of the machine shown. */
+  /** Load this browser's notes on the machine shown. */
   load() {
     const { notes: kept } = notedRuns().find((one) => one?.epoch === this.#data.facts.value?.epoch) ?? {};
-    this.all.value = Array.isArray(kept) ? kept : [];
+    this.own.value = Array.isArray(kept) ? kept : [];
   }
+  /** Add notes to those of this browser. */
   add(more) {
-    this.#set(withNotes(this.all.value, more));
+    this.#set(withNotes(this.own.value, more));
   }
-  remove(note) {
-    this.#set(this.all.value.filter((one) => one !== note));
+  /** Remove one of this browser's. */
+  remove({ at, text: text2 }) {
+    this.#set(this.own.value.filter((one) => one.at !== at || one.text !== text2));
   }
   #set(next) {
     const epoch2 = this.#data.facts.value?.epoch;
-    this.all.value = next;
+    this.own.value = next;
     if (!epoch2) return;
     const others = notedRuns().filter((one) => one?.epoch !== epoch2);
     save("notes", [...others, ...next.length ? [{ epoch: epoch2, notes: next }] : []].slice(-NOTED_RUNS));
@@ -3602,8 +3607,8 @@ var Hub = class {
   #watchdog;
   #due;
   /** @param where without a shared worker, a hidden page needs no stream */
-  constructor({ isShared }) {
-    this.isShared = isShared;
+  constructor({ isShared: isShared2 }) {
+    this.isShared = isShared2;
   }
   add(port) {
     this.#pages.set(port, { follow: null, heard: Date.now(), follows: "", hasAll: false });
@@ -3823,6 +3828,28 @@ function showPage(name, { machine, replace = false } = {}) {
   else history.pushState(null, "", address);
 }
 
+// src/core/shared_notes.ts
+var notesOf = (notes) => notes.map(({ stamp_ns, text: text2, by }) => ({ at: stamp_ns / 1e6, text: text2, by }));
+async function readNotes() {
+  if (isFile()) return;
+  const machine = store.data.facts.value;
+  const answer = await ask(link("notes"));
+  const { name, epoch: epoch2 } = store.data.facts.value ?? {};
+  if (name !== machine?.name || epoch2 !== machine?.epoch) return;
+  if (isFailure(answer)) store.view.notify(`Notes: ${answer.text}`, "error");
+  store.notes.shared.value = isFailure(answer) ? [] : notesOf(answer);
+}
+var addNote = (note) => isShared() ? change("add", note) : store.notes.add([note]);
+var removeNote = (note) => note.by === void 0 ? store.notes.remove(note) : change("remove", note);
+var isShared = () => hasToken() && !isFile();
+async function change(what, { at, text: text2 }) {
+  const by = store.view.operator.value.trim() || void 0;
+  const note = { stamp_ns: Math.round(at * 1e6), text: text2, ...by && { by } };
+  const answer = await post(link("notes"), { command: what, note });
+  if (answer.ok) await readNotes();
+  else if (!answer.wants_token) store.view.notify(`Note: ${answer.text}`, "error");
+}
+
 // src/core/connection.ts
 var CAUGHT_UP_MS = 1e3;
 var RETRY_MS2 = 250;
@@ -3848,6 +3875,7 @@ async function connect(handlers) {
     const run = JSON.parse(await unpack("run-data"));
     store.data.connection.value = "file";
     if (run.view && location.hash.length < 2) handlers.onView(String(run.view));
+    store.notes.shared.value = notesOf(run.notes ?? []);
     await takeSnapshot(run.snap, run.model);
     onObserved(run.observed ?? []);
     store.data.statistics.value = run.statistics ?? null;
@@ -3958,6 +3986,7 @@ var reconnect = () => hub?.postMessage({ kind: "reconnect" });
 async function takeFacts(facts) {
   const before = store.data.facts.value;
   store.data.facts.value = facts;
+  if (before && (before.noted !== facts.noted || before.epoch !== facts.epoch)) readNotes();
   if (before && before.revision !== facts.revision && before.epoch === facts.epoch) await load(facts);
 }
 async function takeSnapshot(snapshot, payload) {
@@ -3965,6 +3994,7 @@ async function takeSnapshot(snapshot, payload) {
   const known2 = store.data.facts.value;
   const same2 = known2?.name === snapshot.name && known2.epoch === snapshot.epoch;
   if (!same2) {
+    if (!payload) store.notes.shared.value = [];
     store.data.robotLag.forget();
     store.data.why.value = null;
   }
@@ -3991,6 +4021,7 @@ async function load(facts) {
   }
   store.view.setModel(payload);
   onMachine();
+  readNotes();
   const statistics = await ask(link("statistics"));
   if (mine !== loads) return;
   if (isFailure(statistics)) store.view.notify(`Recorded runs: ${statistics.text}`, "error");
@@ -4169,7 +4200,7 @@ var Address = class {
   #due;
   constructor() {
     const { view: view2, playback, panels: panels2, notes } = store;
-    const chosen2 = [view2.selected, view2.opened, notes.all, playback.stretch, panels2.arrangement, panels2.plotsChosen];
+    const chosen2 = [view2.selected, view2.opened, notes.own, playback.stretch, panels2.arrangement, panels2.plotsChosen];
     for (const one of [...chosen2, playback.instant]) one.subscribe(() => this.#write());
   }
   /** Take the view of the address again, or that of another fragment. */
@@ -4192,7 +4223,7 @@ var Address = class {
       at: playback.cursor.value,
       selected: view2.selected.value,
       opened: [...view2.opened.value],
-      notes: notes.all.value,
+      notes: notes.own.value,
       stretch: stretch && [stretch.from, stretch.to],
       panels: panels2.arrangement.value,
       plots: panels2.plotsChosen.value
@@ -4523,9 +4554,9 @@ var Picture = class {
     const points2 = edge.points.map((p5) => ({ x: p5.x + x3, y: p5.y + y5 }));
     const kind = edge.kind === "link" ? commonClass(this.#model?.get(edge.source), edge.outcomes) : edge.kind;
     const implicit = edge.link?.implicit ? " implicit" : "";
-    const change2 = edge.link?.change ? ` cmp-${edge.link.change}` : "";
+    const change3 = edge.link?.change ? ` cmp-${edge.link.change}` : "";
     const line = el("path", {
-      class: `edge ${kind}${implicit}${change2}`,
+      class: `edge ${kind}${implicit}${change3}`,
       d: roundedLine(points2),
       "marker-end": `url(#arrow-${edge.kind === "link" ? kind : "plain"})`
     });
@@ -4559,8 +4590,8 @@ var Picture = class {
       into.append(el("text", { class: `label ${kind}`, ...place2 }, name));
     }
     if (!edge.link) return;
-    const { change: change2, note } = edge.link;
-    const text2 = [!edge.labels.length && change2 ? CHANGE_SIGNS[change2] : "", note].filter(Boolean).join(" ");
+    const { change: change3, note } = edge.link;
+    const text2 = [!edge.labels.length && change3 ? CHANGE_SIGNS[change3] : "", note].filter(Boolean).join(" ");
     const middle = middleOfLongest(edge.points);
     const right = !edge.labels.some((label) => label.x > middle.x);
     const place = {
@@ -9788,14 +9819,14 @@ function OpenHome() {
   store.playback.watchSlowly();
   const pins2 = store.view.pins.value;
   const rows = chosen(runs2, filter, pins2);
-  const change2 = (some) => {
+  const change3 = (some) => {
     setFilter({ ...filter, ...some });
     setMost(MOST_ROWS4);
   };
   const failed = rows.filter((row) => standing(row) === "failure").length;
   const failedText = failed ? `, ${failed} failed` : "";
   return /* @__PURE__ */ a4("section", { class: "home", "aria-labelledby": "home-title", children: [
-    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins: pins2, onChange: change2 }),
+    /* @__PURE__ */ a4(Filters, { runs: runs2, filter, pins: pins2, onChange: change3 }),
     /* @__PURE__ */ a4("div", { class: "run-list", children: [
       /* @__PURE__ */ a4("header", { children: [
         /* @__PURE__ */ a4("h2", { id: "home-title", tabindex: -1, ref: heading, children: "Runs" }),
@@ -9812,7 +9843,7 @@ function OpenHome() {
             placeholder: "machine, robot, state, reason",
             "aria-label": "search runs",
             value: filter.text,
-            onInput: (e4) => change2({ text: fieldValue(e4) })
+            onInput: (e4) => change3({ text: fieldValue(e4) })
           }
         ),
         runs2.filter((row) => row.live).length > 1 && /* @__PURE__ */ a4("button", { onClick: () => showPage("fleet"), children: "Fleet" }),
@@ -10283,7 +10314,14 @@ function ShareButtons({ page: page2 }) {
       " % ✕"
     ] }),
     /* @__PURE__ */ a4("button", { title: "note at the instant shown (n)", onClick: () => store.notes.begin(), children: "Note" }),
-    /* @__PURE__ */ a4("button", { title: "copy the address of this view: instant, selection, open containers, notes", onClick: copy2, children: "Link" }),
+    /* @__PURE__ */ a4(
+      "button",
+      {
+        title: "copy the address of this view: instant, selection, open containers, notes of this browser",
+        onClick: copy2,
+        children: "Link"
+      }
+    ),
     !isFile() && /* @__PURE__ */ a4("button", { title: "one HTML file that opens at this instant, with the notes, without a server", onClick: share, children: "Share" })
   ] });
 }
@@ -10297,7 +10335,7 @@ function NoteDialog() {
   };
   const onSubmit = (e4) => {
     e4.preventDefault();
-    store.notes.add([{ at, text: text2 }]);
+    addNote({ at, text: text2.trim() });
     close2();
   };
   return /* @__PURE__ */ a4(Dialog, { label: "note", class: "note-form", onClose: close2, children: /* @__PURE__ */ a4("form", { onSubmit, children: [
@@ -10316,6 +10354,7 @@ function NoteDialog() {
         onInput: (e4) => setText(fieldValue(e4))
       }
     ),
+    /* @__PURE__ */ a4("p", { class: "hint", children: isShared() ? "All pages of this run show it." : isFile() ? "This page forgets it." : "Only this browser keeps it; with the token for commands, all pages of this run show it." }),
     /* @__PURE__ */ a4("p", { children: [
       /* @__PURE__ */ a4("button", { class: "primary", type: "submit", disabled: !text2.trim(), children: "Pin it" }),
       " ",
@@ -10328,8 +10367,8 @@ function Notes2() {
   if (!notes.length) return null;
   return /* @__PURE__ */ a4(Section, { title: "Notes", count: notes.length, children: /* @__PURE__ */ a4("ul", { class: "notes", children: notes.map((note) => /* @__PURE__ */ a4("li", { children: [
     /* @__PURE__ */ a4("button", { class: "link", onClick: () => store.playback.seek(note.at), children: /* @__PURE__ */ a4("time", { children: store.clock.instantText(note.at) }) }),
-    /* @__PURE__ */ a4("span", { children: note.text }),
-    /* @__PURE__ */ a4("button", { class: "small", "aria-label": `remove the note ${note.text}`, onClick: () => store.notes.remove(note), children: "✕" })
+    /* @__PURE__ */ a4("span", { title: note.by ? `by ${note.by}` : "only in this browser", children: note.text }),
+    (note.by === void 0 || isShared()) && /* @__PURE__ */ a4("button", { class: "small", "aria-label": `remove the note ${note.text}`, onClick: () => removeNote(note), children: "✕" })
   ] }, `${note.at} ${note.text}`)) }) });
 }
 
@@ -11435,11 +11474,11 @@ function Laying() {
 function Legend() {
   if (store.data.comparison.value) {
     const changes = ["added", "removed", "changed"];
-    return /* @__PURE__ */ a4("div", { class: "legend", "aria-hidden": "true", children: changes.map((change2) => /* @__PURE__ */ a4("span", { children: [
-      /* @__PURE__ */ a4("b", { class: change2 }),
-      CHANGE_SIGNS[change2],
+    return /* @__PURE__ */ a4("div", { class: "legend", "aria-hidden": "true", children: changes.map((change3) => /* @__PURE__ */ a4("span", { children: [
+      /* @__PURE__ */ a4("b", { class: change3 }),
+      CHANGE_SIGNS[change3],
       " ",
-      change2
+      change3
     ] })) });
   }
   store.playback.watchSlowly();
@@ -11917,7 +11956,7 @@ var mouseleave = "mouseleave";
 var dblclick = "dblclick";
 var resize = "resize";
 var scroll = "scroll";
-var change = "change";
+var change2 = "change";
 var dppxchange = "dppxchange";
 var LEGEND_DISP = "--";
 var domEnv = typeof window != "undefined";
@@ -11930,9 +11969,9 @@ function setPxRatio() {
   let _pxRatio = devicePixelRatio;
   if (pxRatio != _pxRatio) {
     pxRatio = _pxRatio;
-    query && off(change, query, setPxRatio);
+    query && off(change2, query, setPxRatio);
     query = matchMedia(`(min-resolution: ${pxRatio - 1e-3}dppx) and (max-resolution: ${pxRatio + 1e-3}dppx)`);
-    on(change, query, setPxRatio);
+    on(change2, query, setPxRatio);
     win.dispatchEvent(new CustomEvent(dppxchange));
   }
 }
@@ -16652,7 +16691,7 @@ function OpenDialog() {
     const answer = await askSimulation(asked2);
     setProblems(answer.ok ? "" : answer.text ?? "refused");
   };
-  const change2 = (name) => (e4) => setForm({ ...form, [name]: fieldValue(e4) });
+  const change3 = (name) => (e4) => setForm({ ...form, [name]: fieldValue(e4) });
   const earlier = batches.filter((one) => one.mission === mission && !one.running && one.report);
   return /* @__PURE__ */ a4(Dialog, { label: "simulated runs", class: "simulate", onClose: close2, children: [
     /* @__PURE__ */ a4("header", { children: [
@@ -16663,19 +16702,19 @@ function OpenDialog() {
       /* @__PURE__ */ a4("label", { children: [
         "Mission",
         " ",
-        /* @__PURE__ */ a4("select", { value: mission, onChange: change2("mission"), children: names.map((name) => /* @__PURE__ */ a4("option", { value: name, children: name })) })
+        /* @__PURE__ */ a4("select", { value: mission, onChange: change3("mission"), children: names.map((name) => /* @__PURE__ */ a4("option", { value: name, children: name })) })
       ] }),
       /* @__PURE__ */ a4("label", { children: [
         "Runs ",
-        /* @__PURE__ */ a4("input", { inputmode: "numeric", value: form.runs, onInput: change2("runs") })
+        /* @__PURE__ */ a4("input", { inputmode: "numeric", value: form.runs, onInput: change3("runs") })
       ] }),
       /* @__PURE__ */ a4("label", { children: [
         "Seed ",
-        /* @__PURE__ */ a4("input", { inputmode: "numeric", value: form.seed, onInput: change2("seed") })
+        /* @__PURE__ */ a4("input", { inputmode: "numeric", value: form.seed, onInput: change3("seed") })
       ] }),
       /* @__PURE__ */ a4("label", { children: [
         "Limit of a run ",
-        /* @__PURE__ */ a4("input", { value: form.limit, onInput: change2("limit") })
+        /* @__PURE__ */ a4("input", { value: form.limit, onInput: change3("limit") })
       ] }),
       /* @__PURE__ */ a4("label", { class: "wide", children: [
         "Varied values, one per line",
@@ -16686,14 +16725,14 @@ function OpenDialog() {
             placeholder: "battery=0.2..1.0",
             spellcheck: false,
             value: form.vary,
-            onInput: change2("vary")
+            onInput: change3("vary")
           }
         )
       ] }),
       /* @__PURE__ */ a4("label", { class: "wide", children: [
         "Compare with",
         " ",
-        /* @__PURE__ */ a4("select", { value: form.compare, onChange: change2("compare"), children: [
+        /* @__PURE__ */ a4("select", { value: form.compare, onChange: change3("compare"), children: [
           /* @__PURE__ */ a4("option", { value: "", children: "nothing" }),
           earlier.map((one) => /* @__PURE__ */ a4("option", { value: one.id, children: [
             one.runs,

@@ -18,6 +18,7 @@ export const FACTS: MachineFacts = {
   after: null,
   refused: 0,
   refusal: "",
+  noted: 0,
 };
 
 let seq = 0;

@@ -127,3 +127,28 @@ test("a store knows nothing of another one", () => {
   assert.equal(store.view.selected.value, null);
   assert.ok(!store.data.run.events.some((one) => one.path === "/OTHER"));
 });
+
+test("shared notes and those of this browser stand in one list; a link has only the latter", () => {
+  store.notes.shared.value = [
+    { at: 3, text: "c", by: "Ada" },
+    { at: 1, text: "a", by: "" },
+  ];
+  store.notes.own.value = [];
+  store.notes.add([
+    { at: 2, text: "b" },
+    { at: 1, text: "a" },
+  ]);
+  const shown = store.notes.all.value.map(({ text, by }) => [text, by]);
+  assert.deepEqual(shown, [
+    ["a", ""],
+    ["b", undefined],
+    ["c", "Ada"],
+  ]);
+  store.notes.remove(store.notes.all.value[1]);
+  assert.deepEqual(
+    store.notes.own.value.map(({ text }) => text),
+    ["a"],
+  );
+  store.notes.shared.value = Array.from({ length: 100 }, (_, at) => ({ at, text: `${at}`, by: "" }));
+  assert.equal(store.notes.all.value.length, 101);
+});

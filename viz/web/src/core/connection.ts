@@ -6,6 +6,7 @@ import { Hub } from "#core/hub.ts";
 import { isFile, unpack } from "#core/page_file.ts";
 import { pageOf, showPage } from "#core/pages.ts";
 import { ask, encoded, isFailure, link, logIn, readToken, setToken } from "#core/requests.ts";
+import { notesOf, readNotes } from "#core/shared_notes.ts";
 import { store } from "#core/store.ts";
 import type { MachineFacts, MachinePayload, MachineSummary, Observed, RunEvent, Snapshot, Why } from "#core/types.ts";
 import type { Answers, StreamData } from "#core/wire.ts";
@@ -38,6 +39,7 @@ export async function connect(handlers: {
     const run = JSON.parse(await unpack("run-data"));
     store.data.connection.value = "file";
     if (run.view && location.hash.length < 2) handlers.onView(String(run.view));
+    store.notes.shared.value = notesOf(run.notes ?? []);
     await takeSnapshot(run.snap, run.model);
     onObserved(run.observed ?? []);
     store.data.statistics.value = run.statistics ?? null;
@@ -176,6 +178,7 @@ export const reconnect = () => hub?.postMessage({ kind: "reconnect" });
 async function takeFacts(facts: MachineFacts) {
   const before = store.data.facts.value;
   store.data.facts.value = facts;
+  if (before && (before.noted !== facts.noted || before.epoch !== facts.epoch)) readNotes();
   if (before && before.revision !== facts.revision && before.epoch === facts.epoch) await load(facts);
 }
 
@@ -185,6 +188,7 @@ async function takeSnapshot(snapshot: Snapshot, payload?: MachinePayload) {
   // Another snapshot of the same program, after a gap: its structure need not be fetched again.
   const same = known?.name === snapshot.name && known.epoch === snapshot.epoch;
   if (!same) {
+    if (!payload) store.notes.shared.value = [];
     store.data.robotLag.forget();
     store.data.why.value = null;
   }
@@ -213,6 +217,7 @@ async function load(facts: MachineFacts) {
   }
   store.view.setModel(payload);
   onMachine();
+  readNotes();
   const statistics = await ask<Answers["GET /api/statistics"]>(link("statistics"));
   if (mine !== loads) return;
   if (isFailure(statistics)) store.view.notify(`Recorded runs: ${statistics.text}`, "error");

@@ -10,8 +10,8 @@ const MOST_NOTES = 20;
 const LONGEST_NOTE = 300; // characters
 const LATEST = 1e15; // [ms], later than any clock
 
-/** at an instant [ms] */
-export type Note = { at: number; text: string };
+/** at an instant [ms]; `by`: who wrote it, of a shared one */
+export type Note = { at: number; text: string; by?: string };
 export type LinkedView = {
   at: number | null; // instant [ms]; null: now
   selected: string | null; // path
@@ -79,12 +79,10 @@ export function viewOf(text: string) {
 /**
  * Notes and further ones, in the order of their instants; if there are too many, the ones written first are dropped.
  */
-export function withNotes(notes: Note[], more: Note[]) {
-  const clean = more
-    .map(({ at, text }) => ({ at, text: text.trim().slice(0, LONGEST_NOTE) }))
-    .filter((one) => one.text);
+export function withNotes(notes: Note[], more: Note[], most = MOST_NOTES) {
+  const clean = more.map((one) => ({ ...one, text: one.text.trim().slice(0, LONGEST_NOTE) })).filter((one) => one.text);
   const isKnown = (one: Note) => notes.some((other) => other.text === one.text && same(other, one));
-  const all = [...notes, ...clean.filter((one) => !isKnown(one))].slice(-MOST_NOTES);
+  const all = [...notes, ...clean.filter((one) => !isKnown(one))].slice(-most);
   return all.sort((a, b) => a.at - b.at);
 }
 

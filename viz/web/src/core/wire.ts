@@ -29,6 +29,7 @@ export interface MachineSummary {
   after: string | null;
   refused: number;
   refusal: string;
+  noted: number;
   active: string[];
   started: number | null;
   ended: number | null;
@@ -511,6 +512,13 @@ export interface ServerGoal {
   mission: string;
 }
 
+/** A note at an instant of a run, by the robot's clock; `by`: who wrote it. */
+export interface RunNote {
+  stamp_ns: number;
+  text: string;
+  by: string;
+}
+
 /** A goal that was read from YAML. */
 export interface CheckedGoal {
   ok: true;
@@ -659,6 +667,7 @@ export interface Snapshot {
   after: string | null;
   refused: number;
   refusal: string;
+  noted: number;
   seq: number;
   problems: CheckProblem[];
   base: RunFacts;
@@ -686,6 +695,7 @@ export interface MachineFacts {
   after: string | null;
   refused: number;
   refusal: string;
+  noted: number;
 }
 
 /** New events of a machine; `seq` of the last one. */
@@ -766,10 +776,12 @@ export interface Answers {
   "GET /api/reproduction": Reproduction;
   "GET /api/action": GoalForm;
   "GET /api/goals": ServerGoal[];
+  "GET /api/notes": RunNote[];
   "POST /api/control": Done;
   "POST /api/action": CheckedGoal | GoalAccepted | Done;
   "POST /api/simulate": BatchStarted | Done;
   "POST /api/mission": Done;
+  "POST /api/notes": Done;
   "POST /api/reproduce": ReproductionStarted | Done;
 }
 

@@ -14,7 +14,7 @@ export class Address {
 
   constructor() {
     const { view, playback, panels, notes } = store;
-    const chosen = [view.selected, view.opened, notes.all, playback.stretch, panels.arrangement, panels.plotsChosen];
+    const chosen = [view.selected, view.opened, notes.own, playback.stretch, panels.arrangement, panels.plotsChosen];
     for (const one of [...chosen, playback.instant]) one.subscribe(() => this.#write());
   }
 
@@ -40,7 +40,7 @@ export class Address {
       at: playback.cursor.value,
       selected: view.selected.value,
       opened: [...view.opened.value],
-      notes: notes.all.value,
+      notes: notes.own.value,
       stretch: stretch && [stretch.from, stretch.to],
       panels: panels.arrangement.value,
       plots: panels.plotsChosen.value,

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import { isFile } from "#core/page_file.ts";
 import { encoded, link } from "#core/requests.ts";
 import { copyText } from "#core/share.ts";
+import { addNote, isShared, removeNote } from "#core/shared_notes.ts";
 import { store } from "#core/store.ts";
 import { saveFilm } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";
@@ -39,7 +40,10 @@ export function ShareButtons({ page }: { page: Page }) {
       <button title="note at the instant shown (n)" onClick={() => store.notes.begin()}>
         Note
       </button>
-      <button title="copy the address of this view: instant, selection, open containers, notes" onClick={copy}>
+      <button
+        title="copy the address of this view: instant, selection, open containers, notes of this browser"
+        onClick={copy}
+      >
         Link
       </button>
       {!isFile() && (
@@ -61,7 +65,7 @@ export function NoteDialog() {
   };
   const onSubmit = (e: Event) => {
     e.preventDefault();
-    store.notes.add([{ at, text }]);
+    addNote({ at, text: text.trim() });
     close();
   };
   return (
@@ -76,6 +80,13 @@ export function NoteDialog() {
           autofocus
           onInput={(e: Event) => setText(fieldValue(e))}
         />
+        <p class="hint">
+          {isShared()
+            ? "All pages of this run show it."
+            : isFile()
+              ? "This page forgets it."
+              : "Only this browser keeps it; with the token for commands, all pages of this run show it."}
+        </p>
         <p>
           <button class="primary" type="submit" disabled={!text.trim()}>
             Pin it
@@ -101,10 +112,12 @@ export function Notes() {
             <button class="link" onClick={() => store.playback.seek(note.at)}>
               <time>{store.clock.instantText(note.at)}</time>
             </button>
-            <span>{note.text}</span>
-            <button class="small" aria-label={`remove the note ${note.text}`} onClick={() => store.notes.remove(note)}>
-              ✕
-            </button>
+            <span title={note.by ? `by ${note.by}` : "only in this browser"}>{note.text}</span>
+            {(note.by === undefined || isShared()) && (
+              <button class="small" aria-label={`remove the note ${note.text}`} onClick={() => removeNote(note)}>
+                ✕
+              </button>
+            )}
           </li>
         ))}
       </ul>

@@ -1,7 +1,7 @@
-// The notes of the user on the run shown, kept in the browser.
+// The notes on the run shown: those that all pages share, and those of this browser, which may not write to the server.
 
 import type { Signal } from "@preact/signals";
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import type { Note } from "#core/links.ts";
 import { withNotes } from "#core/links.ts";
 import { save, saved } from "#core/storage.ts";
@@ -11,7 +11,10 @@ import type { Playback } from "#core/store/playback.ts";
 const NOTED_RUNS = 30; // runs whose notes are kept in the browser
 
 export class Notes {
-  readonly all: Signal<Note[]> = signal([]);
+  readonly shared: Signal<Note[]> = signal([]);
+  readonly own: Signal<Note[]> = signal([]);
+  /** All of them, in the order of their instants. */
+  readonly all = computed(() => withNotes(this.shared.value, this.own.value, Infinity));
   readonly writtenAt: Signal<number | null> = signal(null); // instant of the note that is being written [ms]
   #data: Data;
   #playback: Playback;
@@ -26,23 +29,25 @@ export class Notes {
     if (this.#data.run.first() !== null) this.writtenAt.value = this.#playback.nowMs();
   }
 
-  /** Load the notes of the machine shown. */
+  /** Load this browser's notes on the machine shown. */
   load() {
     const { notes: kept } = notedRuns().find((one) => one?.epoch === this.#data.facts.value?.epoch) ?? {};
-    this.all.value = Array.isArray(kept) ? kept : [];
+    this.own.value = Array.isArray(kept) ? kept : [];
   }
 
+  /** Add notes to those of this browser. */
   add(more: Note[]) {
-    this.#set(withNotes(this.all.value, more));
+    this.#set(withNotes(this.own.value, more));
   }
 
-  remove(note: Note) {
-    this.#set(this.all.value.filter((one) => one !== note));
+  /** Remove one of this browser's. */
+  remove({ at, text }: Note) {
+    this.#set(this.own.value.filter((one) => one.at !== at || one.text !== text));
   }
 
   #set(next: Note[]) {
     const epoch = this.#data.facts.value?.epoch;
-    this.all.value = next;
+    this.own.value = next;
     if (!epoch) return;
     const others = notedRuns().filter((one) => one?.epoch !== epoch);
     save("notes", [...others, ...(next.length ? [{ epoch, notes: next }] : [])].slice(-NOTED_RUNS));
