@@ -484,6 +484,8 @@ class _ShownServer:
         with self._lock:
             verdict = decide(goal_id)
             result = self._goals.result(goal_id)
+            if verdict is Admission.PASS:
+                self._goals.on_passed(goal_id, self._clock.now())
             if verdict is Admission.PASS and unpack_cancel_if_lost(sample.payload):
                 self._cancel_if_lost[goal_id] = sample.source
                 if len(self._cancel_if_lost) > REMEMBERED:
@@ -534,7 +536,8 @@ class _ShownServer:
             query.finish()
             return
         with self._lock:
-            result, entry = self._goals.result(goal_id), self._goals.status(goal_id)
+            result = self._goals.result(goal_id)
+            entry = self._goals.status(goal_id, self._clock.now())
             listed = self._goals.list()
         if not goal_id:
             statuses = pack_statuses(self._clock.time_ns(), listed)

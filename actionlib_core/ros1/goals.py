@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 REMEMBERED = 100_000  # ids, as many as our own servers remember
 RESULT_KEPT_S = 60.0  # results are kept for this time, or until they are acknowledged
+LISTED_S = 1.0  # a server lists a goal that was passed to it within this time
 RESULT_LOST = "the result message itself was lost"
 UNKNOWN = "the server in ROS 1 does not list this goal"
 
@@ -42,6 +43,7 @@ class GoalsOfServer:
         self._known = Recent(REMEMBERED)
         self._listed: dict[str, StatusEntry] = {}
         self._results: dict[str, tuple[float, bytes]] = {}
+        self._passed: dict[str, float] = {}  # id -> until when the server may not list it yet
         # A client in this process sends each goal both ways; the copies may arrive in any order.
         self._came_directly = Recent(REMEMBERED)  # and not yet over the network
         self._came_by_network = Recent(REMEMBERED)
@@ -62,6 +64,13 @@ class GoalsOfServer:
             return Admission.DROP
         self._came_directly.add(goal_id)
         return Admission.PASS
+
+    def on_passed(self, goal_id: str, now: float) -> None:
+        """Note that a goal is being passed to the server."""
+        while self._passed and next(iter(self._passed.values())) <= now:
+            del self._passed[next(iter(self._passed))]
+        self._passed.pop(goal_id, None)  # repeated: the newest is the last
+        self._passed[goal_id] = now + LISTED_S
 
     def on_statuses(self, entries: Iterable[StatusEntry]) -> bool:
         """Handle a status list; return whether it or the list before contains a goal."""
@@ -89,10 +98,12 @@ class GoalsOfServer:
         kept = self._results.get(goal_id)
         return None if kept is None else kept[1]
 
-    def status(self, goal_id: str) -> StatusEntry:
+    def status(self, goal_id: str, now: float) -> StatusEntry:
         """Return the status of a goal whose result is not here."""
         entry = self._listed.get(goal_id)
         if entry is None:
+            if now < self._passed.get(goal_id, now) and goal_id not in self._known:
+                return StatusEntry(goal_id, 0, Status.PENDING, "")
             return StatusEntry(goal_id, 0, Status.LOST, UNKNOWN)
         if entry.status in TERMINAL:
             text = f"{entry.text} ({RESULT_LOST})" if entry.text else RESULT_LOST

@@ -153,12 +153,27 @@ def test_a_result_is_sent_again_until_it_is_acknowledged_or_old():
 
 def test_a_final_status_without_a_result_says_that_the_message_was_lost():
     goals = GoalsOfServer()
-    assert goals.status("g").status == Status.LOST
+    assert goals.status("g", now=0.0).status == Status.LOST
     goals.on_statuses([entry("g", Status.ACTIVE, "on my way")])
-    assert goals.status("g").text == "on my way"
+    assert goals.status("g", now=0.0).text == "on my way"
     goals.on_statuses([entry("g", Status.SUCCEEDED, "there")])
-    assert goals.status("g").status == Status.SUCCEEDED
-    assert "result message itself was lost" in goals.status("g").text
+    assert goals.status("g", now=0.0).status == Status.SUCCEEDED
+    assert "result message itself was lost" in goals.status("g", now=0.0).text
+
+
+def test_a_goal_on_its_way_to_the_server_is_not_lost():
+    """A client that attached before the next status list was told LOST; the goal then ran."""
+    goals = GoalsOfServer()
+    assert goals.on_goal("g") is Admission.PASS
+    goals.on_passed("g", now=0.0)
+    goals.on_statuses([])  # made before the goal arrived
+    assert goals.status("g", now=0.9).status == Status.PENDING
+    assert goals.status("g", now=1.0).status == Status.LOST  # it has not arrived at all
+    goals.on_passed("g", now=1.0)
+    goals.on_statuses([entry("g", Status.ACTIVE)])
+    assert goals.status("g", now=1.1).status == Status.ACTIVE
+    goals.on_statuses([])  # ended, and no longer listed
+    assert goals.status("g", now=1.2).status == Status.LOST
 
 
 def test_an_idle_servers_status_is_news_once():
