@@ -10,6 +10,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
+from actionlib_core.inputs.suggest import did_you_mean
 from smachpy.userdata.shown import literal
 
 if TYPE_CHECKING:
@@ -195,6 +196,22 @@ def steps_of(
             Step(number, t - began, kind, path, tuple(facts.items()), _lane(path, parallel))
         )
     return found
+
+
+def unknown_tolerated(
+    tolerate: Iterable[str], records: Iterable[StateRecord], events: Iterable[Mapping[str, Any]]
+) -> list[str]:
+    """Return problems: the names of `tolerate` that nothing in the machines and events has."""
+    states = [state for record in records for state in record.walk()]
+    keys = {key for state in states for key in (*state.input_keys, *state.output_keys)}
+    keys.update(event["key"] for event in events if "key" in event)
+    known = sorted({*GROUPS, *keys, *(state.label for state in states)})
+    return [
+        f"tolerate: no state and no key is called {name!r}.{did_you_mean(name, known)}"
+        for name in tolerate
+        if name.strip("/") not in {*GROUPS, *keys}
+        and not any(f"{state.path}/".endswith(f"/{name.strip('/')}/") for state in states)
+    ]
 
 
 def _is_tolerated(event: Mapping[str, Any], tolerate: Collection[str]) -> bool:

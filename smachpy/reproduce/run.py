@@ -23,7 +23,7 @@ from smachpy.events.code import code_facts
 from smachpy.events.introspection import describe
 from smachpy.exceptions import MissionError, SmachError, error_text
 from smachpy.reproduce.changes import changes
-from smachpy.reproduce.compare import compare, steps_of
+from smachpy.reproduce.compare import compare, steps_of, unknown_tolerated
 from smachpy.reproduce.play import Player
 from smachpy.reproduce.world import first_run, world_of
 from smachpy.testing.kit import MissionKit, TimeLimitError
@@ -185,13 +185,20 @@ def reproduce(
         is_complete=world.is_complete,
     )
     is_same = comparison.difference is None
+    unknown = unknown_tolerated(tolerate, (recording.record, record), (*events, *now))
     return Reproduction(
         name=recording.record.label,
         comparison=comparison,
         duration=world.ended - world.began,
         seconds=RealClock().now() - started,
         outcome=outcome,
-        notes=(*world.lacks, *notes, *(() if is_same else ends), *dict.fromkeys(player.problems)),
+        notes=(
+            *unknown,
+            *world.lacks,
+            *notes,
+            *(() if is_same else ends),
+            *dict.fromkeys(player.problems),
+        ),
         changed=() if is_same else tuple(changes(recording, record, code_facts())),
         events=now,
         record=record,

@@ -6,6 +6,7 @@ results, texts. What is written has been run.
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -18,7 +19,7 @@ from actionlib_core.interfaces._sources import BUNDLED
 from smachpy.base.problems import unknown_name
 from smachpy.command.arguments import Text, parameters_of, read_words
 from smachpy.command.durable import whole_target
-from smachpy.command.targets import MISSION_FILES, PLANS, load_target
+from smachpy.command.targets import MISSION_FILES, PLANS, load_target, names_file
 from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
@@ -86,7 +87,12 @@ class Written:
 
 
 def write_test(
-    recording: Recording, *, mission: str = "", allow: Iterable[str | Path] = (), expect: str = ""
+    recording: Recording,
+    *,
+    mission: str = "",
+    allow: Iterable[str | Path] = (),
+    expect: str = "",
+    folder: str | Path = ".",
 ) -> Written:
     """Write a test of the run of a recording.
 
@@ -96,6 +102,7 @@ def write_test(
         allow: As for `reproduce`.
         expect: The outcome that the mission ought to have had, one of its outcomes: the test fails
             until it is mended.
+        folder: Where the test will be: it names the recording, if it needs it, relative to itself.
 
     Raises:
         ReproductionError: the recording does not say enough, or `expect` is no outcome.
@@ -129,7 +136,7 @@ def write_test(
     plain = _without(script, "feedback")
     chosen = plain if trial.holds(plain) else script
     if trial.record is None or (chosen is script and not trial.holds(script)):
-        return _from_recording(recording, mission, expect, trial.runs)
+        return _from_recording(recording, mission, expect, trial.runs, Path(folder))
     short = _shortened(chosen, trial)
     run = trial.run_of(short)
     assert run is not None
@@ -471,12 +478,18 @@ def _arguments(then: dict[str, Any], target: Any) -> str:
     return ", ".join(f"{key}={source(value)}" for key, value in values.items() if key in known)
 
 
-def _from_recording(recording: Recording, mission: str, expect: str, runs: int) -> Written:
+def _from_recording(
+    recording: Recording, mission: str, expect: str, runs: int, folder: Path
+) -> Written:
     """Return a test that reads the recording: its world cannot be written down."""
     name = re.sub(r"[^a-z0-9]+", "_", recording.record.label.lower()).strip("_")
     assert recording.origin is not None
     target = mission or str(recording.origin["mission"]["target"])
-    given = f", mission={source(whole_target(target))}"
+    place, colon, attribute = target.partition(":")
+    given = source(target)
+    if names_file(place):
+        attribute = f" + {source(colon + attribute)}" if colon else ""
+        given = f"str(HERE / {_relative(place, folder)}){attribute}"
     check = (
         f"assert found.outcome == {source(expect)}"
         if expect
@@ -485,13 +498,23 @@ def _from_recording(recording: Recording, mission: str, expect: str, runs: int) 
     more = "" if expect else "from smachpy.reproduce.report import lines_of\n"
     text = f'''"""The recorded run of {recording.record.label}; its world is in the recording."""
 
+from pathlib import Path
+
 from smachpy.events.recording import read_recording
 {more}from smachpy.reproduce.run import reproduce
 
+HERE = Path(__file__).parent
+
 
 def test_{name}_as_recorded():
-    found = reproduce(read_recording({source(str(recording.path.resolve()))}){given})
+    recording = read_recording(HERE / {_relative(recording.path, folder)})
+    found = reproduce(recording, mission={given})
     {check}
 '''
     why = "what the world did cannot be written as a script: the test reads the recording"
     return Written(text, runs, (why,), needs_recording=True)
+
+
+def _relative(place: str | Path, folder: Path) -> str:
+    """Return the text of a place as the test in `folder` finds it, also where both are moved to."""
+    return source(os.path.relpath(Path(place).resolve(), folder.resolve()))

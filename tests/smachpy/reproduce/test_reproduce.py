@@ -222,6 +222,44 @@ def test_what_may_differ_is_left_out(night, name, capsys):
     assert code == (0 if name in changes else 1), capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("HOEM", "no state and no key is called 'HOEM'. Did you mean 'HOME'?"),
+        ("gaols", "no state and no key is called 'gaols'. Did you mean 'goals'?"),
+        ("HOME", ""),
+        ("VISIT/WATCH", ""),
+        ("errors", ""),
+        ("trips", ""),
+    ],
+)
+def test_a_name_of_nothing_that_may_differ_is_told(night, name, said, capsys):
+    _, path = night
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}", "--tolerate", name]) == 0
+    out = capsys.readouterr().out
+    assert out.count("note: tolerate: ") == (1 if said else 0)
+    assert said in out
+
+
+def test_a_test_that_reads_its_recording_may_be_moved_with_it(night, monkeypatch, tmp_path, capsys):
+    """It named the recording and the mission by the folders of the computer that wrote it."""
+    file, path = night
+    monkeypatch.setattr("smachpy.reproduce.written._Trial.holds", lambda _trial, _script: False)
+    (tmp_path / "tests").mkdir()
+    test = tmp_path / "tests" / "test_it.py"
+    words = [str(path), f"--allow={path.parent}", "-o", str(test)]
+    assert main(["runs", "reproduce", *words]) == 0
+    assert "the test reads the recording" in capsys.readouterr().out
+    assert str(tmp_path) not in test.read_text()
+    moved = tmp_path / "elsewhere"
+    (moved / "tests").mkdir(parents=True)
+    for one in (file, path, test):
+        one.rename(moved / one.relative_to(tmp_path))
+    names = {"__file__": str(moved / "tests" / "test_it.py")}
+    exec(Path(names["__file__"]).read_text(), names)
+    names["test_round_as_recorded"]()
+
+
 def test_a_folder_has_a_report_for_ci_whatever_the_number_of_processes(night, tmp_path, capfd):
     _, path = night
     folder = tmp_path / "runs"

@@ -94,6 +94,7 @@ def _write(args: argparse.Namespace) -> int:
             mission=args.mission,
             allow=args.allow,
             expect=args.expect,
+            folder=args.output.parent,
         )
     try:
         with args.output.open("x", encoding="utf-8") as file:
