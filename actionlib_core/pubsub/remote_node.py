@@ -1,10 +1,13 @@
-"""A node of a ROS 2 robot: its parameters and, for managed nodes, its life cycle.
+"""A node of a robot: its parameters and, for managed nodes of ROS 2, its life cycle.
 
 Every ROS 2 node offers services for its parameters, such as `<node>/get_parameters`. A managed node
-also offers `<node>/get_state` and `<node>/change_state`. Nav2 consists of managed nodes.
+also offers `<node>/get_state` and `<node>/change_state`. Nav2 consists of managed nodes. A node of
+ROS 1 whose parameters can change while it runs offers `<node>/set_parameters` of
+dynamic_reconfigure.
 
 Source:
     rcl_interfaces and lifecycle_msgs; https://design.ros2.org/articles/node_lifecycle.html.
+    https://wiki.ros.org/dynamic_reconfigure.
 """
 
 from __future__ import annotations
@@ -13,7 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import RemoteNodeError
 from actionlib_core.inputs.arguments import check_limit
+from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.interfaces import ros2
+from actionlib_core.interfaces.dynamic_reconfigure.msg import (
+    BoolParameter,
+    Config,
+    DoubleParameter,
+    IntParameter,
+    StrParameter,
+)
+from actionlib_core.interfaces.dynamic_reconfigure.srv import Reconfigure
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.wire.ros2.network import choose_network
@@ -31,6 +43,7 @@ if TYPE_CHECKING:
 
 TIMEOUT_S = 10.0  # default limit of a call
 MAX_INTEGER = 2**63  # integer parameters have 64 bits
+MAX_ROS1_INTEGER = 2**31  # and 32 in ROS 1
 
 _FIELDS = {
     1: "bool_value",
@@ -45,9 +58,42 @@ _FIELDS = {
 }
 """The field of a ParameterValue that holds its value, by its `type` (ParameterType)."""
 _NUMBERS = {field: number for number, field in _FIELDS.items()}
+_PARTS: Any = {bool: BoolParameter, int: IntParameter, float: DoubleParameter, str: StrParameter}
 
 
-class RemoteNode:
+class _ServicesOfNode:
+    """Calls the services of one node."""
+
+    def __init__(
+        self, name: str, *, timeout: float | Duration | None = TIMEOUT_S, node: Node | None = None
+    ) -> None:
+        self._node = node if node is not None else get_node()
+        self.name = self._node.resolve(name, "node name")
+        self.timeout = check_limit(f"node {name!r}", "timeout", timeout)
+        self._closed = False
+        self._calls: set[ServiceProxy[..., Any, Any]] = set()  # those that run; `set` is atomic
+
+    def close(self) -> None:
+        """Make running and later calls fail with a `NodeError`; a second call does nothing."""
+        self._closed = True
+        for proxy in list(self._calls):
+            proxy.close()
+
+    def _use_service(self, service: str, service_class: Any, use: Callable[[Any], Any]) -> Any:
+        """Use a proxy of one of its services, which `close` closes."""
+        proxy: Any = ServiceProxy(
+            f"/{self.name}/{service}", service_class, timeout=self.timeout, node=self._node
+        )
+        self._calls.add(proxy)
+        try:
+            if self._closed:  # also by a `close` that has not seen this proxy
+                proxy.close()
+            return use(proxy)
+        finally:
+            self._calls.discard(proxy)
+
+
+class RemoteNode(_ServicesOfNode):
     """Calls the parameter and life-cycle services of a ROS 2 node.
 
     Args:
@@ -74,19 +120,9 @@ class RemoteNode:
     def __init__(
         self, name: str, *, timeout: float | Duration | None = TIMEOUT_S, node: Node | None = None
     ) -> None:
-        self._node = node if node is not None else get_node()
-        self.name = self._node.resolve(name, "node name")
-        self.timeout = check_limit(f"node {name!r}", "timeout", timeout)
-        self._closed = False
-        self._calls: set[ServiceProxy[..., Any, Any]] = set()  # those that run; `set` is atomic
+        super().__init__(name, timeout=timeout, node=node)
         # The services' types are those of the robot's distribution.
         self._distro = choose_network(self._node.config.ros2, self.name).distro
-
-    def close(self) -> None:
-        """Make running and later calls fail with a `NodeError`; a second call does nothing."""
-        self._closed = True
-        for proxy in list(self._calls):
-            proxy.close()
 
     def wait(self, timeout: float | Duration | None = None, *, managed: bool = False) -> None:
         """Wait until the node is there.
@@ -194,18 +230,94 @@ class RemoteNode:
         return self._use(service, type_name, lambda proxy: proxy.call(*args, **fields))
 
     def _use(self, service: str, type_name: str, use: Callable[[Any], Any]) -> Any:
-        """Use a proxy of one of its services, which `close` closes."""
-        service_class: Any = ros2.get_service(type_name, self._distro)
-        proxy: Any = ServiceProxy(
-            f"/{self.name}/{service}", service_class, timeout=self.timeout, node=self._node
+        return self._use_service(service, ros2.get_service(type_name, self._distro), use)
+
+
+class ReconfiguredNode(_ServicesOfNode):
+    """Changes the parameters of a ROS 1 node while it runs, by dynamic_reconfigure.
+
+    `move_base` has them in parts, such as the node name `move_base/DWAPlannerROS`. Arguments,
+    attributes, errors, blocking and threads are those of `RemoteNode`.
+    """
+
+    def wait(self, timeout: float | Duration | None = None) -> None:
+        """Wait until the node is there.
+
+        Args:
+            timeout: Longest wait [s]; None: no limit.
+
+        Raises:
+            WaitTimeoutError: it was not there in time.
+        """
+        self._use_service(
+            "set_parameters", Reconfigure, lambda proxy: proxy.wait_for_service(timeout)
         )
-        self._calls.add(proxy)
-        try:
-            if self._closed:  # also by a `close` that has not seen this proxy
-                proxy.close()
-            return use(proxy)
-        finally:
-            self._calls.discard(proxy)
+
+    def get_parameters(self, *names: str) -> dict[str, Any]:
+        """Return the values of parameters by name.
+
+        Raises:
+            RemoteNodeError: the node does not have some of them; the error names all of those.
+        """
+        found = self._request(Config())
+        missing = {
+            name: f"got no such parameter; expected one of its own.{did_you_mean(name, found)}"
+            for name in names
+            if name not in found
+        }
+        if missing:
+            raise RemoteNodeError(self.name, missing)
+        return {name: found[name] for name in names}
+
+    def set_parameters(self, values: Mapping[str, bool | float | str]) -> None:
+        """Set parameters by name.
+
+        Raises:
+            RemoteNodeError: some values are not possible for a parameter, and nothing was sent; or
+                the node has others now, as it limits them, and has set the rest. The error names
+                all of those.
+        """
+        problems, config = {}, Config()
+        for name, value in values.items():
+            try:
+                add_to_config(config, name, value)
+            except ValueError as error:
+                problems[name] = str(error)
+        if not problems:
+            now = self._request(config)
+            for name, value in values.items():
+                if now.get(name) != value:
+                    # Texts are not shown: one may be a password.
+                    shown = "" if isinstance(value, str) else f": {now.get(name)!r}, not {value!r}"
+                    problems[name] = (
+                        f"the node did not take the value{shown}. Try one of its type and within "
+                        "its limits."
+                    )
+        if problems:
+            raise RemoteNodeError(self.name, problems)
+
+    def _request(self, config: Config) -> dict[str, Any]:
+        """Set some parameters, or none; return the values of all."""
+        now = self._use_service(
+            "set_parameters", Reconfigure, lambda proxy: proxy.call(config)
+        ).config
+        return {one.name: one.value for one in (*now.bools, *now.ints, *now.strs, *now.doubles)}
+
+
+def add_to_config(config: Config, name: str, value: Any) -> None:
+    """Add a parameter to a configuration of dynamic_reconfigure.
+
+    Raises:
+        ValueError: a parameter of ROS 1 cannot have this value.
+    """
+    places = ((bool, config.bools), (int, config.ints), (float, config.doubles), (str, config.strs))
+    too_big = type(value) is int and not -MAX_ROS1_INTEGER <= value < MAX_ROS1_INTEGER
+    for kind, place in places:  # bool before int, of which it is a subclass
+        if isinstance(value, kind) and not too_big:
+            config_part: Any = _PARTS[kind](name=name, value=value)
+            place.append(config_part)
+            return
+    raise ValueError(f"got {value!r}; expected a bool, an int of 32 bits, a float or a str.")
 
 
 def value_of(message: Any) -> Any:

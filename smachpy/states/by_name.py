@@ -476,19 +476,21 @@ def set_parameters(
     node: str,
     values: Mapping[str, Any],
     before: str = "parameters_before",
+    ros1: bool = False,
     timeout: float | None = 10.0,
 ) -> State:
-    """Set parameters of a ROS 2 node. Outcomes: 'succeeded', 'aborted', 'preempted'.
+    """Set parameters of a node. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     Args:
         node: Name of the node.
         values: Name of the parameter: value.
         before: The userdata key that gets what they were; see `restore_parameters`.
+        ros1: The node is one of ROS 1, and has dynamic_reconfigure.
         timeout: Longest time [s]; none: no limit.
     """
     from smachpy.states.ros2_nodes import SetParameters
 
-    return SetParameters(node, values, before=before, timeout=timeout)
+    return SetParameters(node, values, before=before, ros1=ros1, timeout=timeout)
 
 
 def restore_parameters(before: str = "parameters_before", timeout: float | None = 10.0) -> State:

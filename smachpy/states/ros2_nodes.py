@@ -1,4 +1,4 @@
-"""States that change the nodes of a ROS 2 robot: their parameters and their life cycles."""
+"""States that change the nodes of a robot: their parameters and, in ROS 2, their life cycles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actionlib_core.exceptions import RemoteNodeError, ServiceException, WaitTimeoutError
 from actionlib_core.interfaces import ros2
-from actionlib_core.pubsub.remote_node import RemoteNode, parameter_value
+from actionlib_core.interfaces.dynamic_reconfigure.msg import Config
+from actionlib_core.pubsub.remote_node import (
+    ReconfiguredNode,
+    RemoteNode,
+    add_to_config,
+    parameter_value,
+)
 from smachpy.actions.wakeup import PreemptedError, answer_preempt, call_blocking
 from smachpy.base import log
 from smachpy.base.context import current_frame, current_path
@@ -57,7 +63,7 @@ _MOVING: Final = frozenset(
 
 
 class SetParameters(State):
-    """Sets parameters of a ROS 2 node. Outcomes: 'succeeded', 'aborted', 'preempted'.
+    """Sets parameters of a node. Outcomes: 'succeeded', 'aborted', 'preempted'.
 
     What they were before goes to a userdata key, before anything is changed, and
     `RestoreParameters` sets them back: as a clean-up, at every end of the machine. A value that the
@@ -65,13 +71,16 @@ class SetParameters(State):
     changes nothing about what is restored in the end.
 
     'aborted', with the reason in the log: the node is not there or does not answer, it does not
-    have one of the parameters, or it refuses a value. What it had set by then stays set.
+    have one of the parameters, or it refuses or limits a value. What it had set by then stays set.
 
     Args:
         node: Name of the node.
-        values: Name of the parameter -> value: a bool, int, float, str, bytes or a list of one of
-            them. A whole number for a parameter that is a float is sent as one.
+        values: Name of the parameter -> value: a bool, int, float or str, in ROS 2 also bytes or a
+            list of one of them. A whole number for a parameter that is a float is sent as one.
         before: The userdata key.
+        ros1: The node is one of ROS 1, and has dynamic_reconfigure, as the parts of move_base have
+            (`move_base/DWAPlannerROS`). Parameters that a node reads only when it starts are not
+            reached.
         timeout: Longest time [s], including the wait for the node; None: no limit, 0: no time.
         **options: See `smachpy.machines.state.StateOptions`.
 
@@ -87,6 +96,7 @@ class SetParameters(State):
         values: Mapping[str, Any],
         *,
         before: str = BEFORE,
+        ros1: bool = False,
         timeout: float | Duration | None = NODE_S,
         **options: Unpack[UntimedOptions],
     ) -> None:
@@ -100,10 +110,14 @@ class SetParameters(State):
         for name, value in self.__values.items():
             problems.word("values", name)
             try:
-                parameter_value(value, ros2.get_message("rcl_interfaces/ParameterValue"))
+                if ros1:
+                    add_to_config(Config(), name, value)
+                else:
+                    parameter_value(value, ros2.get_message("rcl_interfaces/ParameterValue"))
             except ValueError as error:
                 problems.add(f"values: {name}: {error}")
         self.__before = problems.word("before", before)
+        self.__ros1 = ros1
         self.__timeout_s = problems.seconds("timeout", timeout)
         problems.raise_all()
         self.register_io_keys([before])
@@ -114,7 +128,7 @@ class SetParameters(State):
         Blocks: until the node has answered, `timeout` or a preempt.
         """
 
-        def change(remote: RemoteNode, call: Call) -> None:
+        def change(remote: Any, call: Call) -> None:
             frame: Frame | None = current_frame()
 
             def read() -> dict[str, Any]:
@@ -126,15 +140,16 @@ class SetParameters(State):
                 name: float(value) if type(now[name]) is float and type(value) is int else value
                 for name, value in self.__values.items()
             }
+            wire = {"ros1": True} if self.__ros1 else {}
             kept = _copy(userdata[self.__before]) if self.__before in userdata else {}
             earlier = kept.setdefault(remote.name, {})
             for name, value in values.items():
                 was = earlier[name]["was"] if name in earlier else now[name]
-                earlier[name] = {"was": was, "set": value}
+                earlier[name] = {"was": was, "set": value} | wire
             userdata[self.__before] = kept
             call(lambda: remote.set_parameters(values))
 
-        return _talk(self, self.__node, self.__timeout_s, change)
+        return _talk(self, _kind_of(self.__ros1), self.__node, self.__timeout_s, change)
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the node and the parameters."""
@@ -190,7 +205,7 @@ class RestoreParameters(State):
         outcome = "succeeded"
         for node, entries in [*kept.items()]:
 
-            def restore(remote: RemoteNode, call: Call, entries: Any = entries) -> None:
+            def restore(remote: Any, call: Call, entries: Any = entries) -> None:
                 names, missing = list(entries), None
                 try:
                     now = call(lambda: remote.get_parameters(*names))
@@ -218,7 +233,8 @@ class RestoreParameters(State):
                 if missing is not None:
                     raise missing
 
-            ended = _talk(self, f"/{node}", self.__timeout_s, restore)
+            ros1 = any(entry.get("ros1") for entry in entries.values())
+            ended = _talk(self, _kind_of(ros1), f"/{node}", self.__timeout_s, restore)
             if ended == "succeeded":
                 del kept[node]
                 userdata[self.__before] = _copy(kept)
@@ -276,7 +292,7 @@ class SetLifecycle(State):
         """
         del userdata
 
-        def move(remote: RemoteNode, call: Call) -> None:
+        def move(remote: Any, call: Call) -> None:
             requested: set[str] = set()
             while (at := call(remote.state)) != self.__target:
                 if at in _MOVING:
@@ -293,7 +309,7 @@ class SetLifecycle(State):
                 requested.add(step)
                 call(lambda step=step: remote.change_state(step))  # type: ignore[misc]
 
-        return _talk(self, self.__node, self.__timeout_s, move, managed=True)
+        return _talk(self, RemoteNode, self.__node, self.__timeout_s, move, managed=True)
 
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the node and the wanted state."""
@@ -301,11 +317,16 @@ class SetLifecycle(State):
         return kind, (("node", self.__node), ("state", self.__target), *details)
 
 
+def _kind_of(ros1: bool) -> type[RemoteNode | ReconfiguredNode]:
+    return ReconfiguredNode if ros1 else RemoteNode
+
+
 def _talk(
     state: State,
+    kind: type[RemoteNode | ReconfiguredNode],
     node: str,
     timeout_s: float | None,
-    work: Callable[[RemoteNode, Call], object],
+    work: Callable[[Any, Call], object],
     *,
     managed: bool = False,
 ) -> str:
@@ -318,14 +339,15 @@ def _talk(
         return "preempted"
     clock = clock_of_run()
     until = None if timeout_s is None else clock.now() + timeout_s
-    remote = RemoteNode(node, timeout=timeout_s)
+    remote: Any = kind(node, timeout=timeout_s)
 
     def call(function: Callable[[], R]) -> R:
         remote.timeout = None if until is None else max(0.0, until - clock.now())
         return call_blocking(state, function, remote.close, f"call of /{remote.name}")
 
     try:
-        call(lambda: remote.wait(remote.timeout, managed=managed))
+        which = {"managed": True} if managed else {}
+        call(lambda: remote.wait(remote.timeout, **which))
         work(remote, call)
     except PreemptedError:
         answer_preempt(state)  # that of a sleep

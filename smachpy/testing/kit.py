@@ -23,7 +23,7 @@ from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.process import MissionNode, Process
 from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, RunRecorder, Stuck, Trigger
-from smachpy.testing.ros2_node import ScriptedNode
+from smachpy.testing.ros2_node import ScriptedNode, ScriptedRos1Node
 from smachpy.testing.runs import Run
 from smachpy.testing.servers import (
     ScriptedActionServer,
@@ -449,6 +449,10 @@ class MissionKit:
     ) -> ScriptedNode:
         """Be a ROS 2 node with parameters and, with a `state`, a life cycle."""
         return ScriptedNode(self, name, parameters, state)
+
+    def ros1_node(self, name: str, parameters: Mapping[str, Any]) -> ScriptedRos1Node:
+        """Be a ROS 1 node with parameters of dynamic_reconfigure."""
+        return ScriptedRos1Node(self, name, parameters)
 
     def play(
         self,

@@ -1,4 +1,4 @@
-"""A scripted ROS 2 node: its parameters and its life cycle."""
+"""Scripted nodes: the parameters of a node and, in ROS 2, its life cycle."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import copy
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.interfaces import ros2
-from actionlib_core.pubsub.remote_node import parameter_value, value_of
+from actionlib_core.interfaces.dynamic_reconfigure.srv import Reconfigure
+from actionlib_core.pubsub.remote_node import add_to_config, parameter_value, value_of
 from actionlib_core.pubsub.service import Service
 from smachpy.testing.servers import ScriptedEnd, Test
 
@@ -68,15 +69,7 @@ class ScriptedNode(ScriptedEnd):
         parameters, self.state = self._first
         self.parameters = copy.deepcopy(parameters)
         self._free_at = 0.0  # when it is through with all requests so far [s]
-        answers = {
-            "get_parameters": self._get,
-            "set_parameters": self._set,
-            "list_parameters": self._list,
-        }
-        if self.state:
-            answers |= {"get_state": self._get_state, "change_state": self._change_state}
-        for service, answer in answers.items():
-            kind: Any = ros2.get_service(SERVICES[service])
+        for service, (kind, answer) in self._services().items():
 
             def handle(
                 request: Any, service: str = service, answer: Any = answer, kind: Any = kind
@@ -84,13 +77,24 @@ class ScriptedNode(ScriptedEnd):
                 seconds = self.takes.get(service, 0.0)
                 if seconds is None:
                     self._clock.event(f"the end of the test of {self.name}").wait()
-                    return kind.Response()
+                    return kind._response_class()
                 # One request after another, as a node with one thread.
                 self._free_at = max(self._free_at, self._clock.now()) + seconds
                 self._clock.sleep(self._free_at - self._clock.now())
-                return answer(request, kind.Response())
+                return answer(request, kind._response_class())
 
             Service(f"/{self.name.strip('/')}/{service}", kind, handle, node=self.node)
+
+    def _services(self) -> dict[str, tuple[Any, Any]]:
+        """Return its services: name -> class, and the function that answers."""
+        answers = {
+            "get_parameters": self._get,
+            "set_parameters": self._set,
+            "list_parameters": self._list,
+        }
+        if self.state:
+            answers |= {"get_state": self._get_state, "change_state": self._change_state}
+        return {name: (ros2.get_service(SERVICES[name]), each) for name, each in answers.items()}
 
     def copy_to(self, kit: Test) -> Self:
         """Make the same node in another test."""
@@ -154,4 +158,31 @@ class ScriptedNode(ScriptedEnd):
         if after:
             self.transitions.append(label)
             self.state = after
+        return response
+
+
+class ScriptedRos1Node(ScriptedNode):
+    """A ROS 1 node with parameters of dynamic_reconfigure; it answers as ROS 1's own server does.
+
+    It ignores parameters that it does not have, and values of another type. Made by
+    `mission.ros1_node`; it has what `ScriptedNode` has, without a life cycle. What is `refused`
+    keeps its value, and the reason is told to nobody.
+    """
+
+    def _services(self) -> dict[str, tuple[Any, Any]]:
+        return {"set_parameters": (Reconfigure, self._reconfigure)}
+
+    def _reconfigure(self, request: Any, response: Any) -> Any:
+        config = request.config
+        changed = {
+            part.name: part.value
+            for part in (*config.bools, *config.ints, *config.strs, *config.doubles)
+            if type(self.parameters.get(part.name)) is type(part.value)
+            and part.name not in self.refused
+        }
+        if changed:
+            self.parameters |= changed
+            self.changes.append(changed)
+        for name, value in self.parameters.items():
+            add_to_config(response.config, name, value)
         return response

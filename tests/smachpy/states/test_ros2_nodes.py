@@ -269,6 +269,85 @@ def test_they_are_restored_after_a_kill_at_any_moment(mission, controller):
     assert found.runs > 3
 
 
+# -- ROS 1 -------------------------------------------------------------------------------------
+
+PLANNER = {"max_vel_x": 0.5, "samples": 3, "holonomic": False, "frame": "odom"}
+
+
+@pytest.fixture
+def planner(mission):
+    return mission.ros1_node("move_base/Planner", PLANNER)
+
+
+def slowly_in_ros1(values=None, **options):
+    sm = StateMachine([*ENDS, "done"], name="SLOWLY")
+    slow = SetParameters("move_base/Planner", values or SLOW, ros1=True, **options)
+    sm.add("SLOW", slow, {"succeeded": "WORK"})
+    sm.add("WORK", Wait(10.0))
+    sm.add_cleanup("RESTORE", RestoreParameters())
+    return sm
+
+
+def test_parameters_of_a_ros1_node_are_set_during_the_work_and_set_back(mission, planner):
+    values = {"max_vel_x": 1, "samples": 5, "holonomic": True, "frame": "map"}
+    sm = slowly_in_ros1(values)
+    mission(sm).assert_outcome("done")
+    assert planner.changes == [values, PLANNER]
+    assert type(planner.changes[0]["max_vel_x"]) is float
+    assert sm.userdata.parameters_before == {}
+
+
+@pytest.mark.parametrize("after", [0.0, 1.0, 3.0, 4.5])
+def test_those_of_a_ros1_node_are_set_back_whenever_a_preempt_comes(mission, planner, after):
+    planner.takes["set_parameters"] = 2.0
+    mission.preempt(on="SLOW", after=after) if after < 4 else mission.preempt(on="WORK")
+    mission(slowly_in_ros1()).assert_outcome("preempted")
+    mission(alone(Wait(10.0)))
+    assert planner.parameters == PLANNER
+
+
+@pytest.mark.parametrize(
+    ("values", "problem"),
+    [
+        ({"max_vel": 1.0}, "max_vel: got no such parameter; expected one of its own. Did you mean"),
+        ({"holonomic": "yes"}, "holonomic: the node did not take the value. Try"),
+        ({"samples": 2.5}, "samples: the node did not take the value: 3, not 2.5. Try"),
+        ({"max_vel_x": 9.0}, "max_vel_x: the node did not take the value: 0.5, not 9.0. Try"),
+    ],
+)
+def test_what_a_ros1_node_does_not_take_is_told(mission, planner, caplog, values, problem):
+    planner.refused["max_vel_x"] = "beyond its limits"
+    mission(slowly_in_ros1(values)).assert_outcome("aborted")
+    assert f"/move_base/Planner: {problem}" in caplog.text
+    assert planner.parameters == PLANNER
+
+
+def test_a_ros1_node_that_is_not_there_or_never_answers(mission, caplog):
+    run = mission(slowly_in_ros1(timeout=3.0))
+    assert run.outcome == "aborted"
+    assert "/move_base/Planner/set_parameters: no server" in caplog.text
+    planner = mission.ros1_node("move_base/Planner", PLANNER)
+    planner.takes["set_parameters"] = None
+    mission(slowly_in_ros1(timeout=3.0)).assert_outcome("aborted")
+    assert "/move_base/Planner/set_parameters: no answer" in caplog.text
+
+
+def test_a_node_of_the_other_ros_is_told(mission, planner, caplog):
+    mission.ros2_node("controller", FAST)
+    for name, ros1 in (("controller", True), ("move_base/Planner", False)):
+        state = SetParameters(name, SLOW, ros1=ros1, timeout=3.0)
+        mission(alone(state)).assert_outcome("aborted")
+    assert "expected one of type dynamic_reconfigure/Reconfigure" in caplog.text
+    assert "expected one of type rcl_interfaces/srv/GetParameters" in caplog.text
+    assert planner.parameters == PLANNER
+
+
+@pytest.mark.parametrize("value", [None, [1], b"x", 2**31])
+def test_what_no_ros1_parameter_can_be_is_refused_where_it_is_given(value):
+    with pytest.raises(InvalidStateError, match=r"values: x: got .* an int of 32 bits"):
+        SetParameters("a", {"x": value}, ros1=True)
+
+
 # -- life cycles -------------------------------------------------------------------------------
 
 

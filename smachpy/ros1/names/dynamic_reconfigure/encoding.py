@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from smachpy.ros1.names.dynamic_reconfigure import (
-    BoolParameter,
-    DoubleParameter,
-    DynamicReconfigureParameterException,
-    IntParameter,
-    StrParameter,
-)
+from actionlib_core.pubsub.remote_node import add_to_config
 from smachpy.ros1.names.dynamic_reconfigure import Config as ConfigMsg
+from smachpy.ros1.names.dynamic_reconfigure import DynamicReconfigureParameterException
 from smachpy.ros1.stubs import Anything
 
 
@@ -43,21 +38,11 @@ def encode_config(config: dict[str, Any], flat: bool = True) -> Any:
     """
     del flat
     msg = ConfigMsg()
-    # bool first: in Python a bool is an int as well.
     for name, value in config.items():
-        for kind, make, place in (
-            (bool, BoolParameter, msg.bools),
-            (int, IntParameter, msg.ints),
-            (float, DoubleParameter, msg.doubles),
-            ((str, Anything), StrParameter, msg.strs),
-        ):
-            if isinstance(value, kind):
-                place.append(make(name, str(value) if place is msg.strs else value))
-                break
-        else:
-            raise DynamicReconfigureParameterException(
-                f"{name}: got {value!r}; expected a bool, a number or a text."
-            )
+        try:
+            add_to_config(msg, name, str(value) if isinstance(value, Anything) else value)
+        except ValueError as error:
+            raise DynamicReconfigureParameterException(f"{name}: {error}") from error
     return msg
 
 
