@@ -29,8 +29,9 @@ from tests.free_port import free_port
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-# Pages that drive the robot for long.
+# Pages that drive the robot for long. `.ci/installed` tries README.md and the tutorial with the wheel.
 SLOW = {
+    "README.md",
     "demo_action.md",
     "demo_service.md",
     "rp_action.md",

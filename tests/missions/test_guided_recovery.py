@@ -169,6 +169,7 @@ def succeeds_only_at_the_goal(run):
     return (run.outcome == "succeeded") <= (run.outcomes("DRIVE")[-1:] == ("succeeded",))
 
 
+@pytest.mark.slow
 def test_whatever_happens_it_ends_and_asks_last(mission):
     found = mission.explore(
         guided_recovery,
@@ -181,6 +182,7 @@ def test_whatever_happens_it_ends_and_asks_last(mission):
     found.assert_ok()
 
 
+@pytest.mark.slow
 def test_whatever_servers_do_it_ends(mission):
     here = {"/GUIDED_RECOVERY/REMEMBER": {"home": Pose2D(9.8, 7.1, 0.0)}}
     found = mission.explore(

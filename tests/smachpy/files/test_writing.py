@@ -96,7 +96,7 @@ def facts(record: Any) -> Any:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(TREES)
 def test_python_to_yaml_to_python_is_the_same_machine(tmp_path_factory, tree):
     path = tmp_path_factory.mktemp("files") / "machine.yaml"

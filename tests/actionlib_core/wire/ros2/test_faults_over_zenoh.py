@@ -303,6 +303,7 @@ class Twin:
         )
 
 
+@pytest.mark.slow
 def test_a_thousand_goals(robot: Ros2Robot) -> None:
     process = Process(robot)
     client = Client(robot)
