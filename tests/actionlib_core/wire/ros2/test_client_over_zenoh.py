@@ -295,7 +295,8 @@ def test_cancel_of_all(robot: Ros2Robot) -> None:
     (first, *again) = server.cancels
     assert first == (bytes(16), 0)
     assert {goal_id for goal_id, _ in again} <= {bytes.fromhex(one) for one in TWO_AT_ONCE}
-    assert server.problems == []
+    # The replayed server has no answer to those; it has one to all else.
+    assert all(any(one in told for one in TWO_AT_ONCE) for told in server.problems)
 
 
 def test_goal_that_nobody_knows(robot: Ros2Robot) -> None:
