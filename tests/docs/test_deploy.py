@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import shutil
@@ -84,6 +85,16 @@ def test_a_workflow_runs_scripts_and_targets_that_are_there(workflow):
     assert [
         one for one in uses if not re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|release/v\d+)", one)
     ] == []
+
+
+@pytest.mark.parametrize(("tag", "code"), [("v0.1.0", 0), ("v0.1", 1), ("v99.0.0", 1)])
+def test_a_tag_is_published_only_if_the_changelog_has_a_dated_section_for_it(tag, code):
+    release = steps(ROOT / ".github" / "workflows" / "release.yml")
+    (dated,) = [one["run"] for one in release if "CHANGELOG.md" in one.get("run", "")]
+    done = subprocess.run(
+        dated, shell=True, cwd=ROOT, env={"GITHUB_REF_NAME": tag, "PATH": os.environ["PATH"]}
+    )
+    assert done.returncode == code
 
 
 def test_the_workflows_try_the_versions_of_python_that_are_claimed():
