@@ -1,8 +1,9 @@
 """Evidence: what was tried with a mission before it may drive a robot.
 
 `smachpy certify` writes it, one JSON file. `smachpy run` and `smachpy runner` with
-`--require-evidence` run only missions whose hash is that of a good one. The file is not signed:
-whoever may write it may say what he likes, as with the code.
+`--require-evidence` run only missions whose hash is that of a good one. A run says what there is in
+a note of its machine, and in others what it does that nobody has tried: the engine knows notes, and
+no evidence. The file is not signed: whoever may write it may say what he likes, as with the code.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import json
 import platform
 import sys
 import sysconfig
+from dataclasses import dataclass
 from importlib.machinery import PathFinder
 from importlib.metadata import version
 from pathlib import Path
@@ -21,13 +23,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypedDict
 from actionlib_core.inputs.checked_data import checked
 from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.inputs.json_text import load_json
+from actionlib_core.process.output import printable
 from smachpy.command.targets import DATA, TargetError, names_file
+from smachpy.events import Left, Noted, Recovered, Started
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from smachpy.command.targets import Target
+    from smachpy.events import Event
+    from smachpy.machines.container import Container
 
 FORMAT: Final = "smachpy-evidence"
 VERSION: Final = 1
@@ -38,6 +44,9 @@ MAX_FILES: Final = 2_000
 """Largest number of files of a mission: all of them are in its hash."""
 
 LIBRARY: Final = ("actionlib_core", "smachpy")
+
+NOTE: Final = "evidence: "
+"""How the notes of a run begin that say what evidence it has."""
 
 
 class EvidenceError(SmachError):
@@ -51,12 +60,76 @@ class _Hashed(TypedDict):
     hash: str
 
 
+class _Taken(TypedDict):
+    explored: list[str]
+    simulated: list[str]
+    recorded: list[str]
+
+
 class _Evidence(TypedDict):
     format: Literal["smachpy-evidence"]
     version: Literal[1]
     ok: bool
     mission: _Hashed
     library: _Hashed
+    taken: _Taken
+
+
+@dataclass(frozen=True, slots=True)
+class Seal:
+    """What evidence there is of a mission.
+
+    Attributes:
+        is_valid: It is good, and for this mission and this library.
+        text: What there is, in words.
+        taken: The transitions that were taken with these files of the mission; None if there is no
+            evidence of them.
+    """
+
+    is_valid: bool
+    text: str
+    taken: frozenset[str] | None = None
+
+    def watch(self, machine: Container) -> Callable[[], None]:
+        """Say in notes of the machine what there is, and once each what nobody has tried.
+
+        Returns:
+            A function that ends it.
+        """
+        said: set[str] = set()
+        root = unsaid = ""
+
+        def note(frame: Any, text: str) -> None:
+            with frame.run.lock:  # published before the next event, also for later listeners
+                frame.note(root, Noted, f"{NOTE}{text}")
+
+        def on_event(event: Event) -> None:
+            nonlocal root, unsaid
+            if isinstance(event, Started | Recovered):
+                root, unsaid = event.path, self.text
+            frame = machine._smachpy.live.root
+            if frame is None:  # the run begins, or has ended
+                return
+            if unsaid:
+                text, unsaid = unsaid, ""
+                note(frame, text)
+            if isinstance(event, Left) and self.taken is not None:
+                taken = transition_text(event.path, event.outcome)
+                if taken not in self.taken and taken not in said:
+                    said.add(taken)
+                    note(frame, f"nothing that was tried has taken {taken}")
+
+        return machine.subscribe(on_event)
+
+
+def transition_text(path: str, outcome: str) -> str:
+    """Return a transition as evidence lists it."""
+    return f"{path} -{outcome}->"
+
+
+def transitions_of(records: Iterable[dict[str, Any]]) -> set[str]:
+    """Return the transitions that the events of a recording take."""
+    return {transition_text(e["path"], e["outcome"]) for e in records if e["kind"] == "Left"}
 
 
 def mission_facts(target: Target, text: str) -> dict[str, Any]:
@@ -109,8 +182,10 @@ def library_facts() -> dict[str, Any]:
     }
 
 
-def check_evidence(places: Sequence[str], target: Target, text: str) -> None:
-    """Refuse a mission without good evidence.
+def find_seal(places: Sequence[str], target: Target, text: str) -> Seal:
+    """Return what evidence there is of a mission.
+
+    One good file is enough, whatever others there are.
 
     Args:
         places: Files of `smachpy certify`, and folders with them.
@@ -118,24 +193,49 @@ def check_evidence(places: Sequence[str], target: Target, text: str) -> None:
         text: As the user named it.
 
     Raises:
-        EvidenceError: there is none for these files and this library; or one cannot be read.
+        TargetError: as `mission_facts`.
     """
     mission, library = mission_facts(target, text)["hash"], library_facts()["hash"]
-    near = "none of this mission"
+    near = ["none of this mission", "", "", ""]  # the later, the nearer
+    valid, taken = "", None
     for path in _files(places):
-        found = read_evidence(path)
+        name = printable(str(path))
+        try:
+            found = read_evidence(path)
+        except EvidenceError as error:
+            near[1] = near[1] or f"a file that cannot be read: {error}"
+            continue
         if found["mission"]["hash"] != mission:
             continue
+        taken = (taken or frozenset()).union(*found["taken"].values())
         if found["library"]["hash"] != library:
-            near = f"{path}, of another version of smachpy"
+            near[2] = near[2] or f"{name}, of another version of smachpy"
         elif not found["ok"]:
-            near = f"{path}, which has found problems"
+            near[3] = near[3] or f"{name}, which has found problems"
         else:
-            return
-    raise EvidenceError(
-        f"mission {target.name!r}, hash {mission}: evidence: got {near}; expected one that is "
-        f"good. Try 'smachpy certify {text} -o FILE'."
-    )
+            valid = valid or f"valid, {name}"
+    text = valid or next(filter(None, reversed(near)))
+    return Seal(bool(valid), f"{text}; hash {mission}", taken)
+
+
+def check_evidence(places: Sequence[str], target: Target, text: str) -> Seal:
+    """Return the seal of a mission; refuse a mission without good evidence.
+
+    Args:
+        places: As for `find_seal`.
+        target: The same.
+        text: The same.
+
+    Raises:
+        EvidenceError: there is none for these files and this library.
+    """
+    seal = find_seal(places, target, text)
+    if not seal.is_valid:
+        raise EvidenceError(
+            f"mission {target.name!r}: evidence: got {seal.text}; expected one that is good. "
+            f"Try 'smachpy certify {text} -o FILE'."
+        )
+    return seal
 
 
 def read_evidence(path: Path) -> dict[str, Any]:
@@ -182,12 +282,13 @@ def _imported(name: str, file: Path, is_file: bool) -> dict[str, Path]:
     found = {file.stem if is_file else name: file}
     waiting = [(name, file)]
     while waiting and len(found) <= MAX_FILES:
-        for word in _names_in(*waiting.pop()):
+        module, at = waiting.pop()
+        for word in _names_in(module, at) if at.suffix == ".py" else ():  # else it is compiled
             for one, where in _found(word, path):
                 first = one.partition(".")[0]
                 is_apart = any(where.is_relative_to(place) for place in apart)
                 is_own = first == top or (first not in {*LIBRARY, "smachpy_viz"} and not is_apart)
-                if one not in found and is_own and where.suffix == ".py":
+                if one not in found and is_own:
                     found[one] = where
                     waiting.append((one, where))
     return found

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import TextIO
 
+    from smachpy.command.evidence import Seal
     from smachpy.command.targets import Target
     from smachpy.events.introspection import StateRecord
     from smachpy.machines.container import Container
@@ -74,6 +75,7 @@ class RunOptions:
         debug: Show the traceback of a mission that raises.
         watching: Page, network and recording of the run.
         durable: Journal of the run; None for a run that need not survive.
+        seal: What evidence there is of the mission; None if nobody wants to know it.
     """
 
     inputs: Mapping[str, object] = field(default_factory=dict)
@@ -91,6 +93,7 @@ class RunOptions:
     debug: bool = False
     watching: Watching = field(default_factory=Watching)
     durable: DurableOptions | None = None
+    seal: Seal | None = None
 
 
 def run_mission(target: Target, options: RunOptions) -> int:
@@ -139,6 +142,8 @@ def run_mission(target: Target, options: RunOptions) -> int:
         journal = stack.enter_context(contextlib.ExitStack())
         closing: list[Callable[[], object]] = []
         journal.enter_context(journalled(target, machine, options.durable, closing))
+        if options.seal is not None:
+            stack.callback(options.seal.watch(machine))
         watch = stack.enter_context(
             watched(target.shown_name or target.name, machine, record.path, options.watching)
         )

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import TextIO
 
+    from smachpy.command.evidence import Seal
     from smachpy.command.mission_run import RunOptions
     from smachpy.command.surroundings import Pace, RobotOptions
     from smachpy.command.targets import Target
@@ -151,11 +152,20 @@ def register(subparsers: Any) -> None:
     # For what rows of a store name; the target on the command line is then only shown.
     parser.add_argument("--queued", action="store_true", help=argparse.SUPPRESS)
     add_allow_packages(parser)
-    add_require_evidence(parser)
+    evidence = parser.add_mutually_exclusive_group()
+    add_require_evidence(evidence)
+    evidence.add_argument(
+        "--evidence",
+        action="append",
+        default=[],
+        metavar="FILE|DIR",
+        help="say whether the mission has evidence of 'smachpy certify' here, and run it in any "
+        "case (repeatable)",
+    )
     parser.set_defaults(run=_run, words=())
 
 
-def add_require_evidence(parser: argparse.ArgumentParser) -> None:
+def add_require_evidence(parser: argparse._ActionsContainer) -> None:
     """Add the option `--require-evidence`."""
     parser.add_argument(
         "--require-evidence",
@@ -272,16 +282,23 @@ def _run_mission(
     if ros1 is not None:
         if args.input:
             raise MissionError("--input: got --ros1 beside it; expected --params FILE.")
+        if args.require_evidence or args.evidence:
+            raise MissionError(
+                "--require-evidence, --evidence: got --ros1 beside it; expected a mission, as no "
+                "script of ROS 1 is certified. Try smachpy port."
+            )
         return run_ros1(args.target, ros1, _options(args, {}, None, events), robot)
     target = load_target(args.target, allow=args.allow)
     if args.queued:
         from smachpy.command.queued import check_is_mission
 
         check_is_mission(target)
-    if args.require_evidence:
-        from smachpy.command.evidence import check_evidence
+    seal = None
+    if args.require_evidence or args.evidence:
+        from smachpy.command.evidence import check_evidence, find_seal
 
-        check_evidence(args.require_evidence, target, args.target)
+        places = args.require_evidence or args.evidence
+        seal = (check_evidence if args.require_evidence else find_seal)(places, target, args.target)
     if wants_help(args.words):
         print(usage(target))
         return 0
@@ -292,7 +309,7 @@ def _run_mission(
     if args.record is not None or args.view:
         random.seed(origin["seed"])  # a mission that throws dice throws the same ones again
     world = mission_info(target.thing).world
-    return run_mission(target, _options(args, inputs, world, events, origin))
+    return run_mission(target, _options(args, inputs, world, events, origin, seal))
 
 
 def _options(
@@ -301,6 +318,7 @@ def _options(
     world: Path | None,
     events: TextIO | None,
     origin: Mapping[str, Any] = MappingProxyType({}),
+    seal: Seal | None = None,
 ) -> RunOptions:
     from smachpy.command.mission_run import RunOptions
     from smachpy.command.watching import Watching
@@ -320,6 +338,7 @@ def _options(
         server_timeout=args.server_timeout,
         debug=args.debug,
         durable=durable_options(args),
+        seal=seal,
         watching=Watching(
             record=args.record,
             inputs=args.record_inputs,

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.inputs.suggest import did_you_mean
+from smachpy.command.evidence import NOTE
 from smachpy.userdata.shown import literal
 
 if TYPE_CHECKING:
@@ -186,6 +187,8 @@ def steps_of(
         names = FIELDS.get(kind)
         if names is None or kind in left_out or _is_tolerated(event, tolerate):
             continue
+        if kind == "Noted" and path == record.path and str(event.get("text")).startswith(NOTE):
+            continue  # of the evidence that there was, and not of the run
         facts = {name: _plain(event.get(name)) for name in names}
         if "error" in facts:  # further lines list threads and places
             facts["error"] = str(facts["error"]).partition("\n")[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,15 @@ def test_a_mission_of_more_files_than_are_hashed_is_refused(monkeypatch):
         hash_of("good.py")
 
 
+def test_compiled_modules_are_in_the_hash():
+    Path("evidence_late.py").unlink()
+    compiled = Path(f"evidence_late{EXTENSION_SUFFIXES[0]}")
+    compiled.write_bytes(b"one")
+    before = hash_of("good.py")
+    compiled.write_bytes(b"two")
+    assert hash_of("good.py") != before
+
+
 def test_the_hash_is_of_all_that_the_mission_imports():
     facts = mission_facts(load_target("good.py"), "good.py")
     assert sorted(facts["files"]) == [
@@ -91,7 +101,8 @@ def test_a_shipped_mission_and_a_mission_file_have_a_hash_of_their_own_files():
 def evidence(**facts):
     mission = mission_facts(load_target("good.py"), "good.py")
     made = {"format": "smachpy-evidence", "version": 1, "ok": True, "mission": mission}
-    return json.dumps({**made, "library": library_facts(), **facts})
+    taken = {"explored": ["/GOOD/WORK -done->"], "simulated": [], "recorded": []}
+    return json.dumps({**made, "library": library_facts(), "taken": taken, **facts})
 
 
 REFUSED = [
@@ -101,6 +112,8 @@ REFUSED = [
     (lambda: evidence(mission=5), "$.mission: got 5; expected an object"),
     (lambda: evidence(ok="yes"), "$.ok: got 'yes'"),
     (lambda: evidence(version=2), "$.version: got 2"),
+    (lambda: evidence(taken={"explored": []}), "$.taken: "),
+    (lambda: evidence(taken=[]), "$.taken: got a list of 0"),
     (lambda: evidence()[:-9], "it is no JSON"),
     (lambda: "", "it is no JSON"),
     (lambda: None, "No such file"),
@@ -124,9 +137,74 @@ def test_a_mission_with_evidence_runs_until_it_is_changed(folder, capsys):
     assert main(run) == 0
     Path("evidence_parts/second.py").write_text("def part():\n    return 7\n")
     assert main(run) == 2
-    assert (
-        "evidence: got none of this mission; expected one that is good." in capsys.readouterr().err
+    assert "evidence: got none of this mission; hash " in capsys.readouterr().err
+
+
+def noted(capsys, *words, code=0):
+    """The notes of a run about its evidence, as the terminal has them."""
+    assert main(["run", "good.py", "--plain", *words]) == code
+    lines = capsys.readouterr().out.splitlines()
+    return [line.partition("evidence: ")[2] for line in lines if "evidence: " in line]
+
+
+def test_one_good_file_is_enough_beside_others(capsys):
+    Path("all").mkdir()
+    for number, text in enumerate(
+        [evidence(ok=False), "{", evidence(), evidence(library={"hash": "x"})]
+    ):
+        Path(f"all/{number}.json").write_text(text)
+    assert noted(capsys, "--require-evidence", "all")[0].startswith("valid, all/2.json; hash ")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (evidence, "valid, e.json; hash "),
+        (lambda: evidence(ok=False), "e.json, which has found problems; hash "),
+        (lambda: evidence(library={"hash": "x"}), "e.json, of another version of smachpy; hash "),
+        (lambda: evidence(mission={"hash": "x"}), "none of this mission; hash "),
+        (lambda: "{", "a file that cannot be read: "),
+    ],
+)
+def test_a_run_says_what_evidence_there_is(text, said, capsys):
+    Path("e.json").write_text(text())
+    (line,) = noted(capsys, "--evidence", "e.json", "--record", "r.jsonl")
+    assert line.startswith(said)
+    recorded = [json.loads(one) for one in Path("r.jsonl").read_text().splitlines()]
+    assert [e["text"] for e in recorded if e.get("kind") == "Noted"] == [f"evidence: {line}"]
+    assert noted(capsys) == []
+
+
+def test_a_run_says_once_what_nobody_has_tried(capsys):
+    """In the order of the events, also for those who listen later."""
+    text = MISSION.replace(
+        'sm.add("WORK", CBState(work, outcomes=["done"]))',
+        'sm.add("WORK", CBState(work, outcomes=["done"]), {"done": "AGAIN"})\n'
+        '    sm.add("AGAIN", CBState(twice, outcomes=["done", "again"]), {"again": "WORK"})',
     )
+    text += "\nTIMES = []\n\n\ndef twice(_userdata):\n    TIMES.append(1)\n"
+    text += '    return "again" if len(TIMES) % 3 else "done"\n'
+    Path("good.py").write_text(text)
+    taken = {
+        "explored": ["/GOOD/WORK -done->"],
+        "simulated": [],
+        "recorded": ["/GOOD/AGAIN -done->"],
+    }
+    Path("e.json").write_text(evidence(taken=taken))
+    lines = noted(capsys, "--evidence", "e.json", "--record", "r.jsonl")
+    assert lines[1:] == ["nothing that was tried has taken /GOOD/AGAIN -again->"]
+    events = [json.loads(one) for one in Path("r.jsonl").read_text().splitlines()]
+    kinds = [(e["kind"], e["path"]) for e in events if "kind" in e]
+    assert kinds[:3] == [("Started", "/GOOD"), ("Entered", "/GOOD/WORK"), ("Noted", "/GOOD")]
+    assert kinds[kinds.index(("Noted", "/GOOD"), 3) - 1] == ("Left", "/GOOD/AGAIN")
+    assert main(["runs", "reproduce", "r.jsonl", "--allow", "good.py"]) == 0  # without the notes
+
+
+def test_scripts_of_ros1_have_no_evidence(capsys):
+    Path("e.json").write_text(evidence())
+    for option in ("--evidence", "--require-evidence"):
+        assert main(["run", "--ros1", "good.py", option, "e.json"]) == 2
+        assert "got --ros1 beside it" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -146,6 +224,11 @@ def test_what_is_certified_is_run_by_runners_and_nothing_else(folder, capfd):
     assert good["explore"]["coverage"]["states"] == [2, 2]
     assert good["simulate"]["outcomes"] == {"done": 3}
     assert [one["result"] for one in good["reproduce"]["recordings"]] == ["same"]
+    assert good["taken"] == {
+        "explored": ["/GOOD/WORK -done->"],
+        "simulated": ["/GOOD/WORK -done->"],
+        "recorded": ["/GOOD/WORK -done->"],
+    }
     assert good["inputs"] == {"word": "y"}
     assert main([*certify, "-o", "good.json"]) == 2  # it is there
     assert main(["submit", "good.py", "--db", "j.db", "--mission", "one"]) == 0

@@ -134,14 +134,16 @@ def _run(args: argparse.Namespace) -> int:
         "library": library,
         "assumed": list(ASSUMED),
     }
+    taken: dict[str, set[str]] = {"explored": set(), "simulated": set(), "recorded": set()}
     for name, part in (
         ("check", _checked(args, inputs)),
-        ("explore", _explored(args, inputs)),
-        ("simulate", _simulated(args, inputs)),
-        ("reproduce", _reproduced(args)),
+        ("explore", _explored(args, inputs, taken["explored"])),
+        ("simulate", _simulated(args, inputs, taken["simulated"])),
+        ("reproduce", _reproduced(args, taken["recorded"])),
     ):
         evidence[name] = part
         print(printable(f"{target.name}: {name}: {part['said']}"), flush=True)
+    evidence["taken"] = {kind: sorted(found) for kind, found in taken.items()}
     evidence["ok"] = all(evidence[n]["ok"] for n in ("check", "explore", "simulate", "reproduce"))
     if mission_facts(target, args.mission) != mission:
         raise UsageError(f"{where}: the mission's files have changed meanwhile; expected the same.")
@@ -188,7 +190,9 @@ def _maker(args: argparse.Namespace, inputs: Mapping[str, Text]) -> MissionMaker
     return MissionMaker(args.mission, inputs, imports=True, allow=tuple(args.allow))
 
 
-def _explored(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str, Any]:
+def _explored(
+    args: argparse.Namespace, inputs: Mapping[str, Text], taken: set[str]
+) -> dict[str, Any]:
     from smachpy.command.explore import reckoning_states
     from smachpy.events.introspection import describe
     from smachpy.testing.coverage import KINDS, Coverage
@@ -206,6 +210,7 @@ def _explored(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str,
         on_run=coverage.add,
         jobs=args.jobs,
     )
+    taken.update(coverage.machines[0].taken["edges"])
     leaves = [one.path for one in describe(machine).walk() if not one.is_container]
     counts = {kind: list(coverage.machines[0].counts(kind)) for kind in KINDS}
     missed = {kind: coverage.machines[0].missed(kind) for kind in KINDS}
@@ -224,7 +229,11 @@ def _explored(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str,
     }
 
 
-def _simulated(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str, Any]:
+def _simulated(
+    args: argparse.Namespace, inputs: Mapping[str, Text], taken: set[str]
+) -> dict[str, Any]:
+    from smachpy.command.evidence import transitions_of
+    from smachpy.events.recording import read_recording
     from smachpy_viz.runs.simulate import SimulationPlan, Vary, simulate
 
     if not args.runs:
@@ -233,6 +242,9 @@ def _simulated(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str
     with tempfile.TemporaryDirectory(prefix="smachpy-certify-") as folder:
         plan = SimulationPlan(args.mission, args.runs, Path(folder), given, allow=args.allow)
         results = simulate(plan, jobs=args.jobs)
+        for one in results:
+            if one.outcome is not None:
+                taken |= transitions_of(read_recording(one.task.file).events)
     ends = Counter(one.outcome for one in results if one.outcome is not None)
     failed = [f"run {one.task.number}: {one.error}" for one in results if one.outcome is None]
     said = [f"{outcome} x{count}" for outcome, count in ends.most_common()]
@@ -246,8 +258,9 @@ def _simulated(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str
     }
 
 
-def _reproduced(args: argparse.Namespace) -> dict[str, Any]:
-    from smachpy.events.recording import find_recordings
+def _reproduced(args: argparse.Namespace, taken: set[str]) -> dict[str, Any]:
+    from smachpy.command.evidence import transitions_of
+    from smachpy.events.recording import find_recordings, read_recording
     from smachpy.reproduce.report import summary
     from smachpy.reproduce.task import Options
     from smachpy_viz.runs.reproduce_cli import verdicts_of
@@ -261,6 +274,9 @@ def _reproduced(args: argparse.Namespace) -> dict[str, Any]:
         )
     options = Options(args.mission, tuple(args.allow))
     verdicts = list(verdicts_of(paths, options, args.jobs))
+    for one in verdicts:
+        if one.kind != "failed":
+            taken |= transitions_of(read_recording(one.path).events)
     return {
         "ok": all(one.kind == "same" for one in verdicts),
         "said": summary(verdicts),

@@ -16965,6 +16965,7 @@ function Downloads() {
 
 // src/panels/top_bar.tsx
 var MOST_FOUND = 12;
+var SEAL = "evidence: ";
 function TopBar({ page: page2 }) {
   if (store.view.pageShown.value !== "machine")
     return /* @__PURE__ */ a4("header", { class: "top", children: [
@@ -17003,6 +17004,7 @@ function TopBar({ page: page2 }) {
         children: "Why?"
       }
     ),
+    /* @__PURE__ */ a4(SealChip, {}),
     /* @__PURE__ */ a4(ReproduceButtons, { class: "wide" }),
     problems > 0 && /* @__PURE__ */ a4("span", { class: "chip", title: "problems of the machine's structure; see the inspector", children: [
       "⚠ ",
@@ -17037,6 +17039,15 @@ function canAskWhy() {
   const { now } = store.data.run;
   const about = store.data.facts.value;
   return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
+}
+function SealChip() {
+  store.playback.watch();
+  const root = store.data.model.value?.root.path ?? "";
+  const note = store.data.run.now.states[root]?.note ?? "";
+  if (!note.startsWith(SEAL)) return null;
+  const text2 = note.slice(SEAL.length);
+  const word = text2.startsWith("valid") ? "✓ certified" : text2.startsWith("nothing") ? "⚠ not tried" : "⚠ no evidence";
+  return /* @__PURE__ */ a4("span", { class: "chip", title: note, "data-testid": "seal", children: word });
 }
 function Chooser() {
   const facts = store.data.facts.value;

@@ -154,3 +154,18 @@ test("the inspector says what is wrong with the machine", () => {
   store.data.problems.value = [{ rule: "stuck", severity: "error", path: "/PATROL", text: "no way out" }];
   assert.ok(lines(<Inspector page={page} />).some((line) => line.includes("no way out")));
 });
+
+test("the bar says what evidence the run has, and whether it did what nobody has tried", () => {
+  const chip = () => /data-testid="seal">([^<]*)</.exec(renderToString(<TopBar page={page} />))?.[1];
+  assert.equal(chip(), undefined);
+  const said: [string, string | undefined][] = [
+    ["aisle 7", undefined],
+    ["evidence: valid, e.json; hash 12", "✓ certified"],
+    ["evidence: nothing that was tried has taken /PATROL/ROUND -aborted->", "⚠ not tried"],
+    ["evidence: none of this mission; hash 12", "⚠ no evidence"],
+  ];
+  for (const [text, word] of said) {
+    store.addEvents([event("Noted", "/PATROL", { text })]);
+    assert.equal(chip(), word);
+  }
+});

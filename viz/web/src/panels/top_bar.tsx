@@ -17,6 +17,8 @@ import { ReproduceButtons } from "#panels/reproduction.tsx";
 import { FollowButton, toggleTree, ViewMenu } from "#panels/view_menu.tsx";
 
 const MOST_FOUND = 12;
+const SEAL = "evidence: "; // how the notes of a root begin that say what evidence there is
+
 export function TopBar({ page }: { page: Page }) {
   if (store.view.pageShown.value !== "machine")
     return (
@@ -59,6 +61,7 @@ export function TopBar({ page }: { page: Page }) {
           Why?
         </button>
       )}
+      <SealChip />
       <ReproduceButtons class="wide" />
       {problems > 0 && (
         <span class="chip" title="problems of the machine's structure; see the inspector">
@@ -102,6 +105,21 @@ function canAskWhy() {
   const { now } = store.data.run;
   const about = store.data.facts.value;
   return now.started != null && (now.ended != null || about?.recorded || about?.stale != null || isFile());
+}
+
+/** What evidence the run has, which its root notes, and whether it did what nobody has tried. */
+function SealChip() {
+  store.playback.watch();
+  const root = store.data.model.value?.root.path ?? "";
+  const note = store.data.run.now.states[root]?.note ?? "";
+  if (!note.startsWith(SEAL)) return null;
+  const text = note.slice(SEAL.length);
+  const word = text.startsWith("valid") ? "✓ certified" : text.startsWith("nothing") ? "⚠ not tried" : "⚠ no evidence";
+  return (
+    <span class="chip" title={note} data-testid="seal">
+      {word}
+    </span>
+  );
 }
 
 function Chooser() {
