@@ -706,19 +706,28 @@ def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         yield {**event, "seq": seq, **({"dropped": dropped} if dropped else {})}
 
 
-def read_recording(path: str | Path) -> Recording:
+def read_recording(path: str | Path, *, stream: bool = False) -> Recording:
     """Read a file.
 
     Data of robots' topics, and inputs, that have another form than `smachpy.events.reading` knows
     are left out, with a warning.
 
+    Args:
+        path: The file.
+        stream: Whether the `events` of a large file may be `Streamed`, for readers that only
+            iterate them; topics and definitions are left out then.
+
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event; with the line.
+            Streamed events raise it while they are iterated.
     """
     path = Path(path)
     try:
         with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
             size = os.fstat(file.fileno()).st_size
+            if stream and size > STREAMED:
+                header = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
+                return replace(header, events=cast("list[dict[str, Any]]", Streamed(path)))
             if size > LARGEST:
                 raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
             return _read(path, file)
@@ -888,8 +897,7 @@ def each_recording(places: Iterable[str | Path], *, stream: bool = False) -> Ite
 
     Args:
         places: Files and folders.
-        stream: Whether the `events` of large files may be `Streamed`, for readers that only iterate
-            them; topics and definitions are left out then.
+        stream: As for `read_recording`.
 
     Raises:
         RecordingError: there is no such file or folder, or a given file cannot be read.
@@ -902,8 +910,7 @@ def each_recording(places: Iterable[str | Path], *, stream: bool = False) -> Ite
         for path, run in zip(paths, runs, strict=True):
             is_part = bool(run) and runs.count(run) > 1
             try:
-                is_large = stream and not is_part and path.stat().st_size > STREAMED
-                recording = _streamed(path) if is_large else read_recording(path)
+                recording = read_recording(path, stream=stream and not is_part)
             except RecordingError as error:
                 if not Path(place).is_dir():
                     raise
@@ -914,12 +921,6 @@ def each_recording(places: Iterable[str | Path], *, stream: bool = False) -> Ite
             else:
                 yield recording
         yield from map(joined, parts.values())
-
-
-def _streamed(path: Path) -> Recording:
-    with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
-        recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
-    return replace(recording, events=cast("list[dict[str, Any]]", Streamed(path)))
 
 
 def joined(parts: Sequence[Recording]) -> Recording:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
+import random
 
 import pytest
 
 import smachpy
-from actionlib_core.clock import VirtualClock, use_clock
-from smachpy import CBState, Concurrence, State, StateMachine
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
+from smachpy import CBState, Concurrence, Iterator, State, StateMachine
 from smachpy.command import main
 from smachpy.events import to_record
 from smachpy.events.introspection import describe
@@ -318,3 +320,137 @@ def write(key, value):
         return "ok"
 
     return callback
+
+
+def at_random(picks, depth, worked):
+    """A container of some kind, whose children run again and again, write, read, and fail."""
+    keys = {"input_keys": ["a", "b"], "output_keys": ["a", "b"]}
+
+    def work(userdata):
+        worked()
+        userdata[picks.choice("ab")] = picks.random()
+        current_clock().sleep(picks.choice([0.1, 1.0]))
+        return picks.choices(["ok", "low", "aborted"], weights=[10, 10, 1])[0]
+
+    if not depth:
+        return CBState(work, outcomes=["ok", "low", "aborted", "preempted"], **keys)
+    made: StateMachine | Concurrence | Iterator
+    kind = picks.choice(["machine", "machine", "concurrence", "iterator"])
+    number = 14 if kind == "concurrence" and depth == 1 else picks.choice([2, 3])
+    children = [at_random(picks, depth - 1, worked) for _ in range(number)]
+    if kind == "iterator":
+        made = Iterator(OUTCOMES, it=range(picks.choice([3, 30])), exhausted_outcome="ok", **keys)
+        with made:
+            made.set_contained_state("C0", children[0], loop_outcomes=["ok", "low"])
+    elif kind == "concurrence":
+        made = Concurrence(
+            OUTCOMES,
+            default_outcome="low",
+            child_termination_cb=picks.choice([None, lambda ended: "aborted" in ended.values()]),
+            outcome_map={"ok": {f"C{i}": "ok" for i in range(number)}},
+            **keys,
+        )
+        with made:
+            for i, child in enumerate(children):
+                made.add(f"C{i}", child, remapping=picks.choice([{}, {"a": "b", "b": "a"}]))
+    else:
+        made = StateMachine(OUTCOMES, **keys)
+        with made:
+            for i, child in enumerate(children):
+                ways = {"ok": f"C{picks.randrange(number)}", "low": "SOME"}
+                ways |= picks.choice([{}, {"aborted": "C0"}])
+                made.add(f"C{i}", child, ways)
+            ends = CBState(
+                lambda _: picks.choices(["more", "ok", "aborted"], weights=[60, 2, 1])[0],
+                outcomes=["more", "ok", "aborted"],
+            )
+            made.add("SOME", ends, {"more": "C0"})
+    return made
+
+
+OUTCOMES = ["ok", "low", "aborted", "preempted"]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_run_that_is_not_held_as_a_whole_has_the_same_causes(seed):
+    picks = random.Random(seed)
+    left = iter(range(200))
+    top = StateMachine(OUTCOMES, name="TOP", userdata={"a": 0, "b": 0})
+
+    def worked():
+        if next(left, None) is None:
+            top.request_preempt()
+
+    with top:
+        for label in "PQ":
+            ways = {"ok": "P", "low": "Q", **picks.choice([{}, {"aborted": "P"}])}
+            top.add(label, at_random(picks, 2, worked), ways)
+    record, events = ran(top)
+    assert len(events) > 50
+    for size in {len(events), *picks.choices(range(1, len(events)), k=20)}:
+        cut = events[:size]
+        assert why(record, iter(cut), held=picks.choice([1, 20])) == why(record, cut)
+
+
+def failing_again_and_again(times, inner):
+    visits = itertools.count(1)
+    again = CBState(
+        lambda _: "aborted" if next(visits) % times else "ok", outcomes=["ok", "aborted"]
+    )
+    ways = {"aborted": "FAILS", "ok": "aborted"}
+    return machine([("FAILS", inner, {"aborted": "AGAIN"}), ("AGAIN", again, ways)])
+
+
+def many_at_once():
+    both = Concurrence(["ok", "aborted"], default_outcome="aborted")
+    with both:
+        for number in range(20):
+            outcome = "aborted" if number == 0 else "ok"
+            both.add(f"C{number}", Waits(1.0 + number, outcome))
+    return both
+
+
+@pytest.mark.parametrize("times", [5, 50])
+@pytest.mark.parametrize(
+    "inner",
+    [
+        lambda: Waits(1.0, "aborted"),
+        lambda: failing_again_and_again(6, Waits(1.0, "aborted")),
+        many_at_once,
+    ],
+)
+def test_a_long_way_to_an_end_is_told_as_far_as_that_of_a_run_that_is_held(times, inner):
+    record, events = ran(failing_again_and_again(times, inner()))
+    found = why(record, events, held=10**9)
+    assert len(found.steps) > 6
+    noted = {"kind": "Noted", "path": "/TOP", "stamp_ns": 2**60, "text": "on"}
+    for held in [1, *range(len(events) - 4, len(events))]:
+        assert why(record, events, held=held) == found
+        assert why(record, [*events[:-1], noted], held=held).ended == noted["stamp_ns"]
+
+
+def test_a_long_run_is_held_in_part():
+    class Told(dict):
+        alive = most = 0
+
+        def __init__(self, **facts):
+            super().__init__(facts)
+            Told.alive += 1
+            Told.most = max(Told.most, Told.alive)
+
+        def __del__(self):
+            Told.alive -= 1
+
+    record, (started, *_) = ran(machine([("A", Waits(1.0), {}), ("B", Waits(1.0), {})]))
+
+    def events():
+        yield started
+        for stamp in range(10_000):
+            place = {"path": "/TOP/A" if stamp % 2 else "/TOP/B", "stamp_ns": stamp}
+            yield Told(kind="Entered", **place)
+            yield Told(kind="UserdataWritten", key="left", value=stamp, **place)
+            yield Told(kind="Noted", text="on", **place)
+            yield Told(kind="Left", outcome="ok", **place)
+
+    assert why(record, events(), held=500).outcome is None
+    assert Told.most < 1_100

@@ -432,7 +432,7 @@ def test_a_large_recording_is_counted_event_by_event(record, monkeypatch, capsys
     path = record("run.jsonl", failing=True)
     whole = count_by_machine([read_recording(path)])
     monkeypatch.setattr(recording_module, "STREAMED", 10)
-    monkeypatch.setattr(recording_module, "read_recording", None)  # nothing is read whole
+    monkeypatch.setattr(recording_module, "_read", None)  # nothing is read whole
     (recording,) = each_recording([path], stream=True)
     assert isinstance(recording.events, recording_module.Streamed)
     assert count_by_machine([recording]) == whole
@@ -450,9 +450,21 @@ def test_a_large_recording_is_drawn_event_by_event(record, monkeypatch, tmp_path
     whole, streamed = tmp_path / "whole.txt", tmp_path / "streamed.txt"
     assert main(["runs", "export", str(path), "-o", str(whole)]) == 0
     monkeypatch.setattr(recording_module, "STREAMED", 10)
-    monkeypatch.setattr(recording_module, "read_recording", None)  # nothing is read whole
+    monkeypatch.setattr(recording_module, "_read", None)  # nothing is read whole
     assert main(["runs", "export", str(path), "-o", str(streamed)]) == 0
     assert streamed.read_text() == whole.read_text()
+
+
+def test_a_large_recording_is_explained_event_by_event(record, monkeypatch, capsys):
+    from smachpy.command import main
+
+    path = record("run.jsonl", failing=True)
+    assert main(["runs", "why", str(path)]) == 0
+    whole = capsys.readouterr().out
+    monkeypatch.setattr(recording_module, "STREAMED", 10)
+    monkeypatch.setattr(recording_module, "_read", None)  # nothing is read whole
+    assert main(["runs", "why", str(path)]) == 0
+    assert capsys.readouterr().out == whole
 
 
 def test_names_that_a_recording_repeats_are_kept_once(record):

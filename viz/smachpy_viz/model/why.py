@@ -14,10 +14,10 @@ from smachpy.events.outcome_classes import is_good, outcome_class
 from smachpy.events.run_state import RAISED
 from smachpy.userdata.shown import literal
 from smachpy_viz.model.labels import cleanups, innermost, shorten, tidies
-from smachpy_viz.model.reads import begin_of, values_read
+from smachpy_viz.model.reads import BEGINS, begin_of, values_read
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from smachpy.events.introspection import StateRecord
     from smachpy.events.outcome_classes import OutcomeClass
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 ENDS = frozenset({"Left", "Failed", "Finished"})
 MAX_EARLIER_CAUSES = 10
 """The longest chain of failed states that is shown for one machine."""
+
+HELD = 50_000
+"""Events that are held in memory before those that explain nothing are dropped."""
 
 MAX_KEYS = 8
 MAX_VALUE_LENGTH = 300
@@ -109,15 +112,16 @@ class Explanation:
         return "\n".join(lines)
 
 
-def why(record: StateRecord, events: Sequence[dict[str, Any]]) -> Explanation:
+def why(record: StateRecord, events: Iterable[dict[str, Any]], *, held: int = HELD) -> Explanation:
     """Return the causes of the end of a machine's newest run.
 
     Args:
         record: The machine.
         events: Its events in order, as `smachpy.events.to_record` makes them; the oldest may be
-            missing.
+            missing. They are iterated once, and a long run is not held as a whole.
+        held: About how many events are in memory at once; the explanation is the same with any.
     """
-    run = newest_run(events, record.path)
+    run = newest_run(_explaining(record, events, held), record.path)
     if not run:
         return Explanation(record.label, None, None, None)
     ends = [i for i, event in enumerate(run) if _is(event, "Finished", record.path)]
@@ -145,6 +149,65 @@ def newest_run(events: Sequence[dict[str, Any]], root: str) -> list[dict[str, An
             if ends and event["stamp_ns"] >= since.get(event["path"], _NEVER):
                 run[i] = _PASSED
     return [event for event in run if event is not _PASSED]
+
+
+def _explaining(
+    record: StateRecord, events: Iterable[dict[str, Any]], held: int
+) -> list[dict[str, Any]]:
+    """Return the events of the newest run without most of those that explain nothing."""
+    concurrences = frozenset(one.path for one in record.walk() if one.kind == "concurrence")
+    run: list[dict[str, Any]] = []
+    limit = held
+    for event in events:
+        if _is(event, "Started", record.path):
+            run.clear()
+        run.append(event)
+        if len(run) > limit:
+            run = _thinned(newest_run(run, record.path), concurrences)
+            limit = max(held, 2 * len(run))
+    return run
+
+
+def _thinned(run: list[dict[str, Any]], concurrences: frozenset[str]) -> list[dict[str, Any]]:
+    """Return the beginning of a run without what explains nothing, however the run goes on.
+
+    Of the visits in a container, other than a concurrence, the last ones explain its end. Others
+    explain what was written before a later visit began. Of what one visit does several times, the
+    last explains.
+    """
+    kept: list[dict[str, Any]] = []
+    ended: dict[str, int] = {}  # container -> visits in its present visit
+    passed: set[str] = set()  # states whose visit is left out
+    told: dict[str, set[str]] = {}  # state -> kinds of events in its present visit
+    written: set[tuple[str, str]] = set()  # state and key, before the next begin of a visit
+    for event in reversed(run[1:]):
+        path, kind = event["path"], event["kind"]
+        container = path.rpartition("/")[0]
+        if kind in ENDS:
+            ended[path] = 0
+            told.pop(path, None)
+            ended[container] = number = ended.get(container, 0) + 1
+            # One more, as the clean-up at the end is no cause.
+            if number > MAX_EARLIER_CAUSES + 2 and container not in concurrences:
+                passed.add(path)
+        is_passed = any(path == one or path.startswith(f"{one}/") for one in passed)
+        if kind in BEGINS:
+            passed.discard(path)
+            told.pop(path, None)
+            if not is_passed:
+                written.clear()
+        if kind == "UserdataWritten":
+            explains = (path, event["key"]) not in written
+            written.add((path, event["key"]))
+        elif is_passed or kind not in _EXPLAINING:
+            explains = False
+        else:
+            kinds = told.setdefault(path, set())
+            explains = kind not in kinds or kind == "PreemptRequested"
+            kinds.add(kind)
+        if explains or not kept:  # the last one says how long the run took
+            kept.append(event)
+    return [run[0], *reversed(kept)]
 
 
 _PASSED: dict[str, Any] = {"kind": "", "path": "", "stamp_ns": 0}
@@ -230,11 +293,11 @@ class _CauseFinder:
         return next(found, None)
 
     def _written(self, path: str, begin: int, end: int) -> tuple[tuple[str, str, str], ...]:
-        values = {
-            event["key"]: event["value"]
-            for event in self._run[begin:end]
-            if _is(event, "UserdataWritten", path)
-        }
+        values: dict[str, Any] = {}
+        for event in self._run[begin:end]:
+            if _is(event, "UserdataWritten", path):
+                values.pop(event["key"], None)  # in the order of the last writes
+                values[event["key"]] = event["value"]
         container = path.rpartition("/")[0]
         before = {
             event["key"]: event["value"]
@@ -410,6 +473,8 @@ _CAUSES: dict[str, Any] = {
     ),
 }
 """The causes that events tell, as (what, reason, more lines); the strongest first."""
+
+_EXPLAINING = ENDS | BEGINS | _CAUSES.keys() | {"Recovered"}
 
 
 def _short(value: Any) -> str:

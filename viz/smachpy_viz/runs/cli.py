@@ -280,7 +280,7 @@ def _why(args: argparse.Namespace) -> int:
     from smachpy.events.recording import read_recording
     from smachpy_viz.model.why import why
 
-    recording = read_recording(args.file)
+    recording = read_recording(args.file, stream=True)
     found = why(recording.record, recording.events)
     if args.json:
         print(json.dumps(found.to_json()))
@@ -351,14 +351,14 @@ def _side(place: str) -> ComparedRun:
 
 
 def _export(args: argparse.Namespace) -> int:
-    from smachpy.events.recording import each_recording
+    from smachpy.events.recording import read_recording
 
     if Path(args.file).is_dir():
         return _export_all(args.file, Path(args.output))
     output = Path(args.output)
     # A picture needs the events one after the other, the others all at once.
     is_picture = output.suffix not in {".html", ".mcap"}
-    [recording] = each_recording([args.file], stream=is_picture)
+    recording = read_recording(args.file, stream=is_picture)
     try:
         _write(recording, output, args.runs, args.map)
     except OSError as error:
