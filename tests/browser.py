@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 
-def wait_for(page, condition, timeout=30.0):
+def wait_for(page, condition, timeout=60.0):
     """Wait for a JavaScript condition; the page's policy forbids playwright's own way."""
     deadline = time.monotonic() + timeout
     while not page.evaluate(f"() => Boolean({condition})"):

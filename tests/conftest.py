@@ -42,7 +42,7 @@ settings.load_profile("suite")
 
 # Threads that a clock keeps for a few seconds, without work.
 CACHED = {"idle", "clock-timers"}
-GRACE_S = 20.0  # a thread that is about to end takes a moment, on a busy computer a long one
+GRACE_S = 60.0  # a thread that is about to end takes a moment, on a busy computer a long one
 
 
 def _threads() -> set[threading.Thread]:

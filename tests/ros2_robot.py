@@ -30,7 +30,9 @@ class Ros2Robot:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.left = ExitStack()
         self.config = Config(
-            discovery="off", ros2=(Ros2(router=self.endpoint, domain=DOMAIN, distro="kilted"),)
+            discovery="off",
+            connect_timeout=60.0,
+            ros2=(Ros2(router=self.endpoint, domain=DOMAIN, distro="kilted"),),
         )
         self.route()
 

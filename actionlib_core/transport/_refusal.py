@@ -12,7 +12,7 @@ from actionlib_core.exceptions import ConfigError
 if TYPE_CHECKING:
     from actionlib_core.config import Config, Tls
 
-PROBE_S = 1.0  # longest wait for an answer of the other side
+PROBE_S = 3.0  # longest wait for an answer of the other side, which may be busy
 
 
 def check_interface(config: Config) -> None:
@@ -96,13 +96,20 @@ def _reason(error: OSError) -> str:
 
 def _explain_tls(plain: socket.socket, host: str, context: ssl.SSLContext, tls: Tls) -> str:
     """Return the error of the certificates, "" without one."""
+    is_shaken = False
     try:
         with context.wrap_socket(plain, server_hostname=host) as secure:
+            is_shaken = True
             # With TLS 1.3 our handshake succeeds before the other side has checked our certificate;
             # its refusal arrives with the first bytes.
             secure.settimeout(PROBE_S / 2)
             secure.recv(1)
     except TimeoutError:
+        if not is_shaken:  # nothing is known of certificates and logins
+            return (
+                f"it answers, but makes no TLS connection within {PROBE_S:g} s. Try again later, "
+                "or checking that this port is one for tls/."
+            )
         return ""
     except ssl.SSLCertVerificationError as error:
         return (

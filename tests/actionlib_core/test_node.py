@@ -190,7 +190,7 @@ def run(code, *arguments, **environment):
         [sys.executable, "-c", code, *arguments],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=100,
         check=False,
         env={**os.environ, **environment},
     )

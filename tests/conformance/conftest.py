@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Presence, Sample, Transport
 
 T = TypeVar("T")
-DEADLINE_S = 40.0  # peers that missed each other look again after up to 8 s
+DEADLINE_S = 60.0  # peers that missed each other look again after up to 8 s
 
 
 class Inbox(Generic[T]):

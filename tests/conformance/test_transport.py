@@ -360,7 +360,7 @@ def test_attachments_go_with_question_and_answer(network):
 # -- queries ---------------------------------------------------------------------------------------
 
 
-def ask(network, session, key="add", payload=b"?", timeout=5.0, **how):
+def ask(network, session, key="add", payload=b"?", timeout=60.0, **how):
     replies, done = network.inbox(), network.inbox()
     handle = session.query(
         key,
@@ -563,12 +563,12 @@ def test_query_may_be_closed_by_its_own_answer(network):
     handed_over = network.clock.event()
 
     def on_reply(reply):
-        handed_over.wait(5.0)
+        handed_over.wait(60.0)
         handles[0].close()
         replies(reply)
 
     on_done = lambda: done("done")  # noqa: E731
-    handles.append(a.query("add", b"", timeout=5.0, on_reply=on_reply, on_done=on_done))
+    handles.append(a.query("add", b"", timeout=60.0, on_reply=on_reply, on_done=on_done))
     handed_over.set()
     assert payloads(replies.wait_for(1)) == [b"1"]
     ask(network, a)[2].wait_for(1)

@@ -17,7 +17,7 @@ from actionlib_core.node import Node
 from actionlib_core.transport.zenoh import ZenohTransport
 from smachpy import SimpleActionState, StateMachine
 
-LONG_S = 20.0
+LONG_S = 60.0
 
 SERVER = """
 import sys, time

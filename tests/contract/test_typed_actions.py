@@ -19,7 +19,7 @@ from actionlib_core import (
 from actionlib_core.action.decorated import GoalContext
 from actionlib_core.interfaces.actionlib import msg
 
-LONG_S = 20.0
+LONG_S = 60.0
 
 
 @server("count", msg.TestAction)

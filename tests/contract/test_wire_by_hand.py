@@ -19,7 +19,7 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 
 pytestmark = pytest.mark.zenoh
 
-LONG_S = 20.0
+LONG_S = 60.0
 NAME = "by_hand/move_base"
 MD5 = "70b6aca7c7f7746d8d1609ad94c80bb8"
 PREEMPTED, SUCCEEDED, RECALLING, RECALLED, LOST = 2, 3, 7, 8, 9

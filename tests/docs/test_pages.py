@@ -51,7 +51,7 @@ FENCE = re.compile(
     r"^```(?P<language>\w+)[^\n]*\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-COMMAND_S = 50
+COMMAND_S = 60
 
 
 @dataclass(frozen=True)

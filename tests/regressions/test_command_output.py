@@ -42,7 +42,7 @@ def python(code, *words, **options):
         stderr=subprocess.PIPE,
         stdin=subprocess.DEVNULL,
         text=True,
-        timeout=50,
+        timeout=100,
         **options,
     )
 
@@ -72,7 +72,7 @@ def test_a_closed_output_is_told():
         ["sh", "-c", '"$0" -c "$1" list >&-', sys.executable, SMACHPY],
         stderr=subprocess.PIPE,
         text=True,
-        timeout=50,
+        timeout=100,
     )
     assert done.returncode == 2
     assert "standard output: it is closed" in done.stderr

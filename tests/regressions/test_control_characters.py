@@ -67,7 +67,7 @@ def test_a_command_of_smachpy_writes_none(words, mission_file):
         [sys.executable, "-c", SMACHPY, *(word.format(mission_file) for word in words)],
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=100,
     )
     assert bad_characters(done.stdout) == set()
     assert bad_characters(done.stderr) == set()
@@ -79,7 +79,7 @@ def test_a_command_of_smachpy_writes_none(words, mission_file):
 )
 def test_a_command_of_actionlib_writes_none(words):
     done = subprocess.run(
-        [sys.executable, "-c", ACTIONLIB, *words], capture_output=True, text=True, timeout=50
+        [sys.executable, "-c", ACTIONLIB, *words], capture_output=True, text=True, timeout=100
     )
     assert done.returncode == 2
     assert bad_characters(done.stdout) == set()

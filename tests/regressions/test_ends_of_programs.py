@@ -244,12 +244,12 @@ import smachpy
 
 def work(userdata):
     print("works", flush=True)
-    for _ in range(1200):  # Python handles a signal in the instant before one long sleep after it
+    for _ in range(12000):  # Python handles a signal in the instant before one long sleep after it
         time.sleep(0.05)
 
 def mission():
     sm = smachpy.StateMachine(["done", "preempted"], name="BUSY")
-    sm.add("WORK", smachpy.CBState(work, outcomes=["done"]))
+    sm.add("WORK", smachpy.CBState(work, outcomes=["done"], preempt_timeout=300.0))
     return sm
 """
 IN_CONTAINER = ["unshare", "-r", "--fork", "--pid", "--mount-proc"]
@@ -276,7 +276,7 @@ def test_a_second_sigterm_ends_process_1_of_a_container(tmp_path):
                 pass
         finally:
             os.kill(int(pid), signal.SIGTERM)
-        assert process.wait(9.0) == 128 + signal.SIGTERM  # before the state's grace is over
+        assert process.wait(LONG_S) == 128 + signal.SIGTERM  # before the state's grace is over
 
 
 @pytest.mark.parametrize("way", ["smachpy run --plain", "script", "send_goal"])

@@ -162,8 +162,8 @@ def test_a_copy_waits_for_no_thread_of_its_parent():
         assert task.is_alive()
     finally:
         over.set()
-        assert task.join(20)
-        assert executor.join(20)
+        assert task.join(60)
+        assert executor.join(60)
 
 
 def test_a_copy_that_a_callback_has_forked_ends_with_the_callback():
@@ -179,7 +179,7 @@ def test_a_copy_that_a_callback_has_forked_ends_with_the_callback():
 
     executor = SerialExecutor(clock, "callbacks")
     executor.submit(fork)
-    assert executor.join(20)
+    assert executor.join(60)
     assert os.waitstatus_to_exitcode(os.waitpid(children[0], 0)[1]) == IGNORED
 
 

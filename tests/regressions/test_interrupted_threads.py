@@ -46,7 +46,11 @@ free.set()
 def test_a_traced_function_begins_after_a_thread_was_interrupted(where):
     """CPython 3.11 turned for ever at the first step of the traced function."""
     done = subprocess.run(
-        [sys.executable, "-c", CODE, where], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-c", CODE, where],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
     )
     assert done.stdout.split() == ["preempted", "traced"]
     assert done.returncode == 0, done.stderr

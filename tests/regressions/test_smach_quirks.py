@@ -188,7 +188,7 @@ def test_an_exception_inside_with_leaves_nothing_open():
 
     thread = threading.Thread(target=build)
     thread.start()
-    thread.join(5)
+    thread.join(60)
     assert opened
 
 

@@ -26,7 +26,7 @@ class Held(State):
         self.go_on = threading.Event()
 
     def execute(self, userdata):
-        self.go_on.wait(30.0)
+        self.go_on.wait(60.0)
         return "done"
 
 
@@ -46,7 +46,7 @@ def widget(machine):
     widget.close()
 
 
-def wait_for(condition, timeout=30.0):
+def wait_for(condition, timeout=60.0):
     deadline = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < deadline
@@ -64,7 +64,7 @@ def test_it_follows_a_run_and_says_how_it_ended(machine, widget):
         during = widget.picture
     finally:
         machine["HELD"].go_on.set()
-        runner.join(30.0)
+        runner.join(60.0)
     wait_for(lambda: widget.status.startswith("ended: done after "))
     wait_for(lambda: widget.picture != during)
 

@@ -461,13 +461,13 @@ def test_kill_9_and_a_new_process(tmp_path, on_restart, status, result):
             yield ActionClient("durable_server", Action, node=node)
 
     with client() as sender, server() as first:
-        assert sender.wait_for_server(30)
+        assert sender.wait_for_server(60)
         goal_id = sender.send_goal(Goal(41)).get_goal_id()
         assert first.stdout.readline() == b"begun\n"
         sender.stop()
     with server(), client() as follower:
-        assert follower.wait_for_server(30)
-        with follower.follow(goal_id, timeout=30) as sent:
+        assert follower.wait_for_server(60)
+        with follower.follow(goal_id, timeout=60) as sent:
             sent.wait()
             assert (sent.status, sent.get_result()) == (status, result)
 

@@ -401,7 +401,7 @@ def test_server_by_hand(capsys, monkeypatch):
         """Standard input: answers goals as they come."""
 
         def __iter__(self):
-            assert came.wait(10)
+            assert came.wait(60)
             yield "1 feedback {feedback: 3}\n"
             yield "accept fine\n"
             yield "nonsense\n"
@@ -411,7 +411,7 @@ def test_server_by_hand(capsys, monkeypatch):
             yield "list\n"
             yield "succeed {result: 8}\n"
             yield "succeed\n"
-            done.wait(10)
+            done.wait(60)
             yield "quit\n"
 
     class Watched(module.Operator):
@@ -427,15 +427,15 @@ def test_server_by_hand(capsys, monkeypatch):
     )
 
     def drive():
-        assert client.wait_for_server(10)
+        assert client.wait_for_server(60)
         client.send_goal(msg.TestGoal(1), feedback_cb=lambda f: seen.append(f.feedback))
-        client.wait_for_result(10)
+        client.wait_for_result(60)
         done.set()
 
     thread = threading.Thread(target=drive)
     thread.start()
     assert main(["server", "byhand", "actionlib/Test"], node=node) == 0
-    thread.join(10)
+    thread.join(60)
     out, err = capsys.readouterr()
     assert client.get_state() == 3
     assert client.get_result().result == 8

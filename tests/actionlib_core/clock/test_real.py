@@ -23,7 +23,7 @@ def test_event_may_be_set_by_a_signal_handler_that_interrupts_its_wait():
         for _ in range(50):
             event.clear()
             signal.setitimer(signal.ITIMER_REAL, 0.0005)
-            assert event.wait(5)
+            assert event.wait(60)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
@@ -34,15 +34,15 @@ def test_a_signal_that_does_not_end_the_system_call_is_handled_soon():
     event, ready = RealClock().event(), threading.Event()
     previous = signal.signal(signal.SIGUSR1, lambda *_: event.set())
     sender = threading.Thread(
-        target=lambda: (ready.wait(20.0), os.kill(os.getpid(), signal.SIGUSR1))
+        target=lambda: (ready.wait(60.0), os.kill(os.getpid(), signal.SIGUSR1))
     )
     sender.start()
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
     try:
         ready.set()
         start = time.monotonic()
-        assert event.wait(20.0)
-        assert time.monotonic() - start < 10.0
+        assert event.wait(60.0)
+        assert time.monotonic() - start < 30.0
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGUSR1})
         signal.signal(signal.SIGUSR1, previous)
@@ -68,7 +68,7 @@ def test_a_raising_signal_handler_leaves_no_waiter_behind():
     try:
         with contextlib.suppress(Interrupt):
             signal.setitimer(signal.ITIMER_REAL, 0.001)  # under load it rings before the wait
-            event.wait(5)
+            event.wait(60)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
@@ -78,7 +78,7 @@ def test_a_raising_signal_handler_leaves_no_waiter_behind():
 def test_spawn_reuses_an_idle_thread():
     clock, idents = RealClock(), set()
     for _ in range(20):
-        clock.spawn(lambda: idents.add(threading.get_ident()), name="t").join(5)
+        clock.spawn(lambda: idents.add(threading.get_ident()), name="t").join(60)
     assert len(idents) < 20
 
 
@@ -89,14 +89,14 @@ def test_a_thousand_timers_need_one_thread():
         clock.call_later(0.0001 * (i % 7), done.release)
     assert threading.active_count() <= before + 1
     for _ in range(left):
-        assert done.acquire(timeout=5)
+        assert done.acquire(timeout=60)
 
 
 def test_hand_over_to_cached_threads_under_load():
     clock, count = RealClock(), []
     for _ in range(300):
         tasks = [clock.spawn(lambda: count.append(1), name="t") for _ in range(4)]
-        assert all(task.join(5) for task in tasks)
+        assert all(task.join(60) for task in tasks)
     assert len(count) == 1200
 
 
@@ -116,9 +116,9 @@ def test_what_is_spawned_while_the_program_ends_waits_for_a_thread_that_was_kept
     timer = clock.event()
     clock.call_later(0.0, timer.set)
     tasks = [clock.spawn(lambda i=i: done.append(i), name="t") for i in range(50)]
-    assert all(task.join(20.0) for task in tasks)
+    assert all(task.join(60.0) for task in tasks)
     assert sorted(done) == list(range(50))
-    assert timer.wait(20.0)
+    assert timer.wait(60.0)
     with pytest.raises(RuntimeError, match="can't create new thread"):
         other.spawn(int, name="nobody asked for threads at the end")
 

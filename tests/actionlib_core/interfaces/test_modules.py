@@ -16,7 +16,7 @@ from actionlib_core.interfaces import _modules
 
 def run(code: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, timeout=50
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, timeout=100
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()

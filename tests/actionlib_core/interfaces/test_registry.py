@@ -231,14 +231,14 @@ def test_one_class_however_many_threads_ask() -> None:
     barrier = threading.Barrier(8)
 
     def ask() -> None:
-        barrier.wait(10)
+        barrier.wait(60)
         found.append(registry.message("move_base_msgs/MoveBaseAction"))
 
     threads = [threading.Thread(target=ask) for _ in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(20)
+        thread.join(60)
     assert len(found) == 8
     assert len(set(found)) == 1
 

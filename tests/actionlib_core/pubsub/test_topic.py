@@ -296,11 +296,11 @@ def test_topics_over_zenoh():
         publisher = Publisher("count", Int32, latch=True, node=talker)
         publisher.publish(0)
         with Subscriber("count", Int32, callback, node=listener) as subscriber:
-            assert publisher.wait_for_connections(timeout=10)
-            assert subscriber.wait_for_connections(timeout=10)
+            assert publisher.wait_for_connections(timeout=60)
+            assert subscriber.wait_for_connections(timeout=60)
             assert wait_for_message("count", Int32, 10, node=listener) == Int32(0)
-            assert latched.wait(10)  # else a later message may come before it, in its place
+            assert latched.wait(60)  # else a later message may come before it, in its place
             for number in range(1, 21):
                 publisher.publish(number)
-            assert done.wait(10)
+            assert done.wait(60)
     assert heard == list(range(21))

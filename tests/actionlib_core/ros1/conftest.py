@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PROGRAMS = Path(__file__).parent / "programs"
 ROSMASTER = shutil.which("rosmaster")
 ROS_PYTHON = "/usr/bin/python3"  # the one that Debian's packages are for
-START_S = 50.0
+START_S = 60.0
 
 
 class Ros:

@@ -17,7 +17,7 @@ from actionlib_core.pubsub.topic import Subscriber
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
-WAIT_S = 40.0
+WAIT_S = 60.0
 GOALS = 200
 
 

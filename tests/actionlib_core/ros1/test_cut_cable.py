@@ -13,7 +13,7 @@ from tests.actionlib_core.ros1 import cable as cables
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
-WAIT_S = 40.0
+WAIT_S = 60.0
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from actionlib_core.ros1.rpc import RpcServer
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
-WAIT_S = 40.0
+WAIT_S = 60.0
 
 
 def listen(node, name):
@@ -169,7 +169,7 @@ def test_a_master_that_hangs_does_not_hold_the_end(own_ros, bridge, node):
     try:
         start = node.clock.now()
         made.close()
-        assert node.clock.now() - start < WAIT_S / 2
+        assert node.clock.now() - start < 20.0
     finally:
         own_ros._master.send_signal(signal.SIGCONT)
 

@@ -16,7 +16,7 @@ from actionlib_core.ros1.links import Budget, Connection, TcpListener
 from actionlib_core.ros1.node import Ros1Node
 from actionlib_core.ros1.rpc import RpcServer, call
 
-WAIT_S = 40.0
+WAIT_S = 60.0
 ANSWERS = {
     "nothing": b"",
     "no HTTP": b"hello\r\n\r\n",

@@ -13,7 +13,7 @@ import pytest
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
 SMACHPY = Path(sys.executable).parent / "smachpy"
-WAIT_S = 50.0
+WAIT_S = 60.0
 
 MISSION = """
 import smachpy

@@ -12,7 +12,7 @@ from smachpy.states import AwaitMessage, Publish
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
-WAIT_S = 40.0
+WAIT_S = 60.0
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from actionlib_core.wire.presence import list_endpoints
 
 pytestmark = [pytest.mark.ros1, pytest.mark.zenoh]
 
-WAIT_S = 40.0
+WAIT_S = 60.0
 
 
 class Heard:

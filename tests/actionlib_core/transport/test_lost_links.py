@@ -27,7 +27,7 @@ from tests.free_port import free_port
 CLOCK = RealClock()
 DOMAIN = int(os.environ["SMACHPY_DOMAIN"])
 LEASE_S = 1.0
-LONG_S = 30.0
+LONG_S = 60.0
 KEYS = 6
 
 # Answers what is put on `ask/<n>` by putting on `answer/<n>` the two keys that it came from and to.

@@ -80,7 +80,7 @@ def test_real_clock_close_waits_for_a_running_callback():
 
     session.subscribe("goal", callback)
     session.publisher("goal").put(b"x")
-    assert started.wait(5)
+    assert started.wait(60)
     session.close()
     assert len(ended) == 1
 

@@ -14,7 +14,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from actionlib_core.clock import RealClock
 from actionlib_core.config import AccessRule, Config, Tls
 from actionlib_core.exceptions import AccessDeniedError, TransportError
-from actionlib_core.transport import Quality
+from actionlib_core.transport import Quality, _refusal
 from actionlib_core.transport._refusal import explain_refusal
 from actionlib_core.transport.zenoh import ZenohTransport
 from tests.free_port import free_port
@@ -22,7 +22,7 @@ from tests.free_port import free_port
 pytestmark = pytest.mark.zenoh
 
 CLOCK = RealClock()
-WAIT_S = 40.0
+WAIT_S = 60.0
 RULES = (
     AccessRule(("robot_1/**",), users=("alice",)),
     AccessRule(("robot_1/secret",), users=("alice",), permission="deny"),
@@ -50,7 +50,7 @@ def join(endpoint):
     joined = []
 
     def join(user="", password="", **fields):
-        login = {"user": user, "password": password, "connect_timeout": 1.0}
+        login = {"user": user, "password": password, "connect_timeout": WAIT_S}
         config = Config(mode="client", connect=(endpoint,), discovery="off", **{**login, **fields})
         transport = ZenohTransport(config)
         joined.append(transport)
@@ -72,7 +72,7 @@ def join(endpoint):
 )
 def test_wrong_login_is_refused_and_told(join, user, password, shown):
     with pytest.raises(TransportError) as caught:
-        join(user, password)
+        join(user, password, connect_timeout=1.0)
     text = str(caught.value)
     assert f"it answers but does not let us in: got {shown}; expected a user" in text
     assert not password or password not in text
@@ -255,3 +255,18 @@ def test_a_certificate_that_zenoh_takes_is_not_told_to_be_wrong(certificates, mo
         assert server.join(WAIT_S)
     assert "does not let us in: got no user" in text
     assert "not trusted" not in text
+
+
+def test_a_handshake_that_takes_too_long_is_told_as_that(certificates, monkeypatch):
+    """On a busy computer it was told that the other side lets no user in."""
+    monkeypatch.setattr(_refusal, "PROBE_S", 0.01)
+    with socket.create_server(("127.0.0.1", 0)) as listener:  # it accepts, and says nothing
+        config = Config(
+            mode="client",
+            connect=(f"tls/127.0.0.1:{listener.getsockname()[1]}",),
+            discovery="off",
+            tls=Tls(ca=str(certificates / "ca.pem"), verify_name=False),
+        )
+        text = explain_refusal(config)
+    assert "it answers, but makes no TLS connection within 0.01 s. Try again" in text
+    assert "let us in" not in text

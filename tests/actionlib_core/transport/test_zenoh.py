@@ -29,7 +29,7 @@ from tests.free_port import free_port
 pytestmark = pytest.mark.zenoh
 
 CLOCK = RealClock()
-WAIT_S = 40.0  # only a failing test waits so long
+WAIT_S = 60.0  # only a failing test waits so long
 
 
 class Watch:
@@ -153,15 +153,17 @@ sys.stdin.readline()
 def test_program_ends_while_its_threads_go_on_using_the_network():
     for _ in range(3):
         with child(START + BUSY) as process:
-            _, errors = process.communicate("\n", timeout=60)
+            _, errors = process.communicate("\n", timeout=100)
             assert process.returncode == 0, errors
 
 
-def test_killed_process_is_seen_at_once():
-    transport = ZenohTransport()
+def test_killed_process_is_seen_at_once(tmp_path):
+    file = tmp_path / "config.yaml"
+    file.write_text(f"domain: {load_config().domain}\nlease: 100.0\n")
+    transport = ZenohTransport(load_config(file))
     try:
         watch = Watch(transport)
-        with child(START + "sys.stdin.readline()") as process:
+        with child(START + "sys.stdin.readline()", SMACHPY_CONFIG=str(file)) as process:
             watch.wait(lambda alive: alive)
             done = CLOCK.event()
             transport.query("add", b"", timeout=60, on_reply=print, on_done=done.set)
@@ -169,7 +171,9 @@ def test_killed_process_is_seen_at_once():
             start = CLOCK.now()
             watch.wait(lambda alive: not alive)
             assert done.wait(WAIT_S)
-            assert CLOCK.now() - start < load_config().lease / 2  # not by the silence of its link
+            assert (
+                CLOCK.now() - start < 50.0
+            )  # not by the silence of its link, which takes the lease
     finally:
         transport.close()
 
@@ -218,7 +222,7 @@ def test_close_does_not_wait_for_a_process_that_does_not_read():
         assert stuck.wait(WAIT_S)
         start = CLOCK.now()
         transport.close()
-        assert CLOCK.now() - start < 5.0  # zenoh's own waits for 10 s
+        assert CLOCK.now() - start < 9.0  # zenoh's own waits for 10 s
         process.kill()
         assert task.join(WAIT_S)
 
@@ -463,7 +467,7 @@ began, go_on = threading.Event(), threading.Event()
 
 def slow(sample):
     began.set()
-    go_on.wait(20)
+    go_on.wait(60)
 
 transport.subscribe("test/slow", slow, history=False)
 sender = ZenohTransport()
@@ -471,19 +475,19 @@ publisher = sender.publisher("test/slow")
 while not publisher.matching():
     began.wait(0.01)
 publisher.put(b"x")
-assert began.wait(20)
+assert began.wait(60)
 transport.close()
 sender.close()
 assert not held.wait(0.0)
 go_on.set()
-assert held.wait(20)
+assert held.wait(60)
 print("let go")
 """
 
 
 def test_zenoh_lets_go_of_a_callback_when_it_has_returned_and_not_before():
     with child(LETS_GO) as process:
-        out, errors = process.communicate(timeout=WAIT_S * 2)
+        out, errors = process.communicate(timeout=100)
     assert (out, errors) == ("let go\n", "")
 
 
@@ -518,7 +522,7 @@ print("status", client.send_goal_and_wait(TestGoal(2)), flush=True)
 def test_forked_process_is_told_that_it_has_no_network():
     """It waited for ever, for threads that a fork does not copy; its parent goes on."""
     with child(_FORK) as process:
-        output, errors = process.communicate(timeout=60)
+        output, errors = process.communicate(timeout=100)
     told = ["this process was forked"] * 4
     assert output.splitlines() == [*told, "exit code 0", "status 3"], errors
     assert "Traceback" not in errors
@@ -588,9 +592,9 @@ def note(query):
     asked.set()
 
 transport.queryable("late", note)
-transport.query("late", b"", timeout=20.0, on_reply=print, on_done=int)
+transport.query("late", b"", timeout=60.0, on_reply=print, on_done=int)
 publisher = transport.publisher("later")
-assert asked.wait(20)
+assert asked.wait(60)
 started = threading.Barrier(4)
 
 def repeat(call):
@@ -618,7 +622,7 @@ def test_threads_that_still_send_as_the_interpreter_ends_do_not_abort_the_proces
     """It said 'exception not rethrown': they came back from zenoh after the interpreter's end."""
     for _ in range(5):
         with child(LATE) as process:
-            _, errors = process.communicate(timeout=WAIT_S * 2)
+            _, errors = process.communicate(timeout=100)
             assert process.returncode == 0, errors
 
 

@@ -19,7 +19,7 @@ from actionlib_core.wire.private_network import (
 
 pytestmark = pytest.mark.zenoh
 
-WAIT_S = 20.0
+WAIT_S = 60.0
 
 
 @pytest.fixture(autouse=True)

@@ -669,7 +669,7 @@ def test_an_interrupt_cancels_the_goal_and_goes_on_at_once(world, error):
 def test_the_constructor_touches_no_network_and_starts_no_thread():
     before = set(threading.enumerate())
     state = SimpleActionState("do", Action)
-    assert set(threading.enumerate()) == before
+    assert set(threading.enumerate()) <= before  # idle ones of other tests may have ended
     assert state._status == SimpleActionState.INACTIVE
     kind, details = state.describe_details()
     assert kind == "action"

@@ -148,7 +148,7 @@ def test_a_signal_stops_the_robot_and_everything_ends_soon(far, number, code):
         (robot,) = children_of(process.pid)
         process.send_signal(number)
         output = process.stdout.read()
-        assert process.wait(30) == code, output
+        assert process.wait(60) == code, output
         assert "PATROL: preempted" in output
         assert "stopped on request" in output
         assert not is_alive(robot)
@@ -171,7 +171,7 @@ def test_a_robot_that_is_killed_ends_the_mission(far):
         (robot,) = children_of(process.pid)
         os.kill(robot, signal.SIGKILL)
         output = process.stdout.read()
-        assert process.wait(30) == 1
+        assert process.wait(60) == 1
         assert "PATROL: aborted" in output
         assert "LOST" in output
 
@@ -260,7 +260,7 @@ def test_two_robots_of_one_name():
         assert third.returncode == 2
         check_one_screen(third.stderr, "two servers")
         first.send_signal(signal.SIGTERM)
-        assert first.wait(30) == 0
+        assert first.wait(60) == 0
 
 
 @pytest.mark.slow
@@ -271,7 +271,7 @@ def test_two_runs_that_bring_their_robots_do_not_meet(monkeypatch):
     with started(*near) as one, started(*near) as other:
         for process in (one, other):
             output = process.stdout.read()
-            assert process.wait(30) == 0, output
+            assert process.wait(60) == 0, output
             assert "network of this run: SMACHPY_DOMAIN=" in output
 
 

@@ -84,7 +84,7 @@ def test_a_page_and_a_file_of_a_run(run, tmp_path):
     line = process.stdout.readline()
     assert line.startswith("watch it at http://127.0.0.1:")
     assert "token" not in line
-    with urllib.request.urlopen(line.split()[-1], timeout=10) as page:
+    with urllib.request.urlopen(line.split()[-1], timeout=60) as page:
         assert b"smachpy" in page.read()
     run.over.touch()
     process.stdout.read()
@@ -115,7 +115,7 @@ def read_until(process, word):
 
 
 def summary_at(address):
-    with urllib.request.urlopen(f"{address}api/machines", timeout=10) as answer:
+    with urllib.request.urlopen(f"{address}api/machines", timeout=60) as answer:
         (one,) = json.load(answer)
     return one
 

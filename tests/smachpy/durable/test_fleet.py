@@ -64,7 +64,7 @@ def mission(name: str = "a"):
         StateMachine.add("WAIT", wait)
     return machine
 """
-WITHIN_S = 50
+WITHIN_S = 60
 
 
 @pytest.fixture

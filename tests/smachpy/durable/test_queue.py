@@ -202,10 +202,10 @@ def test_who_listens_is_woken_by_what_comes_into_the_queue(store):
             lambda: put(store, "b"),
             lambda: store.request_cancel("b"),
         ):
-            assert news.wait(20)
+            assert news.wait(60)
             news.clear()
             change()
-        assert news.wait(20)
+        assert news.wait(60)
     finally:
         stop()
 

@@ -12,7 +12,7 @@ from actionlib_core.clock import RealClock, use_clock
 from smachpy import Concurrence, InvalidUserCodeError, State, StateMachine
 
 MANY = 30
-LONG_S = 20.0  # only a failing test waits so long
+LONG_S = 60.0  # only a failing test waits so long
 
 
 @pytest.fixture

@@ -111,7 +111,7 @@ def test_the_objects_of_a_run_are_freed_as_it_ends(kind, kind_of_clock, watched,
         # The threads of the last children may be putting themselves away.
         ended = clock.event()
         clock.call_later(0.02, ended.set)
-        ended.wait(20.0)
+        ended.wait(60.0)
         left = new(before)
         if watched:  # a machine keeps the frames of its newest run; five runs made dozens
             assert set(left) <= {"Frame", "Root", "Run", "ChildBranch"}

@@ -77,7 +77,7 @@ def test_a_listener_that_blocks_keeps_nobody_but_the_order(clock):
     sm.subscribe(listen)
     clock.call_later(1.0, sm.request_preempt)
     runner = clock.spawn(sm.execute, name="runner")
-    assert runner.join(10.0)
+    assert runner.join(60.0)
     clock.sleep(600.0)
     assert {Left, Finished} <= set(heard)
 

@@ -274,7 +274,7 @@ def in_real_time(sm, act):
     """Run `sm` in the main thread and call `act` when its leaf waits."""
     ready = threading.Event()
     smachpy.set_options(sm["A"], on_enter=lambda _userdata: ready.set())
-    thread = threading.Thread(target=lambda: (ready.wait(10.0), act()))
+    thread = threading.Thread(target=lambda: (ready.wait(60.0), act()))
     thread.start()
     with use_clock(RealClock()), use_shutdown(Shutdown()):
         outcome = sm.execute()

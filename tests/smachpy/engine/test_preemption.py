@@ -275,12 +275,12 @@ def test_request_is_not_lost_if_the_container_goes_on_while_it_waits_for_the_loc
             lock[0].acquire()
             monkeypatch.setattr(preempt, "frame_of", frame_of)
             asker.start()
-            assert looked.wait(5.0)
+            assert looked.wait(60.0)
             return super().execute(parent_ud)
 
     def work(_userdata):
         lock[0].release()
-        asker.join(5.0)
+        asker.join(60.0)
         return "ok"
 
     lock = []
@@ -735,11 +735,11 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     else:
         top = smachpy.Concurrence(["done", "preempted"], "done", preempt_timeout=0.02)
         top.add("M", machine if place == "branch machine" else Blocks())
-    current_clock().spawn(lambda: (started.wait(10.0), top.request_preempt()), name="asks")
+    current_clock().spawn(lambda: (started.wait(60.0), top.request_preempt()), name="asks")
     if place == "root":
         runner = threading.Thread(target=lambda: outcomes.append(top.execute()))
         runner.start()
-        runner.join(30)
+        runner.join(60)
     else:
         outcomes.append(top.execute())
     assert outcomes == ["preempted"]
@@ -749,13 +749,13 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     # The same machine runs again while the old thread still hangs.
     again = threading.Thread(target=lambda: outcomes.append(top.execute()))
     again.start()
-    again.join(30)
+    again.join(60)
     assert outcomes[1] in {"done", "preempted"}
     runs = after.runs
     release.release()
     for thread in threading.enumerate():
         if thread is not threading.main_thread() and thread.name.startswith("/SM_ROOT"):
-            thread.join(30)
+            thread.join(60)
     assert after.runs == runs
     assert "x" not in machine.userdata or machine.userdata.x != "late" or place == "root"
 

@@ -137,7 +137,7 @@ started.wait()
 
 def test_a_program_that_ends_stops_its_machine():
     result = subprocess.run(
-        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30, check=True
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=100, check=True
     )
     assert (result.stdout, result.stderr) == ("stopped\n", "")
 
@@ -179,7 +179,7 @@ def test_sigterm_stops_the_machine_and_lets_the_program_end(program, said):
     ) as process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGTERM)
-        assert process.communicate(timeout=30) == (said, "")
+        assert process.communicate(timeout=100) == (said, "")
         assert process.returncode == 0
 
 
@@ -213,7 +213,7 @@ def test_a_program_that_handles_sigterm_itself_keeps_its_handler(own):
     ).replace("self.wait_preempt()", "signal.raise_signal(signal.SIGTERM); self.sleep(0.01)")
     program += "assert signal.getsignal(signal.SIGTERM) is own"
     result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=100, check=True
     )
     heard = "own\n" if "print" in own else ""
     assert (result.stdout, result.stderr) == (f"ready\n{heard}stopped\npreempted\n", "")

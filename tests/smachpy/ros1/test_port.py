@@ -53,7 +53,7 @@ def test_the_new_script_runs_by_itself(tmp_path):
     script = tmp_path / "new.py"
     script.write_text(ported.text)
     done = subprocess.run(
-        [sys.executable, script], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, script], capture_output=True, text=True, timeout=100, check=True
     )
     assert done.stdout == "ok\n"
 

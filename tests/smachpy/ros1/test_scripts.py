@@ -38,7 +38,7 @@ def smachpy():
 
     yield run
     process.stdin.close()
-    process.wait(30)
+    process.wait(60)
     process.stdout.close()
 
 

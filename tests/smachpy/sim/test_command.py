@@ -113,10 +113,10 @@ def test_a_world_as_a_process():
         assert "robot_0 to robot_2, doors lab, kitchen" in line
         with Node("test") as node:
             lab = ServiceProxy("doors/lab/set", SetBool, node=node)
-            lab.wait_for_service(20.0)
+            lab.wait_for_service(60.0)
             assert lab(True).message == "door lab opens"
             client = SimpleActionClient("robot_2/move_base", MoveBaseAction, node=node)
-            assert client.wait_for_server(20.0)
+            assert client.wait_for_server(60.0)
             client.send_goal_and_wait(goal_at(Pose2D(0.5, 0, 0), "base_link"))
             assert client.get_goal_status_text() == "arrived"
         world.send_signal(signal.SIGINT)

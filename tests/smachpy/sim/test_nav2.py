@@ -360,16 +360,16 @@ def test_the_command_serves_it_behind_a_router() -> None:
         assert "ROS 2 kilted, domain 42" in process.stdout.readline()
         spec = ros2.get_action("nav2_msgs/Spin", "kilted")
         client = Ros2Client(session, RealClock(), "spin", spec, domain=DOMAIN)
-        assert client.ready.wait(30.0)
+        assert client.ready.wait(60.0)
         uuid = bytes([1] * 16)
         assert client.accepted(uuid, spec.Goal(target_yaw=0.1)) is not None
         pending = client.result(uuid)
-        pending.answer(30.0)
+        pending.answer(60.0)
         assert client.end_of(pending)[0] == SUCCEEDED
         client.close()
     finally:
         session.close()
-        process.communicate(timeout=30.0)
+        process.communicate(timeout=60.0)
         router.close()
     assert process.returncode == 0
 
@@ -386,7 +386,7 @@ def test_without_the_option_it_joins_no_robot_that_missions_drive() -> None:
     )
     assert process.stdout is not None
     assert process.stdout.readline().startswith("move_base: ready")
-    process.communicate(timeout=30.0)
+    process.communicate(timeout=60.0)
     assert process.returncode == 0
 
 
@@ -402,7 +402,7 @@ def test_bad_input_is_one_clear_end(arguments: list[str]) -> None:
         [sys.executable, "-m", "smachpy", "robot", *arguments],
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=100,
     )
     assert done.returncode == 2
     assert "Traceback" not in done.stderr

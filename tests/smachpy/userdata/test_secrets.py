@@ -450,7 +450,7 @@ def test_processes_show_none(folder):
     assert main(["submit", "mission.py", *words]) == 0
     done = subprocess.run(
         [sys.executable, "-m", "smachpy.command", "runner", "--db", "j.db", "--until-empty", "--allow", "."],
-        capture_output=True, text=True, timeout=60,
+        capture_output=True, text=True, timeout=100,
     )  # fmt: skip
     assert "\0-m\0" in done.stdout or "\0-P\0" in done.stdout, done  # a command line was shown
     assert "4711" not in done.stdout

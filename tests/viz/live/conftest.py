@@ -46,7 +46,7 @@ class Child:
             return
         self.process.stdin.close()
         try:
-            self.process.wait(5.0)
+            self.process.wait(60.0)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -85,7 +85,7 @@ class View(Child):
 
     def get(self, path, **headers):
         request = urllib.request.Request(self.base + path.lstrip("/"), headers=headers)
-        with urllib.request.urlopen(request, timeout=10) as answer:
+        with urllib.request.urlopen(request, timeout=60) as answer:
             return answer.status, dict(answer.headers), answer.read()
 
 

@@ -154,7 +154,7 @@ def test_a_server_that_dies_is_told_at_its_goal_and_at_its_form(start, look, mon
     assert page.is_disabled("#send-goal")
     assert page.input_value(X) == "3.5"
     start.simulation()
-    wait_for(page, "!document.getElementById('send-goal').disabled", timeout=20.0)
+    wait_for(page, "!document.getElementById('send-goal').disabled", timeout=60.0)
     assert page.input_value(X) == "3.5"
 
 
@@ -190,7 +190,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction, MoveBas
 from actionlib_core.node import Node
 import sys
 client = SimpleActionClient("move_base", MoveBaseAction, node=Node("planner"))
-assert client.wait_for_server(20.0)
+assert client.wait_for_server(60.0)
 goal = MoveBaseGoal()
 goal.target_pose.header.frame_id = "map"
 position, orientation = goal.target_pose.pose.position, goal.target_pose.pose.orientation

@@ -88,7 +88,7 @@ def test_a_question_is_above_every_page(served, look, place, size):
     page = look(f"{served.start(token='t')}?{place}=#token=t", drawn=False)
     page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
     with page.expect_response("**/api/control*"):
-        page.click(".question .answer:text-is('yes')", timeout=15_000)  # it is not covered
+        page.click(".question .answer:text-is('yes')", timeout=60_000)  # it is not covered
     assert [one["answer"] for one in served.commands] == ["yes"]
 
 

@@ -28,7 +28,7 @@ def post(view, command, token):
     headers = {"origin": view.base.rstrip("/"), "x-smachpy-token": token}
     request = urllib.request.Request(view.base + "api/control?machine=errand", body, headers)
     try:
-        with urllib.request.urlopen(request, timeout=10) as answer:
+        with urllib.request.urlopen(request, timeout=60) as answer:
             return answer.status, json.loads(answer.read())
     except urllib.error.HTTPError as error:
         return error.code, json.loads(error.read())

@@ -292,14 +292,14 @@ def test_a_page_that_was_cut_off_goes_on_where_it_was(served, look):
 def test_a_busy_network_does_not_hold_the_beat_up(served):
     served.add("one", events=run())
     busy = served.machines.obtain("busy")
-    with urllib.request.urlopen(f"{served.start()}api/events?machine=one", timeout=10) as stream:
+    with urllib.request.urlopen(f"{served.start()}api/events?machine=one", timeout=60) as stream:
         began = time.monotonic()
         beats = 0
         while beats < 2:
             busy.set_stale(None)  # wakes the page
             if stream.readline() == b"event: beat\n":
                 beats += 1
-        assert time.monotonic() - began < 10.0
+        assert time.monotonic() - began < 40.0
 
 
 def test_the_machine_chosen_last_is_shown_however_late_the_first_answers(served, look):
@@ -375,7 +375,7 @@ def test_clocks_that_differ_do_not_show_as_time_spent(served, look, hours):
     off = "Math.abs(smachpy.store.playback.nowMs() - smachpy.store.data.run.last())"
     if hours < 0:
         assert page.evaluate(f"() => {off}") > 3_000_000  # nothing has been heard yet
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     seq = 2
     while page.evaluate(f"() => smachpy.store.data.robotLag.value === null || {off} > 1000"):
         assert time.monotonic() < deadline

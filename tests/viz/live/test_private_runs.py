@@ -14,7 +14,7 @@ from smachpy_viz.live.cli import private_runs
 
 pytestmark = pytest.mark.zenoh
 
-WAIT_S = 20.0
+WAIT_S = 60.0
 
 
 class Part:

@@ -174,7 +174,7 @@ def post(address, headers, **command):
     body = json.dumps(command).encode()
     request = urllib.request.Request(f"{address}api/reproduce", body, headers)
     try:
-        with urllib.request.urlopen(request, timeout=10) as answer:
+        with urllib.request.urlopen(request, timeout=60) as answer:
             return answer.status, json.load(answer)
     except urllib.error.HTTPError as error:
         with error:

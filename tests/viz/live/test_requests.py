@@ -36,7 +36,7 @@ def test_the_id_of_no_event_is_refused(served, last):
     served.add("one")
     address = served.start() + f"api/events?last={urllib.parse.quote(last)}"
     with pytest.raises(urllib.error.HTTPError) as caught:
-        urllib.request.urlopen(address, timeout=10)
+        urllib.request.urlopen(address, timeout=60)
     with caught.value:
         assert caught.value.code == 400
 
@@ -45,7 +45,7 @@ def test_the_id_of_no_event_is_refused(served, last):
 def test_the_id_of_an_event_is_taken(served, last):
     served.add("one")
     address = served.start() + f"api/events?last={urllib.parse.quote(last)}"
-    with urllib.request.urlopen(address, timeout=10) as answer:
+    with urllib.request.urlopen(address, timeout=60) as answer:
         assert answer.status == 200
 
 
@@ -71,7 +71,7 @@ def commanded(served, body):
 def test_a_body_that_is_no_command_is_refused(served, body):
     for request in commanded(served, body):
         with pytest.raises(urllib.error.HTTPError) as caught:
-            urllib.request.urlopen(request, timeout=10)
+            urllib.request.urlopen(request, timeout=60)
         with caught.value:
             assert caught.value.code == 400
 
@@ -218,7 +218,7 @@ def test_the_server_answers_while_a_run_is_exported(served, monkeypatch, form):
     def held(real):
         def made(*arguments):
             began.set()
-            assert go_on.wait(30), "nothing else was answered meanwhile"
+            assert go_on.wait(60), "nothing else was answered meanwhile"
             return real(*arguments)
 
         return made
@@ -228,13 +228,13 @@ def test_the_server_answers_while_a_run_is_exported(served, monkeypatch, form):
     address = served.start()
 
     def get(path):
-        with urllib.request.urlopen(address + path, timeout=10) as answer:
+        with urllib.request.urlopen(address + path, timeout=60) as answer:
             return answer.read()
 
     with ThreadPoolExecutor(1) as pool:
         export = pool.submit(get, f"api/export?machine=one&format={form}")
         try:
-            assert began.wait(10)
+            assert began.wait(60)
             assert b'"one"' in get("api/machines")
             assert not export.done()
         finally:

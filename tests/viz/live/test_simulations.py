@@ -155,7 +155,7 @@ def test_only_who_has_the_token_starts_runs(served, simulations, job):
         headers = {"origin": address.rstrip("/"), "x-smachpy-token": token}
         request = urllib.request.Request(address + "api/simulate", told, headers)
         with pytest.raises(urllib.error.HTTPError) as caught:
-            urllib.request.urlopen(request, timeout=10)
+            urllib.request.urlopen(request, timeout=60)
         with caught.value:
             assert caught.value.code == 403
     assert simulations.rows() == []

@@ -70,7 +70,7 @@ READ = {
 @pytest.mark.parametrize("route", READ)
 def test_answer_of_a_route_has_its_type(one_run, route):
     base = one_run.start()
-    with urllib.request.urlopen(base + route.split("/", 1)[1] + READ[route], timeout=10) as answer:
+    with urllib.request.urlopen(base + route.split("/", 1)[1] + READ[route], timeout=60) as answer:
         checked(wire.ANSWERS[route], json.load(answer))
 
 
@@ -100,7 +100,7 @@ FAILING = [
 def test_error_of_any_route_has_one_form(one_run, address, status):
     base = one_run.start()
     with pytest.raises(urllib.error.HTTPError) as caught:
-        urllib.request.urlopen(base + address, timeout=10)
+        urllib.request.urlopen(base + address, timeout=60)
     with caught.value as error:
         assert error.code == status
         assert checked(wire.Failure, json.load(error))["text"]
@@ -112,7 +112,7 @@ def test_refused_command_has_the_form_of_an_error(one_run, place, token):
     base = one_run.start(token=token)
     request = urllib.request.Request(f"{base}api/{place}", b"{}", {"origin": base.rstrip("/")})
     with pytest.raises(urllib.error.HTTPError) as caught:
-        urllib.request.urlopen(request, timeout=10)
+        urllib.request.urlopen(request, timeout=60)
     with caught.value as error:
         assert error.code == 403
         assert checked(wire.Failure, json.load(error))["wants_token"] == (token is not None)
@@ -127,7 +127,7 @@ def test_command_that_a_machine_refuses_is_an_error(one_run):
     headers = {"origin": base.rstrip("/"), "x-smachpy-token": "t"}
     request = urllib.request.Request(f"{base}api/control?machine=one", b"{}", headers)
     with pytest.raises(urllib.error.HTTPError) as caught:
-        urllib.request.urlopen(request, timeout=10)
+        urllib.request.urlopen(request, timeout=60)
     with caught.value as error:
         assert error.code == 409
         assert checked(wire.Failure, json.load(error))["text"] == "no such state"
@@ -139,7 +139,7 @@ def test_mistake_in_the_viewer_is_an_error_of_the_same_form(one_run, monkeypatch
     monkeypatch.setattr(logger, "handlers", [caplog.handler])
     monkeypatch.setattr(one_run.machines, "summaries", lambda: 1 / 0)
     with pytest.raises(urllib.error.HTTPError) as caught:
-        urllib.request.urlopen(f"{base}api/machines", timeout=10)
+        urllib.request.urlopen(f"{base}api/machines", timeout=60)
     with caught.value as error:
         assert error.code == 500
         assert "ZeroDivisionError" in checked(wire.Failure, json.load(error))["text"]
@@ -299,7 +299,7 @@ def log_in(base, token, origin=None):
     body = json.dumps({"token": token}).encode()
     headers = {"origin": base.rstrip("/") if origin is None else origin}
     request = urllib.request.Request(f"{base}api/login", body, headers)
-    with urllib.request.urlopen(request, timeout=10) as answer:
+    with urllib.request.urlopen(request, timeout=60) as answer:
         return answer.headers["set-cookie"]
 
 
@@ -356,6 +356,6 @@ def test_token_for_reading_does_not_command(one_run):
         more = {} if token is None else {"x-smachpy-token": token}
         request = urllib.request.Request(f"{base}api/mission", b"{}", {**headers, **more})
         with pytest.raises(urllib.error.HTTPError) as caught:
-            urllib.request.urlopen(request, timeout=10)
+            urllib.request.urlopen(request, timeout=60)
         with caught.value as error:
             assert error.code == 403

@@ -520,9 +520,9 @@ def test_a_viewer_prunes_again_and_again(record, monkeypatch):
     texts: queue.Queue[str] = queue.Queue()
     folders = [path.parent, path.parent / "none"]
     with contextlib.closing(pruning.Pruning(folders, 3600.0, "none", texts.put)):
-        assert "It is left." in texts.get(timeout=20)
+        assert "It is left." in texts.get(timeout=60)
         os.utime(path, (1000, 1000))
-        assert texts.get(timeout=20) == "1 old recordings deleted"
+        assert texts.get(timeout=60) == "1 old recordings deleted"
         path.with_name("other.jsonl").unlink()
     assert not path.exists()
     assert texts.empty()

@@ -180,7 +180,7 @@ class Blocked(io.StringIO):
 
     def write(self, text):
         self.reached.set()
-        self.gate.wait(30)
+        self.gate.wait(60)
         return super().write(text)
 
 
@@ -191,14 +191,14 @@ def test_a_blocked_terminal_never_holds_the_mission_up(patrol, monkeypatch):
     view = TerminalView(patrol, console=console, clock=RealClock())
     view.__enter__()
     view.on_event(ev.Started("/PATROL", 0.0, 0))
-    assert file.reached.wait(10)
+    assert file.reached.wait(60)
     for i in range(3 * terminal.BACKLOG):
         view.on_event(ev.Left(f"{DRIVE}/GO_THERE", float(i), 0, "succeeded"))
     assert len(view._lines) == terminal.BACKLOG
     task = view._task
     view.close()  # gives up waiting
     file.gate.set()
-    assert task.join(10)
+    assert task.join(60)
     assert "lines left out: the terminal was too slow" in file.getvalue()
     assert view.history.visits()[f"{DRIVE}/GO_THERE"].outcomes["succeeded"] == 3 * terminal.BACKLOG
 
@@ -250,7 +250,7 @@ def test_a_terminal_that_is_gone_ends_the_drawing_alone(patrol):
     view = TerminalView(patrol, console=terminal._Output(file=Gone()), clock=RealClock())
     with view:
         view.on_event(ev.Started("/PATROL", 0.0, 0))
-        assert view._task.join(10)
+        assert view._task.join(60)
         view.on_event(ev.Left(f"{DRIVE}/GO_THERE", 1.0, 0, "succeeded"))
     assert not view._lines
     assert view.history.visits()[f"{DRIVE}/GO_THERE"].count == 1
@@ -263,7 +263,7 @@ def test_a_hidden_defect_of_the_drawing_is_reported_not_swallowed(patrol, monkey
     monkeypatch.setattr(view, "_frame", lambda: 1 / 0)
     with view:
         view.on_event(ev.Started("/PATROL", 0.0, 0))
-        assert view._task.join(10)
+        assert view._task.join(60)
     assert [report.exc_type for report in seen] == [ZeroDivisionError]
 
 

@@ -22,7 +22,7 @@ for line in sys.stdin:
         print(client.wait_for_server(rospy.Duration(0.5)), flush=True)
         continue
     elif word == "begun?":
-        print("begun" if begun.wait(30) else "not begun", flush=True)
+        print("begun" if begun.wait(60) else "not begun", flush=True)
         continue
     elif word != "wait":
         begun.clear()

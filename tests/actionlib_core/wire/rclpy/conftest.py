@@ -65,7 +65,7 @@ class Rclpy:
         assert self._child.stdin is not None
         assert self._child.stdout is not None
         self._child.stdin.close()
-        assert self._child.wait(30) == 0
+        assert self._child.wait(60) == 0
         self._child.stdout.close()
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.zenoh
 
-LONG_S = 30.0
+LONG_S = 60.0
 GOLDEN = [json.loads(line) for line in (DATA / "ros2_golden.jsonl").read_text().splitlines()]
 CALLS = [line for line in GOLDEN if line["kind"] == "call" and "/_action/" in line["key"]]
 UNKNOWN = next(call for call in CALLS if call["what"] == "fib get_result unknown goal")

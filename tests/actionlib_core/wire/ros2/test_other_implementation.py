@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.zenoh
 
-LONG_S = 30.0
+LONG_S = 60.0
 OTHER = """
 import os, sys
 os.environ["GIT_PYTHON_REFRESH"] = "quiet"

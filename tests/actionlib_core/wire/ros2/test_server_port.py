@@ -172,14 +172,14 @@ def test_statuses_while_the_servers_lock_is_held(world: World) -> None:
 
     def slow_list() -> list[StatusEntry]:
         listing.set()
-        ended.wait(20.0)
+        ended.wait(60.0)
         return list_goals()
 
     action_server.keeper.list_goals = slow_list
     other = threading.Thread(target=port.send_status, args=((),))
     with action_server.lock:
         other.start()
-        assert listing.wait(20.0)
+        assert listing.wait(60.0)
         world.goals[0].set_succeeded()
         port.send_status(())
         ended.set()
@@ -497,7 +497,7 @@ def test_a_client_that_waits_for_no_token_is_answered_in_full(world: World) -> N
 
     ActionServer("fib", Fibonacci, succeed, node=world.node)
     starting.set()
-    asker.join(5.0)
+    asker.join(60.0)
     for uuid, pending in asked:
         if pending.answer().payload is not None:
             assert client.end_of(client.result(uuid))[0] == 4

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.zenoh
 
-LONG_S = 30.0
+LONG_S = 60.0
 CLOCK = RealClock()
 
 

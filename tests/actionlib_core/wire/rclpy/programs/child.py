@@ -22,7 +22,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser.definition import AbstractNestedType, Array, BasicType, NamespacedType
 from test_msgs.action import Fibonacci
 
-LONG_S = 30.0
+LONG_S = 60.0
 
 
 # -- messages --------------------------------------------------------------------------------------
