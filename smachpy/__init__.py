@@ -32,6 +32,7 @@ from smachpy.base.log import set_loggers as set_loggers
 from smachpy.compat import MODULES as _SMACH_MODULES
 from smachpy.engine.cleanup import Ending as Ending
 from smachpy.engine.cleanup import current_ending as current_ending
+from smachpy.engine.options import Resource as Resource
 from smachpy.engine.options import Retry as Retry
 from smachpy.exceptions import InconsistentMachineError as InconsistentMachineError
 from smachpy.exceptions import InvalidConstructionError as InvalidConstructionError
@@ -112,6 +113,7 @@ __all__ = [
     "Options",
     "ReadOnlyError",
     "Remapper",
+    "Resource",
     "Retry",
     "Rule",
     "Secret",

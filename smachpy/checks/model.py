@@ -50,6 +50,7 @@ RULES: dict[str, Rule] = {
         Rule("outside", "note", "code reads what no recording has", is_on=False),
         Rule("deaf-loop", "warning", "`execute` loops without checking for a preempt"),
         Rule("stuck-concurrence", "error", "a concurrence that cannot finish"),
+        Rule("resource-order", "warning", "resources that are taken in different orders"),
         Rule("ambiguous-map", "warning", "two rules of an outcome map hold with equal conditions"),
         Rule("preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"),
         Rule("property", "error", "a property that does not hold"),

@@ -41,6 +41,7 @@ def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
             yield from _preempts(subject, record)
     yield from _loops(subject, graph, reached)
     yield from _waits(subject, subject.root, limited=False)
+    yield from _resources(subject)
 
 
 def _outcomes(subject: Subject, record: StateRecord, made: set[str | None]) -> Iterator[Problem]:
@@ -121,6 +122,43 @@ def _waits(subject: Subject, record: StateRecord, *, limited: bool) -> Iterator[
             yield subject.problem("no-timeout", record, text, hint, place=place)
     for child in record.children:
         yield from _waits(subject, child, limited=limited)
+
+
+def _resources(subject: Subject) -> Iterator[Problem]:
+    """Yield the states that take resources in another order than others: they can block forever."""
+    inside: dict[str, dict[str, str]] = {}  # resource -> resource taken inside -> path of who does
+    todo: list[tuple[StateRecord, tuple[str, ...]]] = [(subject.root, ())]
+    while todo:
+        record, held = todo.pop(0)
+        name = dict(record.details).get("resource", "").partition(",")[0].lstrip("/")
+        if name and name not in held:
+            for outer in held:
+                way = _way(inside, name, outer)
+                if way:
+                    text = (
+                        f"{record.path} takes {name} inside of {outer}, and {way[0]} takes "
+                        f"{' and then '.join(way[1:])} inside of {name}: each can wait for the "
+                        "other."
+                    )
+                    hint = "Take them in the same order, or both at once in one machine around."
+                    yield subject.problem("resource-order", record, text, hint)
+                inside.setdefault(outer, {}).setdefault(name, record.path)
+            held = (*held, name)
+        todo[:0] = [(child, held) for child in record.children]
+
+
+def _way(inside: dict[str, dict[str, str]], start: str, end: str) -> tuple[str, ...]:
+    """Return who first takes something inside of `start` on the way to `end`, and the names."""
+    ways: list[tuple[str, ...]] = [(path, name) for name, path in inside.get(start, {}).items()]
+    seen: set[str] = set()
+    while ways:
+        way = ways.pop()
+        if way[-1] == end:
+            return way
+        if way[-1] not in seen:
+            seen.add(way[-1])
+            ways += [(*way, name) for name in inside.get(way[-1], {})]
+    return ()
 
 
 def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Problem]:

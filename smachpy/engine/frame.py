@@ -49,6 +49,9 @@ class Gate(Protocol):
     def stop(self, run: Run) -> None:
         """End the pause, as the root is asked to stop; with the run's lock held."""
 
+    def is_paused(self) -> bool:
+        """Return whether the machine is paused."""
+
     def pass_gate(self, frame: Frame, step: Any) -> None:
         """Block before `step` while the machine is paused."""
 

@@ -6,11 +6,15 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.exceptions import InvalidNameError
+from actionlib_core.names import check_name
 from smachpy.base.problems import Problems, as_number, plain, unknown_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import TypeAlias
+
+    from actionlib_core.resources import Policy
 
     Result: TypeAlias = str | type[BaseException]
 
@@ -67,6 +71,43 @@ class Retry:
         return f"{self.attempts} attempts, {self.backoff:g} s apart, on {on}"
 
 
+POLICIES = ("wait", "preempt", "refuse")  # of `actionlib_core.resources.Policy`
+REFUSED = "refused"
+
+
+@dataclasses.dataclass(frozen=True, slots=True, init=False)
+class Resource:
+    """What a state needs for itself while it executes, such as the base of the robot.
+
+    Attributes:
+        name: A ROS name; relative to the namespace of the node.
+        policy: While another one holds it: "wait" until it is free, "preempt" the holder and wait
+            until it has stopped, or "refuse" to execute and end with the outcome 'refused'.
+
+    Raises:
+        InvalidStateError: a value is wrong; all problems at once.
+    """
+
+    name: str
+    policy: Policy
+
+    def __init__(self, name: str, policy: Policy = "wait") -> None:
+        problems = Problems("")
+        word = problems.word("resource: name", name)
+        try:
+            check_name(word or "x", "resource: name")
+        except InvalidNameError as error:
+            problems.add(str(error))
+        if not isinstance(policy, str) or policy not in POLICIES:
+            problems.add(f"resource: policy: got {policy!r}; expected one of {list(POLICIES)}.")
+        problems.raise_all()
+        object.__setattr__(self, "name", word)
+        object.__setattr__(self, "policy", plain(policy))
+
+    def __str__(self) -> str:
+        return self.name if self.policy == "wait" else f"{self.name}, {self.policy}"
+
+
 @dataclasses.dataclass(frozen=True, slots=True)
 class Options:
     """The options of one state, checked; `smachpy.machines.state.StateOptions` describes them."""
@@ -83,12 +124,14 @@ class Options:
     idempotent: bool = False
     transient: tuple[str, ...] = ()
     success: tuple[str, ...] | None = None
+    resource: Resource | None = None
 
     def made_outcomes(self) -> tuple[str, ...]:
         """Return the outcomes that these options add to a state."""
         own = () if self.timeout is None else (self.timeout_outcome,)
         skipped = () if self.skipped is None else (self.skipped,)
-        return (*own, *self.on_exception.values(), *skipped)
+        may_refuse = self.resource is not None and self.resource.policy == "refuse"
+        return (*own, *self.on_exception.values(), *skipped, *[REFUSED][:may_refuse])
 
     @property
     def skipped(self) -> str | None:
@@ -194,6 +237,18 @@ def _flag(problems: Problems, name: str, given: Any) -> bool:
     return given is True
 
 
+def _resource(problems: Problems, name: str, given: Any) -> Resource | None:
+    if given is None or isinstance(given, Resource):
+        return given
+    with problems:
+        if isinstance(given, str):
+            return Resource(given)
+        if isinstance(given, tuple) and 1 <= len(given) <= 2:  # noqa: PLR2004  the two fields
+            return Resource(*given)
+        problems.add(f"{name}: got {given!r}; expected a name, Resource(name, policy), or a tuple.")
+    return None
+
+
 _CHECKS: dict[str, Callable[[Problems, str, Any], Any]] = {
     "timeout": Problems.seconds,
     "timeout_outcome": Problems.word,
@@ -206,5 +261,6 @@ _CHECKS: dict[str, Callable[[Problems, str, Any], Any]] = {
     "on_resume": lambda p, name, f: p.function(name, f, "on_resume(userdata)", 1),
     "idempotent": _flag,
     "transient": Problems.names,
+    "resource": _resource,
     "success": lambda p, name, given: None if given is None else p.names(name, given),
 }

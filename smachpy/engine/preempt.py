@@ -91,10 +91,12 @@ class Visit:
         timeout: Its own timeout [s], once that has passed.
         override: The outcome or jump that an operator chose instead of its outcome.
         override_call: The thread of its own `request_preempt`, if it has one that was called.
+        holds: The resource that it holds, or "".
     """
 
     __slots__ = (
         *("by_timeout", "serviced", "answered", "spent", "timeout", "override", "override_call"),
+        "holds",
         *("step", "phase", "_frame", "_injected", "_patience", "_timer", "_timer_number"),
     )
 
@@ -106,6 +108,7 @@ class Visit:
         self.timeout: float | None = None
         self.override: Override | None = None
         self.override_call: Task | None = None
+        self.holds = ""
         self._injected = 0  # the thread for which an exception is pending, 0 for none
         self._patience = PATIENCE_S
         self._timer: Timer | None = None
@@ -275,7 +278,9 @@ class Visit:
                 kind = Finished if each.parent is None else Left
                 event = kind(each.here(), *now, last if each is first else "preempted")
                 run.pending.append(partial(each.publish, event, each.find_subscribers()))
-        run.note_log(f"{frame.described()}: did not react; its thread is left behind.")
+        names = [each.visit.holds for each in _up_to(frame, first) if each.visit is not None]
+        holds = "".join(f", and still holds {name}" for name in names if name)
+        run.note_log(f"{frame.described()}: did not react; its thread is left behind{holds}.")
 
     def _cut_off(self) -> None:
         """Cut the thread off from userdata, events and later runs; then report it as ended.

@@ -310,6 +310,10 @@ def runner_of(
         execute = _run_async(state, execute)
     if is_callback:
         execute = _bounded(state, execute)
+    if options.resource is not None:
+        from smachpy.engine.resources import holding  # here: few states need what it imports
+
+        execute = holding(state, options.resource, execute)
     if ACCEPTING[0]:  # only programs for ROS 1 wait in rospy, whose waits raise `ProgramEnds`
         execute = _ended_by_program(execute)
     plain = options is NO_OPTIONS or (

@@ -197,6 +197,23 @@ class Noted(NamedTuple):
     text: str
 
 
+class ResourceUse(NamedTuple):
+    """A state waits for a resource, holds it, is refused it, or holds it no longer.
+
+    Attributes:
+        resource: Its full name.
+        status: "waits", "holds", "refused", or "free".
+        holder: The state that holds it, if this one waits or is refused; else "".
+    """
+
+    path: str
+    t: float
+    stamp_ns: int
+    resource: str
+    status: str
+    holder: str = ""
+
+
 class CallbackFailed(NamedTuple):
     """A callback, hook or listener raised; the machine goes on."""
 
@@ -376,6 +393,7 @@ Event: TypeAlias = (
     | Retried
     | Iterated
     | Noted
+    | ResourceUse
     | CallbackFailed
     | UserdataWritten
     | Paused
@@ -426,6 +444,12 @@ def asker_text(source: str, by: str, why: str) -> str:
     """Return the origin of a preempt as one phrase for people ("timeout of /P/DRIVE: 5 s")."""
     who = f"{SOURCES.get(source, source)} {by}".strip()
     return f"{who}: {why}" if why else who
+
+
+def resource_text(status: str, resource: str, holder: str) -> str:
+    """Return, for people, what a state has of a resource: "waits for base, held by /P/DRIVE"."""
+    words = {"waits": "waits for", "holds": "holds", "refused": "is refused"}.get(status, "frees")
+    return f"{words} {resource}, held by {holder}" if holder else f"{words} {resource}"
 
 
 def answered_text(answer: str, by: str) -> str:

@@ -281,7 +281,7 @@ _OPENS = {"Started": "", "Recovered": "", "Entered": "", "GoalSent": "goal of "}
 _CLOSES = {"Finished": "", "Left": "", "Failed": "", "GoalDone": "goal of "}
 _WITHIN = {
     **dict.fromkeys(("PreemptRequested", "PreemptServiced", "Abandoned"), ""),
-    **dict.fromkeys(("Retried", "Noted", "Paused", "Resumed"), ""),
+    **dict.fromkeys(("Retried", "Noted", "ResourceUse", "Paused", "Resumed"), ""),
     **dict.fromkeys(("QuestionAsked", "QuestionAnswered"), ""),
     "Iterated": "item of ",
     "GoalFeedback": "goal of ",

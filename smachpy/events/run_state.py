@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NotRequired, TypedDict
 
 # The types are also read while the program runs, by what checks data from the network.
 from actionlib_core.inputs.checked_data import Count, Number, Stamp  # noqa: TC001
+from smachpy.events import resource_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +24,7 @@ _NOT_ASKED = {"preempt": None, "asked": None, "serviced": None, "abandoned": Non
 
 _OF_QUESTION = ("text", "answers", "words", "default", "patience", "service", "has_picture")
 
-_OF_VISIT = ("note", "question", "marking", "fired", "held")
+_OF_VISIT = ("note", "question", "marking", "fired", "held", "resource")
 
 CUT_SHORT = "a new run began before it ended"
 """Text of a LOST goal whose run was cut short."""
@@ -72,10 +73,10 @@ class StateFacts(TypedDict):
     seconds: in finished visits. preempt: when the running visit was asked to stop, asked: by whom,
     serviced: when it serviced the request, abandoned: when its grace was over; all None until then.
     attempt: of the visit, from 1. item: number of an iterator's item, from 0. waits: the reason of
-    a pause before it. note, question: of the newest visit. Of a plan that has fired since it was
-    entered: marking, ids of the places that hold tokens (one with two tokens is in it twice);
-    fired, id of the newest transition; held, while it waits: id of a transition -> why its guard is
-    false.
+    a pause before it. note, question: of the newest visit. resource: which one it holds or waits
+    for, in words. Of a plan that has fired since it was entered: marking, ids of the places that
+    hold tokens (one with two tokens is in it twice); fired, id of the newest transition; held,
+    while it waits: id of a transition -> why its guard is false.
     """
 
     visits: Count
@@ -93,6 +94,7 @@ class StateFacts(TypedDict):
     item: NotRequired[Count]
     waits: NotRequired[str | None]
     note: NotRequired[str]
+    resource: NotRequired[str]
     question: NotRequired[QuestionFacts]
     marking: NotRequired[list[str]]
     fired: NotRequired[str]
@@ -186,6 +188,7 @@ class RunState:
             "Fired": self._on_fired,
             "HeldBack": self._on_held_back,
             "Iterated": lambda r: self._set(r, item=r["number"]),
+            "ResourceUse": self._on_resource,
             "Noted": lambda r: self._set(r, note=r["text"]),
             "Paused": lambda r: self._set(r, waits=r["reason"]),
             "Resumed": lambda r: self._set(r, waits=None),
@@ -288,6 +291,7 @@ class RunState:
     def _leave(self, record: dict[str, Any], outcome: str) -> None:
         state = self._state(record["path"])
         state.pop("held", None)
+        state.pop("resource", None)
         if state["since"] is not None:
             state["seconds"] += (record["stamp_ns"] - state["since"]) / 1e9
         state.update(since=None, left=record["stamp_ns"], outcome=outcome, waits=None, **_NOT_ASKED)
@@ -324,6 +328,13 @@ class RunState:
         truths = record.get("truths") or guards  # older recordings have none
         pairs = zip(record["transitions"], truths, guards, strict=False)
         self._set(record, held={number: truth or guard for number, truth, guard in pairs})
+
+    def _on_resource(self, record: dict[str, Any]) -> None:
+        if record["status"] == "free":
+            self._state(record["path"]).pop("resource", None)
+            return
+        text = resource_text(record["status"], record["resource"], record["holder"])
+        self._set(record, resource=text)
 
     def _on_question(self, record: dict[str, Any]) -> None:
         question = {name: record[name] for name in _OF_QUESTION}

@@ -16,6 +16,7 @@ from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Section
 from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.inputs.yaml_text import YamlTextError, load_with_marks
 from smachpy.base.problems import unknown_name
+from smachpy.engine.options import POLICIES
 from smachpy.exceptions import MissionError, SmachError, error_text
 from smachpy.files.reference import (
     Naming,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 KINDS: Final = ("state", "machine", "sequence", "concurrence", "iterator", "mission", "plan")
 OPTIONS: Final = (
     *("timeout", "timeout_outcome", "preempt_timeout", "retry", "resume"),
-    *("idempotent", "transient"),
+    *("idempotent", "transient", "resource"),
 )
 KEYS: Final = ("outcomes", "input_keys", "output_keys")
 TYPES: Final[dict[str, tuple[type, ...]]] = {
@@ -383,6 +384,10 @@ class _Reader:
                     list(retry.texts("on", ("aborted",))),
                 )
                 retry.close()
+            if name == "resource" and isinstance(value, dict):
+                resource = section.section("resource")
+                value = (resource.text("name", REQUIRED), resource.text("policy", "wait", POLICIES))
+                resource.close()
             found[name] = value
         return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, get_args
 
+from smachpy.engine.options import POLICIES
 from smachpy.files.reading import KINDS, OPTIONS, TYPES
 from smachpy.machines.state_machine import Reenter
 
@@ -34,6 +35,13 @@ def schema() -> dict[str, Any]:
         "resume": {"type": "string", "description": "skip:OUTCOME or ask"},
         "idempotent": {"type": "boolean"},
         "transient": TEXTS,
+        "resource": {
+            "anyOf": [
+                {"type": "string"},
+                _object({"name": {"type": "string"}, "policy": {"enum": list(POLICIES)}}, ["name"]),
+            ],
+            "description": "what it needs for itself while it executes",
+        },
     }
     assert tuple(options) == OPTIONS
     names = {"type": "object", "additionalProperties": {"type": "string"}}

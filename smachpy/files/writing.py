@@ -291,6 +291,11 @@ class _Writer:
             found["idempotent"] = True
         if options.transient:
             found["transient"] = list(options.transient)
+        if options.resource is not None:
+            found["resource"] = {
+                "name": options.resource.name,
+                "policy": options.resource.policy,
+            }
         return found
 
     def _policy(self, container: Concurrence, path: str) -> dict[str, Any]:

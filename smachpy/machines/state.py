@@ -24,7 +24,7 @@ from smachpy.engine import frame as frames
 from smachpy.engine import step as steps
 from smachpy.engine.described import StateData
 from smachpy.engine.frame import clock_of_run, current_scope
-from smachpy.engine.options import NAMES, NO_OPTIONS, Options, Retry, changed
+from smachpy.engine.options import NAMES, NO_OPTIONS, Options, Resource, Retry, changed
 from smachpy.engine.preempt import (
     REQUESTING,
     PreemptNotice,
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from typing import Self, Unpack
 
     from actionlib_core.clock import Clock
+    from actionlib_core.resources import Policy
     from smachpy.base.names import Names
     from smachpy.engine.frame import Frame, Scope
     from smachpy.engine.options import Result
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CBState",
     "Options",
+    "Resource",
     "Retry",
     "State",
     "StateOptions",
@@ -69,6 +71,8 @@ RetrySpec: TypeAlias = (
     "Retry | tuple[int, float, Result | Iterable[Result]] | tuple[int, float] | int | None"
 )
 
+
+ResourceSpec: TypeAlias = "Resource | tuple[str, Policy] | str | None"
 
 LONGEST_NOTE = 200
 """Characters of a note that are kept."""
@@ -98,6 +102,8 @@ class StateOptions(TypedDict, total=False):
         success: The outcomes that are good. All others count as failures, or as preempts if they
             are called so. None, the default, goes by their names (docs/outcomes.md). Exit codes,
             colours, statistics and reports use it.
+        resource: What it needs for itself while it executes: a name, `Resource(name, policy)`, or
+            that as a tuple. See docs/resources.md.
     """
 
     timeout: float | None
@@ -112,6 +118,7 @@ class StateOptions(TypedDict, total=False):
     idempotent: bool
     transient: Iterable[str]
     success: Iterable[str] | None
+    resource: ResourceSpec
 
 
 class DataOf(Generic[Data_co]):
@@ -410,6 +417,8 @@ class State:
             details.append(("timeout", f"{options.timeout:g} s -> {options.timeout_outcome}"))
         if options.retry is not None:
             details.append(("retry", str(options.retry)))
+        if options.resource is not None:
+            details.append(("resource", str(options.resource)))
         return self._smachpy_kind, tuple(details)
 
     def describe_structure(self) -> Structure:

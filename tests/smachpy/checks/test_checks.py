@@ -878,3 +878,31 @@ def test_sources_are_parsed_by_one_thread_at_a_time(monkeypatch):
         thread.join()
     assert most
     assert set(most) == {1}
+
+
+def nested(*names: str) -> State:
+    """A state that takes the last resource, in machines that hold the others."""
+    state: State = CBState(lambda _: "ok", outcomes=["ok"], resource=names[-1])
+    for name in reversed(names[:-1]):
+        machine = StateMachine(["ok", "preempted"], resource=name)
+        machine.add("IN", state)
+        state = machine
+    return state
+
+
+@pytest.mark.parametrize(
+    ("orders", "found"),
+    [
+        ([("base", "arm"), ("base", "arm"), ("arm",)], []),
+        ([("base", "base"), ("arm", "base"), ("base",)], []),
+        ([("base", "arm"), ("arm", "base")], ["/C/N1/IN"]),
+        ([("base", "arm"), ("arm", "door"), ("door", "base")], ["/C/N2/IN"]),
+        ([("base", "arm", "door"), ("door", "base")], ["/C/N1/IN"]),
+    ],
+)
+def test_resources_in_different_orders(orders, found):
+    both = Concurrence(["ok", "preempted"], "ok", name="C")
+    for number, names in enumerate(orders):
+        both.add(f"N{number}", nested(*names))
+    problems = [p for p in smachpy.check(both) if p.rule == "resource-order"]
+    assert [problem.path for problem in problems] == found

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import smachpy
+from smachpy import Resource, get_options
 from smachpy.checks import check
 from smachpy.files import MissionFileError, load, read, resolve
 from smachpy.files.reference import ResolveError
@@ -481,3 +482,31 @@ def test_what_is_no_yaml_has_its_place(file, text, problem):
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(MissionFileError, match="No such file"):
         load(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("given", "resource"),
+    [
+        ("base", Resource("base")),
+        ("{name: base}", Resource("base")),
+        ("{name: /robot/arm, policy: preempt}", Resource("/robot/arm", "preempt")),
+    ],
+)
+def test_resources(tmp_path, given, resource):
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "name: M\noutcomes: [done, preempted]\nstates:\n"
+        f"  A: {{state: wait, with: {{seconds: 1}}, resource: {given}}}\n"
+    )
+    assert get_options(load(path)["A"]).resource == resource
+
+
+@pytest.mark.parametrize("given", ["'a b'", "{name: base, policy: steal}", "{policy: wait}", "7"])
+def test_wrong_resources_have_a_line(tmp_path, given):
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "name: M\noutcomes: [done, preempted]\nstates:\n"
+        f"  A: {{state: wait, with: {{seconds: 1}}, resource: {given}}}\n"
+    )
+    with pytest.raises(MissionFileError, match=r"m\.yaml:4:\d+: .*resource"):
+        load(path)

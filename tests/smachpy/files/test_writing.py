@@ -58,7 +58,12 @@ def build(tree: Any) -> State:
         concurrence.add("S0", children[0])
         return concurrence
     machine: Any = (
-        StateMachine(outcomes, reenter="last" if extra else "first", **KEYS)
+        StateMachine(
+            outcomes,
+            reenter="last" if extra else "first",
+            resource=("base", "preempt") if extra else None,
+            **KEYS,
+        )
         if kind == "machine"
         else Sequence(outcomes, "a", **KEYS)
     )
@@ -91,7 +96,7 @@ def facts(record: Any) -> Any:
         record.rules,
         record.default_outcome,
         record.cleanup,
-        [pair for pair in record.details if pair[0] == "reenter"],
+        [pair for pair in record.details if pair[0] in {"reenter", "resource"}],
         [facts(child) for child in record.children],
     )
 

@@ -70,7 +70,7 @@ FIELDS = {
     "default": "yes", "patience": 5.0, "service": "q/1", "has_picture": False, "answer": "yes",
     "action": "robot/move", "goal_id": "g1", "goal": {"$msg": "a/B", "fields": {"x": 1.0}},
     "feedback": {"$msg": "a/C", "fields": {"distance_remaining": 1.0}}, "status": "SUCCEEDED",
-    "result": None,
+    "result": None, "resource": "base", "holder": "/JOB/B",
 }  # fmt: skip
 
 

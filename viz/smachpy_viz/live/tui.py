@@ -13,7 +13,7 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
-from smachpy.events import answered_text, asker_text, recovered_text
+from smachpy.events import answered_text, asker_text, recovered_text, resource_text
 from smachpy.events.outcome_classes import outcome_class
 from smachpy.events.run_state import RunState
 from smachpy.exceptions import SmachError
@@ -48,7 +48,7 @@ STRIDE = 1000
 LOGGED = {
     *("Started", "Recovered", "Finished", "Left", "Failed", "GoalDone", "Retried"),
     *("PreemptRequested", "PreemptServiced", "Abandoned"),
-    *("QuestionAsked", "QuestionAnswered"),
+    *("QuestionAsked", "QuestionAnswered", "ResourceUse"),
 }
 
 
@@ -539,7 +539,8 @@ def _label(
         return Text(name, "dim")
     if state["since"] is not None:
         style = f"bold {STYLES['preempted']}" if state.get("preempt") else f"bold {RUNNING}"
-        note = f" {shorten(state['note'], 40)}" if state.get("note") else ""
+        texts = filter(None, (state.get("resource"), state.get("note")))
+        note = "".join(f" {shorten(text, 40)}" for text in texts)
         tidy = ", tidying up" if tidies else ""
         text = Text.assemble(
             (name, style), tidy, note, (f"  {(now - state['since']) / 1e9:.1f} s", "dim")
@@ -561,6 +562,8 @@ def _line(event: dict[str, Any], target: str) -> Text:
         words, style = f"asked to stop by {_asker(event)}", STYLES["preempted"]
     if event["kind"] == "QuestionAsked":
         words, style = f"asks {event['text']}", WAITING
+    if event["kind"] == "ResourceUse":
+        words = resource_text(event["status"], event["resource"], event["holder"])
     if event["kind"] == "QuestionAnswered":
         words, style = answered_text(event["answer"], event["by"]), WAITING
     if event["kind"] == "Recovered":

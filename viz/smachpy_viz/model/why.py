@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from smachpy.events import answered_text, asker_text
+from smachpy.events import answered_text, asker_text, resource_text
 from smachpy.events.outcome_classes import is_good, outcome_class
 from smachpy.events.run_state import RAISED
 from smachpy.userdata.shown import literal
@@ -263,7 +263,7 @@ class _CauseFinder:
         for path in innermost(active):
             event = self._run[active[path]]
             cause = self._own_cause(path, active[path], len(self._run), "")
-            reason = "" if cause is None else f"{cause.what}: {cause.reason}"
+            reason = "" if cause is None else ": ".join(filter(None, (cause.what, cause.reason)))
             is_cleanup = tidies(path, self._cleanups)
             what = "entered, to tidy up, and not left" if is_cleanup else "entered, and not left"
             found.append(Cause(path, event["stamp_ns"], what, "other", reason))
@@ -461,6 +461,11 @@ _CAUSES: dict[str, Any] = {
     "OutcomeForced": lambda e: ("ended by an operator", f"with {e['outcome']!r}", ""),
     "Failed": lambda e: (f"raised {e['error']}", "", e.get("trace") or ""),
     "Abandoned": lambda e: (f"ignored its preempt for {e['grace']:g} s", "abandoned", e["stack"]),
+    "ResourceUse": lambda e: (
+        (resource_text(e["status"], e["resource"], e["holder"]), "", "")
+        if e["status"] in {"waits", "refused"}
+        else None
+    ),
     "QuestionAnswered": lambda e: (answered_text(e["answer"], e["by"]), "", ""),
     "TimedOut": lambda e: (f"ran into its timeout of {e['timeout']:g} s", "", ""),
     "GoalDone": _goal,

@@ -8,6 +8,7 @@ from __future__ import annotations
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+from smachpy.events import resource_text
 from smachpy.events.run_state import RAISED
 from smachpy_viz.model.labels import cleanups, end_class, innermost, shorten, tidies
 from smachpy_viz.model.why import newest_run, why
@@ -79,8 +80,8 @@ class RowFold:
         self._last = stamp_ns
         if kind in {"Started", "Entered"}:
             self._active[path] = ""
-        elif kind == "Noted" and path in self._active:
-            self._active[path] = event["text"]
+        elif kind in {"Noted", "ResourceUse"} and path in self._active:
+            self._active[path] = _note(event)
         elif kind == "Recovered":
             self._recover(event)
         elif kind in _ENDS:
@@ -161,6 +162,14 @@ class RowFold:
 def spans_after(began: int, spans: Iterable[Sequence[int]]) -> list[tuple[float, float]]:
     """Convert pairs of instants [ns] to seconds after `began`."""
     return [(round((a - began) / 1e9, 3), round((b - began) / 1e9, 3)) for a, b in spans]
+
+
+def _note(event: dict[str, Any]) -> str:
+    """Return what a state says about itself, or for which resource it waits."""
+    if event["kind"] == "Noted":
+        return str(event["text"])
+    waits = event["status"] == "waits"
+    return resource_text("waits", event["resource"], event["holder"]) if waits else ""
 
 
 def _name(path: str, record: StateRecord) -> str:

@@ -87,6 +87,7 @@ class EventLines:
                     STYLES["preempted"],
                 ),
             ),
+            ev.ResourceUse: self._resource,
             ev.Noted: lambda e: self._line(e, Text(self._reason(e.text))),
             ev.Abandoned: lambda e: self._line(
                 e, Text(f"left behind: it ignored its preempt for {e.grace:g} s", STYLES["failure"])
@@ -115,6 +116,12 @@ class EventLines:
         if self._narrow:
             return shorten(path.rpartition("/")[2], 24)
         return shorten(path.removeprefix(self._root).lstrip("/") or path.lstrip("/"), 70)
+
+    def _resource(self, event: ev.ResourceUse) -> Text | None:
+        if event.status == "free":
+            return None
+        text = ev.resource_text(event.status, event.resource, event.holder)
+        return self._line(event, Text(self._reason(text)))
 
     def _left(self, event: ev.Left) -> Text:
         words = outcome_text(event.outcome)

@@ -1132,7 +1132,8 @@ var OF_VISIT = [
   "question",
   "marking",
   "fired",
-  "held"
+  "held",
+  "resource"
 ];
 var emptyState = () => ({
   run: 0,
@@ -1230,6 +1231,11 @@ var RULES = {
   Iterated(data, e4) {
     stateOf(data, e4.path).item = e4.number;
   },
+  ResourceUse(data, e4) {
+    const state = stateOf(data, e4.path);
+    if (e4.status === "free") delete state.resource;
+    else state.resource = resourceText(e4);
+  },
   Noted(data, e4) {
     stateOf(data, e4.path).note = e4.text;
   },
@@ -1291,6 +1297,10 @@ var RULES = {
   }
 };
 var containerOf = (path) => path.slice(0, Math.max(0, path.lastIndexOf("/"))) || path;
+function resourceText({ status, resource, holder }) {
+  const words2 = own({ waits: "waits for", holds: "holds", refused: "is refused" }, status) ?? "frees";
+  return `${words2} ${resource}${holder ? `, held by ${holder}` : ""}`;
+}
 function stateOf(data, path) {
   const known2 = own(data.states, path);
   return known2 ?? put(data.states, path, { visits: 0, since: null, outcome: null, outcomes: {}, seconds: 0 });
@@ -1304,6 +1314,7 @@ function enter(data, e4) {
 function leave(data, e4, outcome) {
   const state = stateOf(data, e4.path);
   delete state.held;
+  delete state.resource;
   if (state.since != null) state.seconds += (e4.stamp_ns - state.since) / 1e9;
   Object.assign(state, { since: null, left: e4.stamp_ns, outcome, waits: null, ...NO_PREEMPT });
   put(state.outcomes, outcome, (own(state.outcomes, outcome) ?? 0) + 1);
@@ -4636,7 +4647,7 @@ function glyphOf(state, kind) {
 function statusOf(state, goal, noServer) {
   if (state?.since == null) return state?.outcome ?? "not visited";
   if (state.preempt) return `asked to stop${state.serviced ? ", cleaning up" : ""}`;
-  return noServer && goal ? `no server of ${goal.action} seen` : "running";
+  return noServer && goal ? `no server of ${goal.action} seen` : state.resource ?? "running";
 }
 function elapsed(node, state, now) {
   const since = (ns) => Math.max(0, now - (ms(ns) ?? now)) / 1e3;
@@ -4645,6 +4656,7 @@ function elapsed(node, state, now) {
   const parts = [];
   if (isInCleanup(node)) parts.push("tidying up");
   if (state.item != null) parts.push(`#${state.item + 1}`);
+  if (state.resource) parts.push(shorten(state.resource, 40));
   if (attempt > 1) parts.push(`attempt ${attempt}`);
   if (!state.preempt) parts.push(duration(since(state.since)));
   else if (state.serviced) parts.push(`cleans up ${duration(since(state.serviced))}`);
@@ -10032,6 +10044,7 @@ var LINES = {
   TimedOut: (e4) => [`timeout of ${e4.timeout} s`, "preempted"],
   Retried: (e4) => [`retry: ${e4.reason}`, "preempted"],
   Iterated: (e4) => [`item ${e4.number + 1}`, "other"],
+  ResourceUse: (e4) => [resourceText(e4), e4.status === "holds" || e4.status === "free" ? "other" : "waiting"],
   Noted: (e4) => [e4.text, "other"],
   CallbackFailed: (e4) => [`${e4.callback}: ${e4.error}`, "failure"],
   Paused: (e4) => [`paused (${e4.reason})`, "waiting"],

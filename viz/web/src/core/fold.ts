@@ -9,12 +9,13 @@ const ENDED_GOALS = 20; // ended goals that are kept
 const NO_PREEMPT = { preempt: null, asked: null, serviced: null, abandoned: null };
 
 /** Facts that end with the visit of a state. */
-const OF_VISIT: ("note" | "question" | "marking" | "fired" | "held")[] = [
+const OF_VISIT: ("note" | "question" | "marking" | "fired" | "held" | "resource")[] = [
   "note",
   "question",
   "marking",
   "fired",
   "held",
+  "resource",
 ];
 
 export const emptyState = (): RunState => ({
@@ -129,6 +130,11 @@ const RULES: Rules = {
   Iterated(data, e) {
     stateOf(data, e.path).item = e.number;
   },
+  ResourceUse(data, e) {
+    const state = stateOf(data, e.path);
+    if (e.status === "free") delete state.resource;
+    else state.resource = resourceText(e);
+  },
   Noted(data, e) {
     stateOf(data, e.path).note = e.text;
   },
@@ -193,6 +199,12 @@ const RULES: Rules = {
 
 export const containerOf = (path: string) => path.slice(0, Math.max(0, path.lastIndexOf("/"))) || path;
 
+/** What a state has of a resource: "waits for base, held by /P/DRIVE". */
+export function resourceText({ status, resource, holder }: { status: string; resource: string; holder: string }) {
+  const words = own({ waits: "waits for", holds: "holds", refused: "is refused" }, status) ?? "frees";
+  return `${words} ${resource}${holder ? `, held by ${holder}` : ""}`;
+}
+
 function stateOf(data: RunState, path: string): StateRun {
   const known = own(data.states, path);
   return known ?? put(data.states, path, { visits: 0, since: null, outcome: null, outcomes: {}, seconds: 0 });
@@ -208,6 +220,7 @@ function enter(data: RunState, e: RunEvent) {
 function leave(data: RunState, e: RunEvent, outcome: string) {
   const state = stateOf(data, e.path);
   delete state.held;
+  delete state.resource;
   if (state.since != null) state.seconds += (e.stamp_ns - state.since) / 1e9;
   Object.assign(state, { since: null, left: e.stamp_ns, outcome, waits: null, ...NO_PREEMPT });
   put(state.outcomes, outcome, (own(state.outcomes, outcome) ?? 0) + 1);

@@ -1,6 +1,6 @@
 // The lines of the log: a text and a colour for each event.
 
-import { RAISED, requestOf } from "#core/fold.ts";
+import { RAISED, requestOf, resourceText } from "#core/fold.ts";
 import { endClass, outcomeClass } from "#core/outcomes.ts";
 import { askerText, duration } from "#core/text.ts";
 import type { EventKind, EventOf, RunEvent, StateNode } from "#core/types.ts";
@@ -20,6 +20,7 @@ const LINES: Lines = {
   TimedOut: (e) => [`timeout of ${e.timeout} s`, "preempted"],
   Retried: (e) => [`retry: ${e.reason}`, "preempted"],
   Iterated: (e) => [`item ${e.number + 1}`, "other"],
+  ResourceUse: (e) => [resourceText(e), e.status === "holds" || e.status === "free" ? "other" : "waiting"],
   Noted: (e) => [e.text, "other"],
   CallbackFailed: (e) => [`${e.callback}: ${e.error}`, "failure"],
   Paused: (e) => [`paused (${e.reason})`, "waiting"],

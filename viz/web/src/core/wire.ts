@@ -312,6 +312,7 @@ export interface EventFields {
   Retried: { attempt: number; reason: string };
   Iterated: { number: number };
   Noted: { text: string };
+  ResourceUse: { resource: string; status: string; holder: string };
   CallbackFailed: { callback: string; error: string };
   UserdataWritten: { key: string; value: Json };
   Paused: { reason: string };
@@ -608,6 +609,7 @@ export interface StateFacts {
   item?: number;
   waits?: string | null;
   note?: string;
+  resource?: string;
   question?: QuestionFacts;
   marking?: string[];
   fired?: string;

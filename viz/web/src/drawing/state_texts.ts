@@ -2,7 +2,7 @@
 
 import { ms } from "#core/fold.ts";
 import { isInCleanup, isPartOfNet } from "#core/model.ts";
-import { duration } from "#core/text.ts";
+import { duration, shorten } from "#core/text.ts";
 import type { GoalRun, OutcomeClass, StateNode, StateRun } from "#core/types.ts";
 
 const BRIEF_MS = 400; // a state shows its clock after this time
@@ -18,7 +18,7 @@ export function glyphOf(state: StateRun | undefined, kind: OutcomeClass | null) 
 export function statusOf(state: StateRun | undefined, goal: GoalRun | null | undefined, noServer: boolean) {
   if (state?.since == null) return state?.outcome ?? "not visited";
   if (state.preempt) return `asked to stop${state.serviced ? ", cleaning up" : ""}`;
-  return noServer && goal ? `no server of ${goal.action} seen` : "running";
+  return noServer && goal ? `no server of ${goal.action} seen` : (state.resource ?? "running");
 }
 
 /** The text of a running state's badge: its time, attempt and so on. */
@@ -29,6 +29,7 @@ export function elapsed(node: StateNode, state: StateRun, now: number) {
   const parts = [];
   if (isInCleanup(node)) parts.push("tidying up");
   if (state.item != null) parts.push(`#${state.item + 1}`);
+  if (state.resource) parts.push(shorten(state.resource, 40));
   if (attempt > 1) parts.push(`attempt ${attempt}`);
   if (!state.preempt) parts.push(duration(since(state.since)));
   else if (state.serviced) parts.push(`cleans up ${duration(since(state.serviced))}`);
