@@ -31,6 +31,7 @@ from pathlib import Path
 import smachpy
 from actionlib_core.clock import RealClock, use_clock
 from smachpy.events.recording import Recorder
+from smachpy.modes import Modes
 
 ROUNDS = 7
 STEPS = 2000
@@ -45,6 +46,8 @@ BUDGETS = {
     "concurrence runs/s": 2000.0,
     "preempt p50 ms": 0.5,
     "preempt p99 ms": 5.0,
+    "emergency stop p50 ms": 2.0,
+    "emergency stop p99 ms": 50.0,
 }
 
 
@@ -320,6 +323,56 @@ def preempt_latencies(count):
     return sorted((end - start) * 1e3 for start, end in zip(asked, ended, strict=True))
 
 
+def emergency_latencies(count):
+    """Return milliseconds of emergency stops of 8 branches, 4 levels deep, each sorted.
+
+    Until the call returns, which is when all states have been told; and until the last of these
+    states has ended.
+    """
+    waiting, ended = threading.Semaphore(0), threading.Semaphore(0)
+
+    class Waits(smachpy.State):
+        def __init__(self):
+            super().__init__(["done", "preempted"])
+
+        def execute(self, _ud):
+            waiting.release()
+            self.wait_preempt()
+            ended.release()
+            return "preempted"
+
+    branches = smachpy.Concurrence(["done", "preempted"], "done")
+    for number in range(8):
+        state = Waits()
+        for _ in range(3):
+            machine = smachpy.StateMachine(["done", "preempted"])
+            machine.add("INNER", state)
+            state = machine
+        branches.add(f"BRANCH_{number}", state)
+    modes = Modes([{"name": "auto", "mission": branches}, "estop"], [], emergency="estop")
+    told, over = [], []
+
+    def press():
+        for _ in range(count):
+            for _ in range(8):
+                waiting.acquire()
+            time.sleep(0.0005)  # until the leaves really wait
+            start = time.perf_counter()
+            modes.emergency_stop()
+            told.append((time.perf_counter() - start) * 1e3)
+            for _ in range(8):
+                ended.acquire()
+            over.append((time.perf_counter() - start) * 1e3)
+            modes.release()
+        modes.request_preempt()
+
+    presser = threading.Thread(target=press)
+    presser.start()
+    modes.execute()
+    presser.join()
+    return sorted(told), sorted(over)
+
+
 def bytes_per_state(library, count=2000):
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
@@ -353,6 +406,10 @@ def figures(rounds):
     latencies = preempt_latencies(60 * rounds)
     found["preempt p50 ms"] = latencies[len(latencies) // 2]
     found["preempt p99 ms"] = latencies[int(len(latencies) * 0.99)]
+    told, over = emergency_latencies(60 * rounds)
+    found["emergency stop p50 ms"] = told[len(told) // 2]
+    found["emergency stop p99 ms"] = told[int(len(told) * 0.99)]
+    found["emergency stop, states ended, p99 ms"] = over[int(len(over) * 0.99)]
     found["bytes per state: smachpy"] = bytes_per_state(smachpy)
     return found, missing
 
