@@ -41,14 +41,17 @@ from smachpy.userdata.user_data import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from typing import Unpack
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from typing import TypeAlias, Unpack
 
     from smachpy.base.names import Names
     from smachpy.engine.control import Control
     from smachpy.engine.frame import Frame
     from smachpy.events.introspection import Structure
     from smachpy.machines.state import StateOptions
+
+    ModeEvent: TypeAlias = tuple[str, Callable[[], object], Callable[[], object] | None]
+    """An event for the exploration: its name, what triggers it, and what follows a second later."""
 
 __all__ = ["Container"]
 
@@ -384,6 +387,14 @@ class Container(Openable, Callbacks, State):
     def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:  # noqa: ARG002  overridden
         """Return the children that ended last: all of them."""
         return list(self._smachpy.others())
+
+    def _smachpy_events(self, label: str) -> tuple[Sequence[ModeEvent], bool]:  # noqa: ARG002  overridden
+        """Return the events that end a child from outside, and whether it only waits for them."""
+        return (), False
+
+    def _smachpy_situation(self) -> str:
+        """Return what the rest of a run depends on, besides the active states and userdata."""
+        return ""
 
     def _smachpy_compile(self) -> Any:
         """Return the plan of this container, which has no problems."""

@@ -22,12 +22,13 @@ from smachpy.modes.table import ModesError, Table, name_of, rows_of, states_of
 from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from typing import Self, Unpack
 
     from smachpy.engine.frame import Frame
     from smachpy.engine.step import Plan, Step
     from smachpy.events.introspection import Kind, Structure
+    from smachpy.machines.container import ModeEvent
     from smachpy.machines.state import StateOptions
     from smachpy.modes.sources import Source
     from smachpy.modes.table import Way
@@ -166,17 +167,24 @@ class Modes(StateMachine):
 
         Threads: any, but no signal handler. It does not wait for the mode to change.
         """
+        table = self.__table
+        return self.__go(
+            lambda mode, values: table.next(mode, event, values), by or f"event {event}"
+        )
+
+    def __go(self, choose_mode: Callable[[str, Any], str | None], by: str) -> bool:
+        """Leave for the mode that is chosen from the present one; return whether there is one."""
         frame = self.__frame
         if frame is None:
             return False
         values = data_of(self.userdata)
-        with asking("program", by or f"event {event}"):
+        with asking("program", by):
             written: tuple[Step | None, str] | None = None
             while True:
                 with frame.run.lock:
                     stop = self.control.emergency()
                     here = self.__emergency if stop else self.__mode
-                    target = self.__table.next(here, event, values) if here else None
+                    target = choose_mode(here, values) if here else None
                     if target is None or self.__frame is not frame:
                         return False
                     step: Step | None = frame.step
@@ -254,6 +262,34 @@ class Modes(StateMachine):
     def __take_events(self, frame: Frame | None, mode: str) -> None:
         """Take the events of a run from now on, or none; what a former run wanted is no more."""
         self.__frame, self.__mode, self.__wanted = frame, mode, ""
+
+    # -- exploration ---------------------------------------------------------------------------
+
+    def _smachpy_events(self, label: str) -> tuple[list[ModeEvent], bool]:
+        waits = self.__table.modes[label].mission is None
+        # What its own outcomes trigger is explored as such.
+        ends = () if waits else self._smachpy.children[label].get_registered_outcomes()
+
+        def ways(mode: str) -> Iterator[tuple[str, str]]:
+            for (source, event), ways in self.__table.ways.items():
+                for way in ways if source == mode and event not in ends else ():
+                    yield f"{event} to {way.target}" if len(ways) > 1 else event, way.target
+
+        def leave_for(target: str) -> Callable[[], object]:
+            return lambda: self.__go(lambda *_: target, "exploration")
+
+        found: list[ModeEvent] = [
+            (f"event {event}", leave_for(target), None) for event, target in ways(label)
+        ]
+        if self.__emergency not in {None, label}:
+            found += [
+                (f"{STOP}, then {event}", self.emergency_stop, leave_for(target))
+                for event, target in ways(str(self.__emergency))
+            ]
+        return found, waits
+
+    def _smachpy_situation(self) -> str:
+        return f"{self.mode} {self.__wanted}"
 
     # -- structure and running -----------------------------------------------------------------
 

@@ -51,6 +51,7 @@ OUTLASTS = "outlasts the others"
 STAYS = "is left alone"
 ASKED = "runs as a preempt comes"
 RAISED = "raised by the test"  # text of the exceptions
+ENDS = "no more events"
 
 # The options of a server for a goal.
 REPLIES: dict[str, Reply] = {
@@ -83,6 +84,8 @@ class RunOptions(TypedDict, total=False):
             next to others, may always hang. "kill": each run has a journal, and is repeated with
             a kill of its process before and after each write; another process continues it.
         preempts: The most preempts per run; 1.
+        events: The most events of `Modes` that come in a run, while they wait and while their
+            missions run; 3. A machine of modes, which never ends, is preempted after them.
         interleavings: Whether to vary which thread continues first, and which leaf outlasts the
             others; True.
         max_steps: The most doubles that run; 200. With more the run counts as endless.
@@ -104,6 +107,7 @@ class RunOptions(TypedDict, total=False):
 
     faults: Iterable[str]
     preempts: int
+    events: int
     interleavings: bool
     max_steps: int
     limit: float
@@ -119,6 +123,7 @@ class RunOptions(TypedDict, total=False):
 DEFAULTS: RunOptions = {
     "faults": (),
     "preempts": 1,
+    "events": 3,
     "interleavings": True,
     "max_steps": 200,
     "limit": 3600.0,
@@ -130,6 +135,19 @@ DEFAULTS: RunOptions = {
     "doubles": (),
     "servers": (),
 }
+
+
+@dataclass(slots=True)
+class _Led:
+    """The events that end a mode.
+
+    Attributes:
+        events: Name -> what triggers it, and what happens a second later, if anything.
+        waits: Whether the double is the mode itself, which only waits for them.
+    """
+
+    events: dict[str, tuple[Callable[[], object], Callable[[], object] | None]]
+    waits: bool
 
 
 @dataclass(slots=True)
@@ -196,6 +214,7 @@ class Explorer:
         # Longer than all leaves of a run together, so that everything else ends first.
         self._long_s = (options["max_steps"] + 1) * STEP_S
         self.doubles: set[str] = set()
+        self._led: dict[str, _Led] = {}
         self._bounded: set[str] = set()
         # After a kill, leaves that end at the same moment may end in another order: avoid ties.
         tie_s = APART_S if "kill" in options["faults"] else 0.0
@@ -244,6 +263,7 @@ class Explorer:
         self._steps = 0
         self._past: list[tuple[str, int]] = []
         self._preempts = self._options["preempts"]
+        self._events = self._options["events"]
         self._active: dict[str, float] = {}
         self._ended: dict[str, str] = {}
         self._items: dict[str, int] = {}
@@ -253,7 +273,7 @@ class Explorer:
             set()
         )  # those that chose to outlast others since a leaf last ended
         self._outlasted: list[tuple[float, float]] = []
-        self._request: Timer | None = None
+        self._requests: list[Timer] = []
         self._over = False
 
     def go_on(self, root: Container, places: Places, active: Iterable[str]) -> None:
@@ -272,9 +292,9 @@ class Explorer:
         self._replace_leaves(places, root, self.root_path, self._kept)  # skips those that are there
 
     def end(self) -> None:
-        """Cancel a preempt whose time has not come."""
-        if self._request is not None:
-            self._request.cancel()
+        """Cancel what was to come later."""
+        for request in self._requests:
+            request.cancel()
 
     def outlasted_s(self, since: float) -> float:
         """Return how long leaves ran on only to outlast others, from `since` on [s]."""
@@ -365,7 +385,7 @@ class Explorer:
         if self.choose(path, (STAYS, ASKED), self._situation((path, ASKED)), key):
             self._preempts -= 1
             # A timer at the current time fires when every thread waits: so the leaf has started.
-            self._request = self._clock.call_later(0.0, self._preempt)
+            self._requests.append(self._clock.call_later(0.0, self._preempt))
 
     def _situation(self, about: Hashable) -> Hashable:
         """Return everything that the rest of the run depends on."""
@@ -377,6 +397,7 @@ class Explorer:
         return (
             about,
             self._preempts,
+            self._events,
             self._attempts.get(self.root_path, 0),
             frozenset(
                 (path, self._age(path, now - t), self._attempts.get(path, 0))
@@ -388,7 +409,7 @@ class Explorer:
             frozenset(item for item in self._items.items() if item[0] in running),
             tuple(self._past),
             tuple(end.situation() for end in self._kit.ends),
-            _userdata(self._root),
+            _kept_in(self._root),
         )
 
     def _age(self, path: str, age: float) -> float:
@@ -437,14 +458,27 @@ class Explorer:
     # -- doubles -------------------------------------------------------------------------------
 
     def _replace_leaves(
-        self, places: Places, container: Container, path: str, kept: set[str]
+        self,
+        places: Places,
+        container: Container,
+        path: str,
+        kept: set[str],
+        led: _Led | None = None,
     ) -> None:
         real = self._options["real_actions"]
         self._choose_cases(places, container, path, kept)
         for label, state in list(container.get_children().items()):
             where = f"{path}/{label}"
+            events, waits = container._smachpy_events(label)
+            inner = (
+                _Led({text: (act, later) for text, act, later in events}, waits)
+                if events or waits
+                else led
+            )
+            if inner is not None:
+                self._led[where] = inner
             if isinstance(state, Container):
-                self._replace_leaves(places, state, where, kept)
+                self._replace_leaves(places, state, where, kept, inner)
             elif where in kept or isinstance(state, Double):
                 continue
             elif not real or state._smachpy_kind in _OUTSIDE:
@@ -501,21 +535,26 @@ class Explorer:
             self._attempts[path] = self._attempts.get(path, 0) + 1
             self._steps += 1
             if self._steps > self._options["max_steps"]:
-                self.too_long = True
+                self.too_long = path not in self._led  # modes never end by themselves
                 self._root.request_preempt()
                 return PREEMPTED if PREEMPTED in outcomes else outcomes[0]
             self._visits[path] = self._visits.get(path, -1) + 1
             execution = _Execution(begun, begun + seconds)
             self._executions[path, number] = execution
-        while execution.picked == OUTLASTS:
-            outlasts = execution.picks > 0
+        led = self._led.get(path, _Led({}, waits=False))
+        while execution.picked == OUTLASTS or execution.picked in led.events:
+            outlasts = execution.picks > 0 and execution.picked == OUTLASTS
             if self._sleep(double, seconds, outlasts=outlasts) and PREEMPTED in outcomes:
                 double.service_preempt()
                 return PREEMPTED
             seconds = self._longer_s(double, path, execution.begun)
             pick = (path, number, execution.picks)
-            picked = self._pick(double, path, outcomes, pick, may_outlast=seconds > 0)
+            may_outlast = seconds > 0 and not led.waits
+            picked = self._pick(double, path, outcomes, pick, led, may_outlast=may_outlast)
             execution.picked, execution.picks = picked, execution.picks + 1
+            if picked in led.events:
+                self._trigger(*led.events[picked])
+                seconds = self._step_s[path]  # it goes on, unless the event asks it to stop
             execution.until = self._clock.now() + seconds
             if picked == OUTLASTS:
                 self._outlasting.add(path)
@@ -523,6 +562,12 @@ class Explorer:
         for key, value in self._writes.get(path, {}).items():
             ud[key] = value
         return self._act(double, path, picked, outcomes)
+
+    def _trigger(self, act: Callable[[], object], later: Callable[[], object] | None) -> None:
+        self._events -= 1
+        act()
+        if later is not None:
+            self._requests.append(self._clock.call_later(STEP_S, later))
 
     def _sleep(self, double: Double, seconds: float, *, outlasts: bool) -> bool:
         """Wait for a double's duration; return whether a preempt ended it."""
@@ -561,19 +606,30 @@ class Explorer:
         path: str,
         outcomes: tuple[str, ...],
         key: Hashable,
+        led: _Led,
         *,
         may_outlast: bool,
     ) -> str:
+        events = list(led.events) if self._events else []
+        if led.waits and not events:
+            return ENDS
         plain = [outcome for outcome in outcomes if outcome != PREEMPTED] or list(outcomes)
+        if led.waits:
+            plain, events = events, []
         # The usual outcome changes with each visit: with a fixed one, a loop would never end.
         first = self._visits[path] % len(plain)
         options = plain[first:] + plain[:first]
         options += [OUTLASTS] if may_outlast else []
         if self._preempts:
             options += [PREEMPT] if PREEMPTED in outcomes else []
-            options += [LATE.format(outcome) for outcome in plain]
+            options += [] if led.waits else [LATE.format(outcome) for outcome in plain]
+        options += events
         faults = self._options["faults"]
-        if get_options(double).timeout is not None or "hang" in faults or self._waits(double, path):
+        if led.waits:
+            faults = ()
+        elif (
+            get_options(double).timeout is not None or "hang" in faults or self._waits(double, path)
+        ):
             options.append(HANGS)
         options += [RAISES, *self._raised.get(path, ())] if "raise" in faults else []
         options += [DEAF] if "deaf" in faults and self._preempts else []
@@ -605,11 +661,11 @@ class Explorer:
             return PREEMPTED if PREEMPTED in outcomes else late or outcomes[0]
         if picked in outcomes:
             return picked
-        self._preempts -= 1
+        self._preempts -= picked != ENDS
         self._preempt()
         if picked == DEAF:
             self._clock.event("nothing: it ignores its preempt").wait()
-        if picked == PREEMPT:
+        if picked in {PREEMPT, ENDS}:
             double.service_preempt()
             return PREEMPTED
         return next(outcome for outcome in outcomes if picked == LATE.format(outcome))
@@ -651,12 +707,18 @@ def _can_be_made(kind: type[BaseException]) -> bool:
     return True
 
 
-def _userdata(container: Container) -> Hashable:
-    """Return the userdata of a container and all inner ones, in a form that can be compared."""
+def _kept_in(container: Container) -> Hashable:
+    """Return what a container and all inner ones keep, in a form that can be compared.
+
+    The userdata, and where the next run begins.
+    """
     data = container.userdata
     own = tuple((key, _text(writable(data[key]))) for key in sorted(data.keys()))
+    live = container._smachpy.live
+    begins = live.goes_on, live.stopped_at, getattr(container._smachpy, "next_initial", None)
     children = container.get_children().values()
-    return (own, *[_userdata(child) for child in children if isinstance(child, Container)])
+    inner = [_kept_in(child) for child in children if isinstance(child, Container)]
+    return (own, begins, container._smachpy_situation(), *inner)
 
 
 def _text(value: object) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import warnings
+from functools import partial
 from typing import Any
 
 import pytest
@@ -17,7 +18,7 @@ from actionlib_core.interfaces.std_srvs.srv import Trigger
 from smachpy import Concurrence, State, StateMachine
 from smachpy.checks import check
 from smachpy.modes import Modes, ModesError, Table, on_service, on_signal, on_topic
-from smachpy.testing import explore, mission_kit
+from smachpy.testing import explore, mission_kit, replay
 
 
 class Step(State):
@@ -408,6 +409,67 @@ def test_exploration_tries_orders_of_events():
         lambda: Modes(["a", "b", "c"], modes, name="R"), invariants=[note], max_runs=50, max_depth=6
     )
     assert paths == {"/R/a", "/R/b", "/R/c"}
+
+
+def small(resume=True):
+    return Modes(
+        ["idle", {"name": "auto", "mission": mission, "resume": resume}, "teleop", "estop"],
+        [
+            ["start", "idle", "auto"],
+            ["joy", ["idle", "auto"], "teleop"],
+            ["free", "teleop", "auto"],
+            ["reset", "estop", "idle"],
+            ["done", "auto", "idle"],
+        ],
+        emergency="estop",
+        name="ROBOT",
+    )
+
+
+@pytest.mark.slow
+def test_exploration_tries_orders_of_events_while_missions_run():
+    orders = set()
+
+    def note(run: Any) -> None:
+        orders.add(tuple(leaves(run)))
+
+    found = explore(small, on_run=note, jobs=1, max_runs=5000, events=2)
+    assert found.exhaustive, str(found)
+    found.assert_ok()
+    assert ("idle", "auto/A", "auto/DOCK", "teleop") in orders  # as it drives
+    assert ("idle", "auto/A", "auto/B", "auto/DOCK", "teleop") in orders  # as it cleans up
+    stopped = ("idle", "auto/A", "auto/DOCK", "idle")  # by an emergency stop, and its release
+    assert stopped in orders
+
+
+@pytest.mark.slow
+def test_exploration_finds_an_order_of_events_that_breaks_an_invariant():
+    def never_left_in_b(run: Any) -> bool:
+        return not any(
+            type(e).__name__ == "Left" and e.path == "/ROBOT/auto/B" and e.outcome == "preempted"
+            for e in run.events
+        )
+
+    found = explore(small, invariants=[never_left_in_b], jobs=1, preempts=0, max_runs=2000)
+    assert found.counterexample is not None
+    at_b = [one for one in found.counterexample.choices if one.startswith("/ROBOT/auto/B: ")]
+    assert set(at_b) & {"/ROBOT/auto/B: event joy", "/ROBOT/auto/B: emergency stop, then reset"}
+    run = replay(small, found.counterexample.choices, preempts=0)
+    assert not never_left_in_b(run)
+
+
+def test_exploration_tries_each_way_of_an_event_and_ends_without_events():
+    ways = [["go", "a", "b", "level > 3"], ["go", "a", "c"]]
+    ends = set()
+
+    def note(run: Any) -> None:
+        ends.add(tuple(leaves(run)))
+
+    modes = partial(Modes, ["a", "b", "c"], ways, userdata={"level": 1}, name="ROBOT")
+    found = explore(modes, on_run=note, jobs=1)
+    assert found.exhaustive, str(found)
+    assert found.ok, str(found)
+    assert ends == {("a",), ("a", "b"), ("a", "c")}
 
 
 def test_all_problems_of_a_table_come_at_once():
