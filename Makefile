@@ -43,10 +43,11 @@ soak:  ## Attack what is promised for some minutes and print the figures (GOALS=
 	$(BIN)/python tests/soak/soak.py $(if $(GOALS),--goals $(GOALS)) $(if $(SECONDS),--seconds $(SECONDS)) $(if $(SEED),--seed $(SEED))
 	MACHINES=$(or $(MACHINES),4000) $(BIN)/python -m pytest -q -m slow tests/contract/test_differential.py
 
-soak-durable:  ## Kill a durable mission's processes, and the shipped missions in virtual time (KILLS=1000 RUNS=1000 SEED=1)
+soak-durable:  ## Kill durable missions, also in virtual time, and update a fleet that works (KILLS=1000 RUNS=1000 UPDATES_S=120 SEED=1)
 	@.ci/venv dot,sim,test
 	KILLS=$(or $(KILLS),1000) $(BIN)/python -m pytest -q -s -m slow tests/smachpy/durable/test_killed_processes.py
 	RUNS=$(or $(RUNS),1000) $(BIN)/python -m pytest -q -m slow tests/missions/test_killed.py
+	$(BIN)/python tests/soak/fleet.py --seconds $(or $(UPDATES_S),120) $(if $(SEED),--seed $(SEED))
 
 mutants:  ## Change one line at a time: would the tests notice? (ROOMS="smachpy/engine" SAMPLE=20 SEED=1)
 	@.ci/venv dot,sim,test

@@ -283,6 +283,11 @@ class _Rest:
         self.until = now + min(rest, MAX_REST_S)
 
 
+def _forget_old(rests: dict[Any, _Rest], now: float) -> None:
+    for key in [key for key, rest in rests.items() if rest.until < now - MAX_REST_S]:
+        del rests[key]
+
+
 def recording_name(run: str) -> str:
     """Return the name of a run's file; the run's name comes from the queue, and may be anything."""
     words = re.sub(r"[^A-Za-z0-9_-]+", "_", run)[:100].strip("_")
@@ -351,7 +356,8 @@ class Runner:
         self._leases: dict[str, Lease] = {}  # of reservations
         self._rests: defaultdict[str, _Rest] = defaultdict(_Rest)  # id of a mission -> its pause
         # The same for a target whose missions cannot begin here, such as one that is not installed.
-        self._target_rests: defaultdict[str, _Rest] = defaultdict(_Rest)
+        # By the machine's structure, too: those of another version may wait for another computer.
+        self._shape_rests: defaultdict[tuple[str, bytes], _Rest] = defaultdict(_Rest)
         self._told: set[str] = set()  # problems that were reported
         self._pause = 0.0
         self._unreachable = False
@@ -451,10 +457,8 @@ class Runner:
                 *self._given_up,
                 *(mission for mission, rest in self._rests.items() if rest.until > now),
             ],
-            leave_targets=[
-                *self._refused,
-                *(target for target, rest in self._target_rests.items() if rest.until > now),
-            ],
+            leave_targets=list(self._refused),
+            leave_shapes=[shape for shape, rest in self._shape_rests.items() if rest.until > now],
         )
         if found is None:
             return False
@@ -549,7 +553,7 @@ class Runner:
             if row is not None:
                 how = f"{row.status}{f': {row.outcome}' if row.outcome else ''}"
                 if row.status != QUEUED:
-                    self._target_rests.pop(row.target, None)
+                    self._shape_rests.pop((row.target, row.structure), None)
             if row is not None and row.status not in OVER:
                 self._note_failure(row, code, begun=row.status != QUEUED)
             else:
@@ -568,10 +572,9 @@ class Runner:
             self._store.release(self._leases[mission], None, note=f"{this_runner()}: {why}")
         self._rests[mission].fail(now)
         if not begun:
-            self._target_rests[row.target].fail(now, MAX_UNFIT_STARTS - 1)
+            self._shape_rests[row.target, row.structure].fail(now, MAX_UNFIT_STARTS - 1)
         if self._until_empty and (not begun or self._rests[mission].attempts >= MAX_ATTEMPTS):
             self._given_up.add(mission)
             tell("smachpy runner", f"mission {mission}: given up, it stays {row.status}: {why}")
-        for rests in (self._rests, self._target_rests):
-            for name in [name for name, rest in rests.items() if rest.until < now - MAX_REST_S]:
-                del rests[name]
+        _forget_old(self._rests, now)
+        _forget_old(self._shape_rests, now)

@@ -68,6 +68,7 @@ _ROBOT: Final = "COALESCE({0}drives, {0}robot)"
 """The robot that a mission holds, as an expression; `drives` is null in rows of version 1."""
 
 MAX_LEFT_ROWS: Final = 500
+MAX_LEFT_SHAPES: Final = 50
 """The most missions, and targets, that `reserve` passes over: they are bound to a statement."""
 
 PRUNED_AT_ONCE: Final = 500
@@ -485,6 +486,7 @@ class SqlStore(ABC):
         robots: Collection[str] = (),
         leave: Collection[str] = (),
         leave_targets: Collection[str] = (),
+        leave_shapes: Collection[tuple[str, bytes]] = (),
     ) -> tuple[MissionRow, Lease] | None:
         check_lease_seconds(seconds)
         host_and_pid(runner)
@@ -499,6 +501,9 @@ class SqlStore(ABC):
             if given:
                 conditions += f"AND {column} {word} ({_places(given)}) "
                 values += given
+        for target, shape in list(leave_shapes)[-MAX_LEFT_SHAPES:]:
+            conditions += "AND NOT (m.target = ? AND m.structure = ?) "
+            values += [target, shape]
         # Evaluated once, unlike `NOT EXISTS`: a long queue may wait for one robot.
         held = (
             "NOT IN (SELECT {0} FROM smachpy_missions WHERE owner IS NOT NULL AND {0} IS NOT NULL)"

@@ -232,6 +232,7 @@ class Store(Protocol):
         robots: Collection[str] = (),
         leave: Collection[str] = (),
         leave_targets: Collection[str] = (),
+        leave_shapes: Collection[tuple[str, bytes]] = (),
     ) -> tuple[MissionRow, Lease] | None:
         """Take the mission that comes next, for a process that will `claim` it with the lease.
 
@@ -245,6 +246,7 @@ class Store(Protocol):
             robots: Only missions of these robots; empty: all missions, with or without a robot.
             leave: Ids of missions that are passed over.
             leave_targets: Targets of missions that are passed over.
+            leave_shapes: Targets and structures of missions that are passed over.
         """
         ...
 

@@ -272,6 +272,25 @@ def test_pauses_grow_with_each_attempt_that_fails():
 
 
 @pytest.mark.slow
+def test_missions_of_an_old_version_hold_up_none_of_the_new_one(errand, tmp_path, capsys):
+    """After an update their file rested, minutes long: they could not begin on that computer."""
+    place = str(tmp_path / "queue.db")
+    old = [f"old{n}" for n in range(5)]
+    for name in old:
+        submit(errand, place, name)
+    errand.write_text(MISSION.replace("FIRST", "CHECK"))
+    submit(errand, place, "new")
+    (tmp_path / "go_new").touch()
+    process = runner(place)
+    try:
+        until(lambda: statuses(place)["new"] == ("ended", "done"))
+    finally:
+        end(process)
+    assert {statuses(place)[name] for name in old} == {("queued", None)}
+    assert {line[1] for line in log_of(errand)} == {"new"}
+
+
+@pytest.mark.slow
 def test_the_last_runner_resumes_what_died_before_it_ends(errand, tmp_path, capsys):
     """The pause after an attempt that failed was taken for an empty queue."""
     place = str(tmp_path / "queue.db")

@@ -101,6 +101,13 @@ def test_what_a_runner_leaves_stays_for_others(store):
     assert taken(store) == ["a"]
 
 
+def test_what_a_runner_leaves_of_one_version_hides_no_other(store):
+    for name, target, shape in [("a", "m.py", b"{}"), ("b", "m.py", b"[]"), ("c", "n.py", b"{}")]:
+        put(store, name, target=target, structure=shape)
+    assert taken(store, leave_shapes=[("m.py", b"{}"), ("o.py", b"[]")]) == ["b", "c"]
+    assert taken(store) == ["a"]
+
+
 def test_more_left_missions_than_a_statement_binds(store):
     put(store, "a")
     assert taken(store, leave=[str(n) for n in range(40_000)]) == ["a"]
