@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from smachpy import CBState, StateMachine
 from tests.browser import wait_for
 
 pytestmark = pytest.mark.browser
@@ -84,3 +85,37 @@ def test_one_clock_for_all_instants(page):
     wait_for(page, "document.querySelector('.log time').textContent === '0.00 s'")
     page.keyboard.press("c")
     wait_for(page, "document.querySelector('.log time').textContent === '1:00:00.00'")
+
+
+def test_a_night_is_folded_until_it_is_unfolded(served, look):
+    """Five hours with 20,000 events and an idle night: each failure is a bar wide enough to be seen."""
+    events, failures, at = [("Started", "/JOB")], 20, 0.0
+    for n in range(10_000):
+        if n == 5_000:
+            at += 8 * HOUR
+        outcome = "aborted" if n % 500 == 250 else "ok"
+        events += [("Entered", "/JOB/A", {"at": at})]
+        events += [("Left", "/JOB/A", {"outcome": outcome, "at": at + 1.7})]
+        at += 1.8
+    sm = StateMachine(outcomes=["done"], name="JOB")
+    with sm:
+        both = CBState(lambda _: "ok", outcomes=["ok", "aborted"])
+        StateMachine.add("A", both, {"ok": "A", "aborted": "A"})
+        StateMachine.add("B", CBState(lambda _: "done", outcomes=["done"]))
+    served.add("one", sm=sm, events=[*events, ("Finished", "/JOB", {"outcome": "done", "at": at})])
+    page = look(served.start())
+    bars = """() => { const { bars, scale } = smachpy.page.timeline;
+        const failed = bars.hits.filter(({ span }) => span.outcome === 'aborted');
+        return [failed.length, Math.min(...failed.map((b) => b.right - b.left)), scale.folds.length]; }"""
+    assert page.evaluate(bars) == [failures, 3, 1]
+    fold = "(() => { const { scale } = smachpy.page.timeline; const [one] = scale.folds; return (scale.x(one.from) + scale.x(one.to)) / 2; })()"
+    canvas = page.locator(".timeline canvas").last
+    canvas.click(position={"x": page.evaluate(fold), "y": 12})
+    wait_for(page, "smachpy.page.timeline.scale.folds.length === 0")
+    assert page.evaluate("() => smachpy.store.playback.cursor.value") is None
+    button = page.get_by_role("button", name="Idle", exact=True)
+    assert button.get_attribute("aria-pressed") == "false"
+    button.click()
+    wait_for(page, "smachpy.page.timeline.scale.folds.length === 1")
+    page.evaluate("() => smachpy.store.playback.seek(smachpy.store.data.run.first() + 3600e3)")
+    assert page.evaluate(bars)[0] == failures

@@ -95,11 +95,11 @@ def test_a_plot_draws_its_line_and_a_click_in_it_goes_to_the_instant(page):
     )
     assert painted > 50
     x = page.evaluate(
-        """() => { const { x } = smachpy.page.timeline.scale; const [plot] = smachpy.page.plots;
+        """() => { const { scale } = smachpy.page.timeline; const [plot] = smachpy.page.plots;
           const first = smachpy.store.data.run.first();
           const { left, width } = plot.chart.over.getBoundingClientRect(); const { from, to } = plot.range;
           const canvas = smachpy.page.timeline.canvas.getBoundingClientRect();
-          return [left + (first + 5000 - from) / (to - from) * width, canvas.left + x(first + 5000)]; }"""
+          return [left + (first + 5000 - from) / (to - from) * width, canvas.left + scale.x(first + 5000)]; }"""
     )
     assert x[0] == pytest.approx(x[1], abs=1.5)  # the plot stands on the timeline's axis
     box = page.locator(".plot-area").first.bounding_box()

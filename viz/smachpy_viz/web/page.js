@@ -1674,6 +1674,79 @@ function namedPlace(value, key) {
 }
 var placeText = ({ x: x3, y: y5 }) => `(${x3.toFixed(1)}, ${y5.toFixed(1)})`;
 
+// src/core/idle.ts
+var LEAST_MS = 3e5;
+var PART = 20;
+var WIDTH = 44;
+var MOST2 = 1 / 3;
+function idleIn(events) {
+  const long = [];
+  for (let i4 = 1; i4 < events.length; i4++) {
+    const [from, to] = [events[i4 - 1].stamp_ns / 1e6, events[i4].stamp_ns / 1e6];
+    if (to - from >= LEAST_MS) long.push({ from, to });
+  }
+  long.sort((a5, b3) => lengthOf(b3) - lengthOf(a5));
+  let rest = events.length ? (events[events.length - 1].stamp_ns - events[0].stamp_ns) / 1e6 : 0;
+  const found = [];
+  for (const one of long) {
+    if (lengthOf(one) * PART < rest) break;
+    rest -= lengthOf(one);
+    found.push(one);
+  }
+  return found.sort((a5, b3) => a5.from - b3.from);
+}
+var lengthOf = ({ from, to }) => to - from;
+var Axis = class {
+  from;
+  // [ms]
+  to;
+  left;
+  // [px]
+  right;
+  folds;
+  // those in the range
+  rate;
+  // [px/ms], but for folded times
+  #width = 0;
+  // of a folded time [px]
+  /** @param folds do not overlap, in their order */
+  constructor(folds, { from, to }, left, right) {
+    [this.from, this.to, this.left, this.right] = [from, to, left, right];
+    this.folds = folds.filter((one) => one.from < to && one.to > from && !(one.from <= from && one.to >= to));
+    const inside = this.folds.map((one) => Math.min(one.to, to) - Math.max(one.from, from));
+    const parts = this.folds.reduce((sum, one, i4) => sum + inside[i4] / lengthOf(one), 0);
+    const busy = to - from - inside.reduce((a5, b3) => a5 + b3, 0);
+    if (parts) this.#width = Math.min(WIDTH, (right - left) * MOST2 / parts);
+    this.rate = (right - left - parts * this.#width) / Math.max(busy, 1e-6);
+  }
+  /** The place of an instant; outside of the range, too. */
+  x(t4) {
+    let busy = t4 - this.from;
+    let parts = 0;
+    for (const fold of this.folds) {
+      const folded = Math.min(Math.max(t4, fold.from), fold.to) - Math.min(Math.max(this.from, fold.from), fold.to);
+      busy -= folded;
+      parts += folded / lengthOf(fold);
+    }
+    return this.left + busy * this.rate + parts * this.#width;
+  }
+  /** The instant at a place; outside of the range, too. */
+  timeAt(px) {
+    let [t4, at] = [this.from, this.left];
+    for (const { from, to } of this.folds) {
+      const [begin, end] = [this.x(from), this.x(to)];
+      if (px < begin) return from - (begin - px) / this.rate;
+      if (px <= end) return from + (px - begin) / (end - begin) * (to - from);
+      [t4, at] = [to, end];
+    }
+    return t4 + (px - at) / this.rate;
+  }
+  /** The folded time at a place; null for none. */
+  foldAt(px) {
+    return this.folds.find(({ from, to }) => px >= this.x(from) && px <= this.x(to)) ?? null;
+  }
+};
+
 // src/core/storage.ts
 function saved(name, fallback) {
   try {
@@ -1693,6 +1766,10 @@ function save(name, value) {
 var CLOCKS = ["run", "wall", "relative"];
 var Clock = class {
   chosen = y3(saved("clock", "run"));
+  /** Whether idle times are folded; those that the user unfolded are not, by their beginnings [ms]. */
+  foldsIdle = y3(true);
+  unfolded = y3(/* @__PURE__ */ new Set());
+  #idle = { key: "", found: [] };
   #data;
   #playback;
   constructor(data, playback) {
@@ -1703,6 +1780,25 @@ var Clock = class {
     this.chosen.value = name;
     save("clock", name);
     this.#playback.updateSlow();
+  }
+  /** The idle times of the run. */
+  idle() {
+    const { events } = this.#data.run;
+    const key = `${this.#data.facts.value?.epoch} ${events[0]?.seq} ${events.at(-1)?.seq}`;
+    if (key !== this.#idle.key) this.#idle = { key, found: idleIn(events) };
+    return this.#idle.found;
+  }
+  /** Those that are folded. */
+  folds() {
+    return this.foldsIdle.value ? this.idle().filter(({ from }) => !this.unfolded.value.has(from)) : [];
+  }
+  /** Fold all idle times, or none. */
+  foldIdle(folds) {
+    this.unfolded.value = /* @__PURE__ */ new Set();
+    this.foldsIdle.value = folds;
+  }
+  unfold({ from }) {
+    this.unfolded.value = /* @__PURE__ */ new Set([...this.unfolded.value, from]);
   }
   /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */
   instantText(t4, digits = 1) {
@@ -6918,13 +7014,12 @@ var Latency = class {
 };
 
 // src/core/density.ts
-function densityOf(events, { from, to }, columns, model = null) {
+function densityOf(events, columnOf, columns, model = null) {
   const found = { counts: new Array(columns).fill(0), failures: [], preempts: [], starts: [] };
-  const wide = Math.max(1, to - from) / columns;
   let begun = false;
   for (const e4 of events) {
     const t4 = e4.stamp_ns / 1e6;
-    found.counts[Math.max(0, Math.min(columns - 1, Math.floor((t4 - from) / wide)))] += 1;
+    found.counts[Math.max(0, Math.min(columns - 1, Math.floor(columnOf(t4))))] += 1;
     const isFailure2 = e4.kind === "Failed" || e4.kind === "Left" && endClass(model?.get(e4.path), e4.outcome) === "failure";
     if (isFailure2) found.failures.push(t4);
     else if (e4.kind === "PreemptRequested") found.preempts.push(t4);
@@ -6979,14 +7074,16 @@ var Strip = class {
     const { width, height } = size;
     const wide = width - this.left - RIGHT;
     if (wide < 40) return;
-    const x3 = (t4) => this.left + (t4 - whole2.from) / (whole2.to - whole2.from) * wide;
+    const axis = new Axis(store.clock.folds(), whole2, this.left, this.left + wide);
+    const x3 = (t4) => axis.x(t4);
     const columns = Math.floor(wide / COLUMN);
     const { events } = store.data.run;
     const step = (whole2.to - whole2.from) / columns;
     const end = Math.floor(whole2.to / Math.max(step, 250));
-    const key = [store.data.model.value?.root.path, events[0]?.seq, events.length, columns, end].join(" ");
+    const folds = axis.folds.map(({ from }) => from);
+    const key = [store.data.model.value?.root.path, events[0]?.seq, events.length, columns, end, ...folds].join(" ");
     if (key !== this.#key || !this.#density) {
-      this.#density = densityOf(events, whole2, columns, store.data.model.value);
+      this.#density = densityOf(events, (t4) => (x3(t4) - this.left) / COLUMN, columns, store.data.model.value);
       this.#key = key;
     }
     const { counts, failures, preempts, starts } = this.#density;
@@ -7008,6 +7105,16 @@ var Strip = class {
       g5.fillStyle = this.#colours.of(colour);
       for (const t4 of instants2) g5.fillRect(x3(t4) - thick / 2, top, thick, height - top);
     };
+    g5.strokeStyle = this.#colours.of("muted");
+    g5.lineWidth = 1.2;
+    for (const { from, to } of axis.folds) {
+      const [begin, last] = [x3(from), x3(to)];
+      g5.fillStyle = this.#colours.of("depth2");
+      g5.fillRect(begin, 0, last - begin, height);
+      g5.beginPath();
+      for (let y5 = 0, side = -1; y5 <= height; y5 += 4, side = -side) g5.lineTo((begin + last) / 2 + 2.5 * side, y5);
+      g5.stroke();
+    }
     ticks2("preempted", preempts, 1.5, height / 2);
     ticks2("ink", starts, 1.5, 0);
     ticks2("failure", failures, FAILURE2, 0);
@@ -7046,24 +7153,23 @@ var Strip = class {
     const { left: edge } = this.canvas.getBoundingClientRect();
     const wide = width - this.left - RIGHT;
     if (!whole2 || e4.button !== 0 || e4.clientX - edge < this.left - GRIP) return;
-    const x3 = (t4) => this.left + (t4 - whole2.from) / (whole2.to - whole2.from) * wide;
-    const timeOf2 = (px2) => (px2 - edge - this.left) / wide * (whole2.to - whole2.from);
-    const [left, right] = this.#ends(x3, width);
+    const axis = new Axis(store.clock.folds(), whole2, this.left, this.left + wide);
+    const [left, right] = this.#ends((t4) => axis.x(t4), width);
     const px = e4.clientX - edge;
     let { from, to } = this.shown;
     const near = (end) => Math.abs(px - end) <= GRIP;
     const isLeft = near(left) && !(near(right) && px > (left + right) / 2);
     const isRight = !isLeft && near(right);
     if (!isLeft && !isRight && (px < left || px > right)) {
-      const middle = whole2.from + timeOf2(e4.clientX);
-      [from, to] = [middle - (to - from) / 2, middle + (to - from) / 2];
+      const half = (axis.x(to) - axis.x(from)) / 2;
+      [from, to] = [axis.timeAt(px - half), axis.timeAt(px + half)];
       this.#onRange({ from, to });
     }
     drag((m5) => {
-      const moved2 = timeOf2(m5.clientX) - timeOf2(e4.clientX);
-      if (isLeft) this.#onRange({ from: Math.min(from + moved2, to - SHORTEST_MS2), to });
-      else if (isRight) this.#onRange({ from, to: Math.max(to + moved2, from + SHORTEST_MS2) });
-      else this.#onRange({ from: from + moved2, to: to + moved2 });
+      const moved2 = (t4) => axis.timeAt(axis.x(t4) + m5.clientX - e4.clientX);
+      if (isLeft) this.#onRange({ from: Math.min(moved2(from), to - SHORTEST_MS2), to });
+      else if (isRight) this.#onRange({ from, to: Math.max(moved2(to), from + SHORTEST_MS2) });
+      else this.#onRange({ from: moved2(from), to: moved2(to) });
     });
   }
 };
@@ -7097,7 +7203,9 @@ var Bars = class {
     this.#visits(lane, y5, lanes, model, scale);
     this.#waits(lane, y5, lanes, model, scale);
   }
-  #visits(lane, y5, lanes, model, { from, to, left, right, x: x3 }) {
+  #visits(lane, y5, lanes, model, axis) {
+    const { from, to, left, right } = axis;
+    const x3 = (t4) => axis.x(t4);
     const g5 = this.context;
     const now = store.playback.nowMs();
     const isOneRow = lanes.rowsOf(lane) === 1;
@@ -7167,7 +7275,9 @@ var Bars = class {
     this.#text(words2, `${kind}-text`, bar);
   }
   /** Draw the times in which the lane's states were paused before they began, or asked. */
-  #waits(lane, y5, lanes, model, { from, to, left, right, x: x3 }) {
+  #waits(lane, y5, lanes, model, axis) {
+    const { from, to, left, right } = axis;
+    const x3 = (t4) => axis.x(t4);
     const now = store.playback.nowMs();
     for (const wait of store.data.run.waits) {
       const until = Math.min(wait.to ?? now, now);
@@ -7394,6 +7504,7 @@ var isNamed = (path, words2) => {
 var LIVE_MS = 3e4;
 var SHORTEST_MS3 = 200;
 var LONGEST_MS = 30 * 864e5;
+var WIDE2 = 1e3;
 var TimeWindow = class {
   length = LIVE_MS;
   // [ms]
@@ -7408,8 +7519,10 @@ var TimeWindow = class {
     const first = store.data.run.first();
     const last = store.playback.nowMs();
     if (first == null) return;
-    this.length = Math.max(500, (last - first) * 1.04);
-    this.end = last + this.length * 0.02;
+    const folded = store.clock.folds().reduce((sum, one) => sum + lengthOf(one), 0);
+    const margin = Math.max(10, (last - first - folded) * 0.02);
+    this.length = Math.max(500, last - first + 2 * margin);
+    this.end = last + margin;
   }
   /** Show a visit with some time around it. @param to [ms] */
   fit(from, to) {
@@ -7433,19 +7546,30 @@ var TimeWindow = class {
     if (this.end === null && !isPast && first != null) end = Math.max(end, first + this.length * 0.98);
     return [end - this.length, end];
   }
+  /** Where the instants of the range are between two places. */
+  axis(left, right) {
+    const [from, to] = this.range();
+    return new Axis(store.clock.folds(), { from, to }, left, right);
+  }
   /** Let the range stay where it is. */
   hold() {
     this.end ??= this.range()[1];
   }
-  /** Move the range. @param time [ms] */
-  move(time2) {
-    this.end = this.range()[1] + time2;
+  /** Move the range by a part of what it shows. */
+  move(part) {
+    const axis = this.axis(0, WIDE2);
+    const [from, to] = [part * WIDE2, (1 + part) * WIDE2].map((px) => axis.timeAt(px));
+    this.length = Math.max(SHORTEST_MS3, to - from);
+    this.end = to;
   }
   /** Make the range longer by a factor, around an instant [ms]. */
   zoom(factor, at) {
-    const [, to] = this.range();
-    const length = Math.max(SHORTEST_MS3, Math.min(this.length * factor, LONGEST_MS));
-    if (this.end !== null || store.playback.cursor.value !== null) this.end = at + (to - at) * length / this.length;
+    const axis = this.axis(0, WIDE2);
+    const isHeld = this.end !== null || store.playback.cursor.value !== null;
+    const fixed = isHeld ? axis.x(at) : WIDE2;
+    const [from, to] = [0, WIDE2].map((px) => axis.timeAt(fixed + (px - fixed) * factor));
+    const length = Math.max(SHORTEST_MS3, Math.min(to - from, LONGEST_MS));
+    if (isHeld) this.end = length === to - from ? to : at + (to - at) * length / (to - from);
     this.length = length;
   }
   /** Keep the played instant in view. */
@@ -7460,6 +7584,7 @@ var TimeWindow = class {
 // src/drawing/timeline.ts
 var NAMES2 = 168;
 var NAMES_NARROW = 84;
+var TOOLS_NARROW = 176;
 var RIGHT2 = 14;
 var TOP = 3;
 var FOOT = 26;
@@ -7494,7 +7619,8 @@ var Timeline = class {
     canvas2.addEventListener("wheel", (e4) => this.#wheel(e4), { passive: false });
     canvas2.addEventListener("pointermove", (e4) => {
       const span = this.#spanAt(e4);
-      canvas2.title = span ? describe2(span) : "";
+      const fold = this.#foldAt(e4);
+      canvas2.title = fold ? `nothing happened for ${duration((fold.to - fold.from) / 1e3)}: click to unfold it` : span ? describe2(span) : "";
       store.pointer.hover(span ? { path: span.path, from: span.from } : null);
       this.#hover(e4.offsetX);
     });
@@ -7546,10 +7672,8 @@ var Timeline = class {
     g5.font = FONT;
     g5.textBaseline = "middle";
     this.window.keepInView();
-    const [from, to] = this.window.range();
-    const [left, right] = [this.names, width - RIGHT2];
-    const x3 = (t4) => left + (t4 - from) / (to - from) * (right - left);
-    const scale = { from, to, left, right, x: x3 };
+    const scale = this.window.axis(this.names, width - RIGHT2);
+    const { from, to } = scale;
     this.scale = scale;
     this.#grid(scale, width, height);
     this.lanes.update(model, store.data.run.spans);
@@ -7566,6 +7690,7 @@ var Timeline = class {
       }
     });
     this.#outages(scale, room);
+    for (const fold of scale.folds) this.#fold(fold, scale, room);
     this.#stretch(scale, height);
     this.#notes(scale, height);
     this.#cursor(scale, height);
@@ -7578,31 +7703,38 @@ var Timeline = class {
     this.tallest = tallest;
     document.documentElement.style.setProperty("--lanes", `${tallest}px`);
   }
-  #grid({ from, to, x: x3 }, width, height) {
+  #grid(axis, width, height) {
+    const { from, to } = axis;
     const g5 = this.context;
     const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
-    const widthOf = (s4) => s4 * 1e3 / (to - from) * (width - this.names);
-    const step = 1e3 * (STEPS_S.find((s4) => widthOf(s4) > 74) ?? 86400 * Math.ceil((to - from) / 864e5 / 8));
+    const step = 1e3 * (STEPS_S.find((s4) => s4 * 1e3 * axis.rate > 74) ?? 86400 * Math.ceil(74 / axis.rate / 864e5));
     g5.fillStyle = this.#colours.of("muted");
     g5.strokeStyle = this.#colours.of("hair");
     g5.textAlign = "left";
     g5.lineWidth = 1;
-    for (let t4 = begun + Math.ceil((from - begun) / step) * step; t4 < to; t4 += step) {
-      const px = Math.round(x3(t4)) + 0.5;
+    const next = (t4) => begun + Math.ceil((t4 - begun) / step) * step;
+    let free = this.names === NAMES_NARROW ? TOOLS_NARROW : 0;
+    for (let t4 = next(from); t4 < to; t4 += step) {
+      const fold = axis.folds.find((one) => one.from < t4 && one.to > t4);
+      if (fold) t4 = next(fold.to);
+      const px = Math.round(axis.x(t4)) + 0.5;
       g5.beginPath();
       g5.moveTo(px, 0);
       g5.lineTo(px, height - FOOT);
       g5.stroke();
       const text2 = store.clock.instantText(t4, step < 1e3 ? 1 : 0);
-      if (px + 3 + g5.measureText(text2).width < width) g5.fillText(text2, px + 3, height - FOOT / 2);
+      const end = px + 3 + g5.measureText(text2).width;
+      if (px < free || end > width) continue;
+      g5.fillText(text2, px + 3, height - FOOT / 2);
+      free = end + 4;
     }
   }
   /** Draw the selected stretch. */
-  #stretch({ left: begin, x: x3 }, height) {
+  #stretch(axis, height) {
     const found = store.playback.stretch.value;
     if (!found) return;
     const g5 = this.context;
-    const [left, right] = [found.from, found.to].map((t4) => Math.max(begin, x3(t4)));
+    const [left, right] = [found.from, found.to].map((t4) => Math.max(axis.left, axis.x(t4)));
     g5.fillStyle = this.#colours.of("ink");
     g5.globalAlpha = 0.1;
     g5.fillRect(left, 0, right - left, height - FOOT);
@@ -7611,13 +7743,13 @@ var Timeline = class {
     g5.fillRect(left, height - FOOT, right - left, store.playback.looping.value ? 4 : 2);
   }
   /** Draw the outages. */
-  #outages({ from, to, x: x3, ...edge }, height) {
+  #outages(axis, height) {
     const g5 = this.context;
     this.gaps = [];
     for (const [begin, end] of store.data.run.now.outages ?? []) {
-      if (end / 1e6 < from || begin / 1e6 > to) continue;
-      const left = Math.max(edge.left, x3(begin / 1e6));
-      const right = Math.min(edge.right, Math.max(x3(end / 1e6), left + 3));
+      if (end / 1e6 < axis.from || begin / 1e6 > axis.to) continue;
+      const left = Math.max(axis.left, axis.x(begin / 1e6));
+      const right = Math.min(axis.right, Math.max(axis.x(end / 1e6), left + 3));
       if (right <= left) continue;
       this.gaps.push([left, right]);
       g5.fillStyle = this.#colours.of("background");
@@ -7633,17 +7765,43 @@ var Timeline = class {
       }
       g5.setLineDash([]);
       const text2 = duration((end - begin) / 1e9);
-      if (g5.measureText(text2).width + 8 > right - left) continue;
+      if (g5.measureText(text2).width + 8 > right - left || axis.foldAt((left + right) / 2)) continue;
       g5.fillStyle = this.#colours.of("waiting-text");
       g5.textAlign = "center";
       g5.fillText(text2, (left + right) / 2, 10);
     }
   }
+  /** Draw a folded idle time: a zigzag with its length, which a click unfolds. */
+  #fold({ from, to }, axis, height) {
+    const g5 = this.context;
+    const left = Math.max(axis.left, axis.x(from));
+    const right = Math.min(axis.right, axis.x(to));
+    const middle = (left + right) / 2;
+    g5.fillStyle = this.#colours.of("depth2");
+    g5.fillRect(left, 0, right - left, height);
+    g5.strokeStyle = this.#colours.of("muted");
+    g5.lineWidth = 1.2;
+    g5.beginPath();
+    for (let y5 = 0, side = -1; y5 <= height; y5 += 5, side = -side) g5.lineTo(middle + 3 * side, y5);
+    g5.stroke();
+    const text2 = duration((to - from) / 1e3);
+    const half = g5.measureText(text2).width / 2 + 5;
+    const at = Math.max(axis.left + half, Math.min(axis.right - half, middle));
+    g5.beginPath();
+    g5.roundRect(at - half, height / 2 - 9, 2 * half, 18, 9);
+    g5.fillStyle = this.#colours.of("background");
+    g5.fill();
+    g5.stroke();
+    g5.fillStyle = this.#colours.of("ink");
+    g5.textAlign = "center";
+    g5.fillText(text2, at, height / 2 + 0.5);
+  }
   /** Draw a pin at each note, with its text. */
-  #notes({ left: first, right: last, x: x3 }, height) {
+  #notes(axis, height) {
+    const { left: first, right: last } = axis;
     const g5 = this.context;
     for (const { at, text: text2 } of pins()) {
-      const px = x3(at);
+      const px = axis.x(at);
       if (px < first || px > last) continue;
       g5.fillStyle = this.#colours.of("ink");
       g5.fillRect(px - 0.5, 0, 1, height - FOOT);
@@ -7659,7 +7817,9 @@ var Timeline = class {
     }
   }
   /** Draw the instants at the pointer and shown. */
-  #cursor({ left, right, x: x3 }, height) {
+  #cursor(axis, height) {
+    const { left, right } = axis;
+    const x3 = (t4) => axis.x(t4);
     const at = store.playback.cursor.value;
     const pointed = store.pointer.pointed.value;
     if (pointed !== null && x3(pointed) >= left) this.#flag(x3(pointed), pointed, height, "muted", 1);
@@ -7686,8 +7846,7 @@ var Timeline = class {
   }
   // -- input ------------------------------------------------------------------------------------
   #timeAt(px) {
-    const [from, to] = this.window.range();
-    return from + (px - this.names) / (this.canvas.clientWidth - this.names - RIGHT2) * (to - from);
+    return this.window.axis(this.names, this.canvas.clientWidth - RIGHT2).timeAt(px);
   }
   #hover(px) {
     store.pointer.pointed.value = px !== null && px >= this.names ? this.#timeAt(px) : null;
@@ -7698,6 +7857,10 @@ var Timeline = class {
     const hit = this.bars.hits.findLast((h5) => px >= h5.left - 1 && px <= h5.right + 1 && py >= h5.top && py <= h5.bottom);
     return hit?.span ?? null;
   }
+  /** The folded idle time below the pointer; null for none, and at the axis. */
+  #foldAt(e4) {
+    return e4.offsetY < this.canvas.clientHeight - FOOT ? this.scale?.foldAt(e4.offsetX) ?? null : null;
+  }
   #down(e4) {
     const { left, bottom } = this.canvas.getBoundingClientRect();
     const from = e4.clientX - left;
@@ -7705,6 +7868,7 @@ var Timeline = class {
     const selects = e4.pointerType === "mouse" && e4.clientY < bottom - FOOT;
     const begin = this.#timeAt(from);
     const span = this.#spanAt(e4);
+    const fold = this.#foldAt(e4);
     let dragged = false;
     this.window.hold();
     const seek = (m5) => store.playback.seek(Math.min(this.#timeAt(m5.clientX - left), store.data.run.last() ?? Infinity));
@@ -7715,6 +7879,10 @@ var Timeline = class {
     };
     drag(move, (m5) => {
       if (dragged && selects) return;
+      if (!dragged && fold) {
+        store.clock.unfold(fold);
+        return;
+      }
       seek(m5);
       if (!dragged && span) this.onPick(span.path);
     });
@@ -7726,8 +7894,7 @@ var Timeline = class {
     this.draw();
   }
   #zoom(e4) {
-    if (Math.abs(e4.deltaX) > Math.abs(e4.deltaY))
-      this.window.move(e4.deltaX / this.canvas.clientWidth * this.window.length);
+    if (Math.abs(e4.deltaX) > Math.abs(e4.deltaY)) this.window.move(e4.deltaX / this.canvas.clientWidth);
     else this.window.zoom(Math.exp(e4.deltaY * 16e-4), this.#timeAt(e4.offsetX));
   }
   #key(e4) {
@@ -7843,7 +8010,15 @@ var Page = class {
   /** Draw what changes in the store. */
   #subscribe() {
     const { data, view: view2, playback, pointer, clock, notes } = store;
-    for (const one of [notes.all, clock.chosen, view2.laneFilter, pointer.pointed, playback.stretch])
+    for (const one of [
+      notes.all,
+      clock.chosen,
+      clock.foldsIdle,
+      clock.unfolded,
+      view2.laneFilter,
+      pointer.pointed,
+      playback.stretch
+    ])
       one.subscribe(() => this.timeline.draw());
     playback.instant.subscribe(() => {
       this.painter.paintAll();
@@ -8522,13 +8697,13 @@ function refusal() {
 
 // src/panels/goals.tsx
 var RECENT_MS = 6e4;
-var MOST2 = 6;
+var MOST3 = 6;
 var MOST_ENDED = 3;
 var MARKS = { success: "✓", failure: "✕", preempted: "■", other: "•" };
 function Goals({ page: page2, data, now }) {
   const [all, setAll] = d2(false);
   const goals = Object.entries(data.goals).sort(([, a5], [, b3]) => (b3.ended ?? b3.since) - (a5.ended ?? a5.since));
-  const running = goals.filter(([, goal]) => goal.ended == null).slice(0, MOST2);
+  const running = goals.filter(([, goal]) => goal.ended == null).slice(0, MOST3);
   const ended = goals.filter(([, goal]) => goal.ended != null && (all || now - goal.ended / 1e6 < RECENT_MS));
   const shown = all ? ended : ended.slice(0, MOST_ENDED);
   const left = goals.filter(([, goal]) => goal.ended != null).length - shown.length;
@@ -9932,7 +10107,7 @@ function Filters({
 }
 
 // src/panels/comparison.tsx
-var MOST3 = 60;
+var MOST4 = 60;
 async function compare(page2, name) {
   if (!name) {
     if (!store.data.comparison.value) return;
@@ -10001,7 +10176,7 @@ function Differences({ page: page2 }) {
   const found = store.data.comparison.value;
   const [all, setAll] = d2(false);
   if (!found) return null;
-  const shown = all ? found.listed : found.listed.slice(0, MOST3);
+  const shown = all ? found.listed : found.listed.slice(0, MOST4);
   const [before, now] = found.runs;
   const runs2 = before && now ? ` (${before} runs) to this (${now}); ×: visits per run` : "";
   return /* @__PURE__ */ a4("section", { children: [
@@ -10714,7 +10889,7 @@ function OpenTwoRuns({ page: page2, one, found }) {
       page2.goTo(bar.path);
     } }),
     /* @__PURE__ */ a4(Side, { title: "today", lanes: both.now, range, at, children: (bar) => page2.goTo(bar.path) }),
-    /* @__PURE__ */ a4(Axis, { range, relative: aligned2 && difference !== null })
+    /* @__PURE__ */ a4(Axis2, { range, relative: aligned2 && difference !== null })
   ] });
 }
 var percent = (t4, { from, to }) => 100 * (t4 - from) / Math.max(1e-6, to - from);
@@ -10755,7 +10930,7 @@ function BarButton({ bar, range, at, onPick }) {
     }
   );
 }
-function Axis({ range, relative }) {
+function Axis2({ range, relative }) {
   const step = TICKS.find((one) => (range.to - range.from) / one <= 8) ?? 86400;
   const ticks2 = [];
   for (let t4 = Math.ceil(range.from / step) * step; t4 <= range.to; t4 += step)
@@ -10992,7 +11167,7 @@ function Changes({ page: page2 }) {
 }
 
 // src/drawing/card.ts
-var WIDTH = 800;
+var WIDTH2 = 800;
 var EDGE = 24;
 var LINE = 24;
 var MOST_STEPS = 6;
@@ -11019,7 +11194,7 @@ async function draw2(page2, why) {
   await pictureOf(svg2, style);
   await new Promise((done) => setTimeout(done, FONTS_MS2));
   const diagram = await pictureOf(svg2, style);
-  const wide = WIDTH - 2 * EDGE;
+  const wide = WIDTH2 - 2 * EDGE;
   const tall = (from) => from.clientWidth ? Math.round(from.clientHeight * wide / from.clientWidth) : 0;
   const steps = why.steps.slice(0, MOST_STEPS);
   const lines = steps.reduce((sum, { reason }) => sum + (reason ? 2 : 1), 0);
@@ -11027,11 +11202,11 @@ async function draw2(page2, why) {
   const height = EDGE * 3 + LINE * (lines + 3) + heights.diagram + heights.map;
   const canvas2 = document.createElement("canvas");
   const ratio = 2;
-  Object.assign(canvas2, { width: WIDTH * ratio, height: height * ratio });
+  Object.assign(canvas2, { width: WIDTH2 * ratio, height: height * ratio });
   const g5 = canvas2.getContext("2d");
   g5.scale(ratio, ratio);
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
-  const write2 = (text2, x3, y6, font2, ink, most = WIDTH - EDGE - x3) => {
+  const write2 = (text2, x3, y6, font2, ink, most = WIDTH2 - EDGE - x3) => {
     g5.font = font2;
     g5.fillStyle = colour(ink);
     let shown = text2;
@@ -11039,7 +11214,7 @@ async function draw2(page2, why) {
     g5.fillText(shown, x3, y6);
   };
   g5.fillStyle = colour("background");
-  g5.fillRect(0, 0, WIDTH, height);
+  g5.fillRect(0, 0, WIDTH2, height);
   g5.textBaseline = "middle";
   let y5 = EDGE + LINE / 2;
   const outcome = why.outcome ?? "no end";
@@ -11568,7 +11743,7 @@ function TokenDialog() {
 // src/core/palette.ts
 var SIGNS2 = { ">": "command", "@": "state", ".": "key", ":": "instant", "#": "run" };
 var ORDER = ["instant", "state", "command", "run", "key"];
-var MOST4 = 40;
+var MOST5 = 40;
 function asked(text2) {
   const kind = SIGNS2[text2.trimStart()[0]] ?? null;
   return { kind, words: kind ? text2.trimStart().slice(1).trim() : text2.trim() };
@@ -11587,7 +11762,7 @@ function ranked(items3, text2) {
     return place * ORDER.length + ORDER.indexOf(of);
   };
   const ranks = new Map(found.map((item) => [item, rank(item)]));
-  return found.sort((a5, b3) => (ranks.get(a5) ?? 0) - (ranks.get(b3) ?? 0)).slice(0, MOST4);
+  return found.sort((a5, b3) => (ranks.get(a5) ?? 0) - (ranks.get(b3) ?? 0)).slice(0, MOST5);
 }
 
 // src/panels/palette.tsx
@@ -11953,7 +12128,7 @@ var LEGEND_SERIES = pre + "series";
 var LEGEND_MARKER = pre + "marker";
 var LEGEND_LABEL = pre + "label";
 var LEGEND_VALUE = pre + "value";
-var WIDTH2 = "width";
+var WIDTH3 = "width";
 var HEIGHT = "height";
 var TOP2 = "top";
 var BOTTOM = "bottom";
@@ -12840,7 +13015,7 @@ function cursorPointShow(self, si) {
   let o5 = self.cursor.points;
   let pt = placeDiv();
   let size = o5.size(self, si);
-  setStylePx(pt, WIDTH2, size);
+  setStylePx(pt, WIDTH3, size);
   setStylePx(pt, HEIGHT, size);
   let mar = size / -2;
   setStylePx(pt, "marginLeft", mar);
@@ -15291,13 +15466,13 @@ function uPlot(opts, data, then) {
     if (shouldSetSize) {
       setStylePx(under, LEFT, plotLftCss);
       setStylePx(under, TOP2, plotTopCss);
-      setStylePx(under, WIDTH2, plotWidCss);
+      setStylePx(under, WIDTH3, plotWidCss);
       setStylePx(under, HEIGHT, plotHgtCss);
       setStylePx(over, LEFT, plotLftCss);
       setStylePx(over, TOP2, plotTopCss);
-      setStylePx(over, WIDTH2, plotWidCss);
+      setStylePx(over, WIDTH3, plotWidCss);
       setStylePx(over, HEIGHT, plotHgtCss);
-      setStylePx(wrap, WIDTH2, fullWidCss);
+      setStylePx(wrap, WIDTH3, fullWidCss);
       setStylePx(wrap, HEIGHT, fullHgtCss);
       can.width = round(fullWidCss * pxRatio);
       can.height = round(fullHgtCss * pxRatio);
@@ -15595,7 +15770,7 @@ function uPlot(opts, data, then) {
   };
   function setSelH(off2, dim) {
     setStylePx(selectDiv, LEFT, select.left = off2);
-    setStylePx(selectDiv, WIDTH2, select.width = dim);
+    setStylePx(selectDiv, WIDTH3, select.width = dim);
   }
   function setSelV(off2, dim) {
     setStylePx(selectDiv, TOP2, select.top = off2);
@@ -16243,6 +16418,8 @@ var Plot = class {
   samples;
   chart;
   range = { from: 0, to: 1 };
+  #axis = new Axis([], { from: 0, to: 1 }, 0, 1);
+  // of its drawing, from its left
   #colours = new Colours();
   /** @param ids of series */
   constructor(element, ids, unit) {
@@ -16265,7 +16442,10 @@ var Plot = class {
         padding: [6, RIGHT4, 6, 0],
         cursor: { show: false },
         legend: { show: false },
-        scales: { x: { time: false, auto: false }, y: percent2 ? { range: [0, 100] } : {} },
+        scales: {
+          x: { time: false, auto: false, distr: 100, fwd: (t4) => this.#axis.x(t4), bwd: (px) => this.#axis.timeAt(px) },
+          y: percent2 ? { range: [0, 100] } : {}
+        },
         axes: [
           { show: false },
           {
@@ -16303,6 +16483,7 @@ var Plot = class {
     const [width, height] = [element.clientWidth, element.clientHeight];
     if (!width || !height) return;
     this.range = range;
+    this.#axis = new Axis(store.clock.folds(), range, 0, Math.max(1, width - SCALE - RIGHT4));
     for (const one of this.samples) one.update(store.data.run, store.data.scene.series);
     if (chart.width !== width || chart.height !== height) chart.setSize({ width, height });
     chart.batch(() => {
@@ -16313,7 +16494,7 @@ var Plot = class {
   /** Mark the instants shown and at the pointer and the hovered visit; the time after the instant shown is pale. */
   #marks() {
     const { ctx: g5, bbox } = this.chart;
-    const at = (t4) => bbox.left + (t4 - this.range.from) / (this.range.to - this.range.from) * bbox.width;
+    const at = (t4) => bbox.left + this.#axis.x(t4) / this.#axis.right * bbox.width;
     const within3 = (px) => Math.max(bbox.left, Math.min(px, bbox.left + bbox.width));
     const band = (from, to, name, part = 1) => {
       g5.globalAlpha = part;
@@ -16322,6 +16503,7 @@ var Plot = class {
     };
     const ratio = devicePixelRatio || 1;
     g5.save();
+    for (const fold of this.#axis.folds) band(at(fold.from), at(fold.to), "depth2");
     const span = store.pointer.hoveredSpan();
     if (span) band(at(span.from), at(span.to ?? store.playback.nowMs()), "halo", 0.22);
     const stretch = store.playback.stretch.value;
@@ -16336,8 +16518,7 @@ var Plot = class {
   }
   #timeAt(e4) {
     const { left, width } = this.chart.over.getBoundingClientRect();
-    const { from, to } = this.range;
-    return from + Math.max(0, Math.min(1, (e4.clientX - left) / width)) * (to - from);
+    return this.#axis.timeAt(Math.max(0, Math.min(1, (e4.clientX - left) / width)) * this.#axis.right);
   }
   #down(e4) {
     if (e4.button !== 0) return;
@@ -17365,6 +17546,22 @@ function StripTools() {
     )
   ] });
 }
+function FoldIdle() {
+  const { clock, playback } = store;
+  playback.watchSlowly();
+  if (!clock.idle().length) return null;
+  const folds = clock.folds().length > 0;
+  return /* @__PURE__ */ a4(
+    "button",
+    {
+      class: folds ? "on" : "",
+      "aria-pressed": folds,
+      title: "fold long times in which nothing happened: they take little room, and a click unfolds one",
+      onClick: () => clock.foldIdle(!folds),
+      children: "Idle"
+    }
+  );
+}
 function TimeTools() {
   const { timeline } = page;
   const showAll = () => {
@@ -17374,6 +17571,7 @@ function TimeTools() {
   const addPlot = (id) => store.panels.setPlots([...store.panels.plotsShown.value, [id]]);
   return /* @__PURE__ */ a4("div", { class: "time-tools", children: [
     /* @__PURE__ */ a4("button", { title: "show the whole run", onClick: showAll, children: "All" }),
+    /* @__PURE__ */ a4(FoldIdle, {}),
     /* @__PURE__ */ a4(AddLine, { label: "plot a number of the run", text: "Plot", onPick: addPlot })
   ] });
 }

@@ -82,6 +82,24 @@ function StripTools() {
   );
 }
 
+/** Folds all idle times, or unfolds them; not there in a run without any. */
+function FoldIdle() {
+  const { clock, playback } = store;
+  playback.watchSlowly(); // idle times end while the run goes on
+  if (!clock.idle().length) return null;
+  const folds = clock.folds().length > 0;
+  return (
+    <button
+      class={folds ? "on" : ""}
+      aria-pressed={folds}
+      title="fold long times in which nothing happened: they take little room, and a click unfolds one"
+      onClick={() => clock.foldIdle(!folds)}
+    >
+      Idle
+    </button>
+  );
+}
+
 function TimeTools() {
   const { timeline } = page;
   const showAll = () => {
@@ -94,6 +112,7 @@ function TimeTools() {
       <button title="show the whole run" onClick={showAll}>
         All
       </button>
+      <FoldIdle />
       <AddLine label="plot a number of the run" text="Plot" onPick={addPlot} />
     </div>
   );

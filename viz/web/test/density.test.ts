@@ -10,7 +10,7 @@ test("every failure and preempt has its instant, however many events there are",
   const events = Array.from({ length: 5000 }, (_, i) => at(i, "Iterated", { number: i }));
   events.splice(1234, 0, at(1234, "Left", { outcome: "aborted" }));
   events.splice(4000, 0, at(4000, "PreemptRequested"), at(4000, "Failed", { error: "no" }));
-  const { counts, failures, preempts } = densityOf(events, { from: 0, to: 5000 }, 100);
+  const { counts, failures, preempts } = densityOf(events, (t) => t / 50, 100);
   assert.deepEqual(failures, [1234, 4000]);
   assert.deepEqual(preempts, [4000]);
   assert.equal(counts.length, 100);
@@ -21,10 +21,7 @@ test("every failure and preempt has its instant, however many events there are",
 });
 
 test("a run that begins again is parted from the one before", () => {
-  assert.deepEqual(
-    densityOf([at(1, "Started"), at(9, "Finished"), at(20, "Started")], { from: 0, to: 30 }, 3).starts,
-    [20],
-  );
+  assert.deepEqual(densityOf([at(1, "Started"), at(9, "Finished"), at(20, "Started")], (t) => t / 10, 3).starts, [20]);
 });
 
 test("an open question lasts until now", () => {

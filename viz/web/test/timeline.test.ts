@@ -92,3 +92,23 @@ test("the map writes the names of goals beside them", () => {
     paper.texts.join(", "),
   );
 });
+
+test("a night in which nothing happened is folded, and its length is told", () => {
+  const night = event("Started", "/PATROL");
+  night.stamp_ns += 8 * 3600e9;
+  const failed = event("Entered", A);
+  failed.stamp_ns = night.stamp_ns + 1e9;
+  const left = { ...event("Left", A, { outcome: "aborted" }), stamp_ns: night.stamp_ns + 2e9 };
+  store.addEvents([night, failed, left]);
+  const { timeline, paper } = drawn();
+  assert.ok(paper.texts.includes("8 h 00"), paper.texts.join(", "));
+  const failures = timeline.bars.hits.filter((hit) => hit.span.path === A);
+  assert.equal(failures.length, 2);
+  for (const { left, right } of failures) assert.ok(right - left > 20);
+  store.clock.foldIdle(false);
+  assert.ok(!drawn().paper.texts.includes("8 h 00"));
+  store.clock.foldIdle(true);
+  store.clock.unfold(store.clock.idle()[0]);
+  assert.ok(!drawn().paper.texts.includes("8 h 00"));
+  store.clock.foldIdle(true);
+});

@@ -12,21 +12,21 @@ export type Density = {
 };
 
 /**
- * @param columns parts into which the time from `from` to `to` is cut [ms]
+ * @param columnOf the column of an instant [ms], from 0
+ * @param columns number of columns
  * @param model knows which states are monitors, whose own ends are no failures
  */
 export function densityOf(
   events: RunEvent[],
-  { from, to }: { from: number; to: number },
+  columnOf: (t: number) => number,
   columns: number,
   model: Model | null = null,
 ): Density {
   const found: Density = { counts: new Array(columns).fill(0), failures: [], preempts: [], starts: [] };
-  const wide = Math.max(1, to - from) / columns;
   let begun = false;
   for (const e of events) {
     const t = e.stamp_ns / 1e6;
-    found.counts[Math.max(0, Math.min(columns - 1, Math.floor((t - from) / wide)))] += 1;
+    found.counts[Math.max(0, Math.min(columns - 1, Math.floor(columnOf(t))))] += 1;
     const isFailure =
       e.kind === "Failed" || (e.kind === "Left" && endClass(model?.get(e.path), e.outcome) === "failure");
     if (isFailure) found.failures.push(t);

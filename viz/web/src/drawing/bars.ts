@@ -1,5 +1,6 @@
 // Draws a lane of the timeline: a bar for each visit of a state, and for each time in which one waited.
 
+import type { Axis } from "#core/idle.ts";
 import type { Model } from "#core/model.ts";
 import { endClass } from "#core/outcomes.ts";
 import { wordsOf } from "#core/purposes.ts";
@@ -15,8 +16,6 @@ const THINNEST = 0.5;
 const FAILED = 3; // narrowest bar of a failure
 const MOST_WIDTHS = 4000; // texts whose widths are kept
 
-/** the range shown [ms], and its pixels between the names of the lanes and the right end */
-export type Scale = { from: number; to: number; left: number; right: number; x: (t: number) => number };
 /** [px] */
 type Bar = { left: number; right: number; top: number; bottom: number };
 export type Hit = Bar & { span: Span };
@@ -37,7 +36,7 @@ export class Bars {
   }
 
   /** Draw a lane's name, bars and waits. */
-  lane(lane: StateNode, y: number, lanes: Lanes, model: Model, scale: Scale) {
+  lane(lane: StateNode, y: number, lanes: Lanes, model: Model, scale: Axis) {
     const g = this.context;
     const h = lanes.heightOf(lane);
     g.fillStyle = this.colours.of("muted");
@@ -48,7 +47,9 @@ export class Bars {
     this.#waits(lane, y, lanes, model, scale);
   }
 
-  #visits(lane: StateNode, y: number, lanes: Lanes, model: Model, { from, to, left, right, x }: Scale) {
+  #visits(lane: StateNode, y: number, lanes: Lanes, model: Model, axis: Axis) {
+    const { from, to, left, right } = axis;
+    const x = (t: number) => axis.x(t);
     const g = this.context;
     const now = store.playback.nowMs();
     const isOneRow = lanes.rowsOf(lane) === 1;
@@ -121,7 +122,9 @@ export class Bars {
   }
 
   /** Draw the times in which the lane's states were paused before they began, or asked. */
-  #waits(lane: StateNode, y: number, lanes: Lanes, model: Model, { from, to, left, right, x }: Scale) {
+  #waits(lane: StateNode, y: number, lanes: Lanes, model: Model, axis: Axis) {
+    const { from, to, left, right } = axis;
+    const x = (t: number) => axis.x(t);
     const now = store.playback.nowMs();
     for (const wait of store.data.run.waits) {
       const until = Math.min(wait.to ?? now, now);

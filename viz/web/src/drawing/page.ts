@@ -113,7 +113,15 @@ export class Page {
   /** Draw what changes in the store. */
   #subscribe() {
     const { data, view, playback, pointer, clock, notes } = store;
-    for (const one of [notes.all, clock.chosen, view.laneFilter, pointer.pointed, playback.stretch])
+    for (const one of [
+      notes.all,
+      clock.chosen,
+      clock.foldsIdle,
+      clock.unfolded,
+      view.laneFilter,
+      pointer.pointed,
+      playback.stretch,
+    ])
       one.subscribe(() => this.timeline.draw());
     playback.instant.subscribe(() => {
       this.painter.paintAll();

@@ -1,5 +1,6 @@
 // A plot beside the timeline, on its axis of instants: uPlot draws the lines and their scale.
 import uPlot from "uplot";
+import { Axis } from "#core/idle.ts";
 import { aligned, Samples } from "#core/series.ts";
 import { store } from "#core/store.ts";
 import { Colours, FONT } from "#drawing/theme.ts";
@@ -16,6 +17,7 @@ export class Plot {
   samples: Samples[];
   chart: uPlot;
   range: Range = { from: 0, to: 1 };
+  #axis = new Axis([], { from: 0, to: 1 }, 0, 1); // of its drawing, from its left
   #colours = new Colours();
 
   /** @param ids of series */
@@ -39,7 +41,10 @@ export class Plot {
         padding: [6, RIGHT, 6, 0],
         cursor: { show: false },
         legend: { show: false },
-        scales: { x: { time: false, auto: false }, y: percent ? { range: [0, 100] } : {} },
+        scales: {
+          x: { time: false, auto: false, distr: 100, fwd: (t) => this.#axis.x(t), bwd: (px) => this.#axis.timeAt(px) },
+          y: percent ? { range: [0, 100] } : {},
+        },
         axes: [
           { show: false },
           {
@@ -80,6 +85,7 @@ export class Plot {
     const [width, height] = [element.clientWidth, element.clientHeight];
     if (!width || !height) return;
     this.range = range;
+    this.#axis = new Axis(store.clock.folds(), range, 0, Math.max(1, width - SCALE - RIGHT));
     for (const one of this.samples) one.update(store.data.run, store.data.scene.series);
     if (chart.width !== width || chart.height !== height) chart.setSize({ width, height });
     chart.batch(() => {
@@ -91,7 +97,7 @@ export class Plot {
   /** Mark the instants shown and at the pointer and the hovered visit; the time after the instant shown is pale. */
   #marks() {
     const { ctx: g, bbox } = this.chart;
-    const at = (t: number) => bbox.left + ((t - this.range.from) / (this.range.to - this.range.from)) * bbox.width;
+    const at = (t: number) => bbox.left + (this.#axis.x(t) / this.#axis.right) * bbox.width;
     const within = (px: number) => Math.max(bbox.left, Math.min(px, bbox.left + bbox.width));
     const band = (from: number, to: number, name: string, part = 1) => {
       g.globalAlpha = part;
@@ -100,6 +106,7 @@ export class Plot {
     };
     const ratio = devicePixelRatio || 1;
     g.save();
+    for (const fold of this.#axis.folds) band(at(fold.from), at(fold.to), "depth2");
     const span = store.pointer.hoveredSpan();
     if (span) band(at(span.from), at(span.to ?? store.playback.nowMs()), "halo", 0.22);
     const stretch = store.playback.stretch.value;
@@ -115,8 +122,7 @@ export class Plot {
 
   #timeAt(e: PointerEvent) {
     const { left, width } = this.chart.over.getBoundingClientRect();
-    const { from, to } = this.range;
-    return from + Math.max(0, Math.min(1, (e.clientX - left) / width)) * (to - from);
+    return this.#axis.timeAt(Math.max(0, Math.min(1, (e.clientX - left) / width)) * this.#axis.right);
   }
 
   #down(e: PointerEvent) {

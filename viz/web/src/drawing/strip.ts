@@ -2,6 +2,7 @@
 // dragged and stretched.
 
 import { asksIn, type Density, densityOf } from "#core/density.ts";
+import { Axis } from "#core/idle.ts";
 import { store } from "#core/store.ts";
 import { Colours, fitted } from "#drawing/theme.ts";
 import { drag } from "#drawing/viewport.ts";
@@ -52,15 +53,17 @@ export class Strip {
     const { width, height } = size;
     const wide = width - this.left - RIGHT;
     if (wide < 40) return;
-    const x = (t: number) => this.left + ((t - whole.from) / (whole.to - whole.from)) * wide;
+    const axis = new Axis(store.clock.folds(), whole, this.left, this.left + wide);
+    const x = (t: number) => axis.x(t);
     const columns = Math.floor(wide / COLUMN);
     const { events } = store.data.run;
     // A density of many events is computed anew only when its picture would change.
     const step = (whole.to - whole.from) / columns;
     const end = Math.floor(whole.to / Math.max(step, 250));
-    const key = [store.data.model.value?.root.path, events[0]?.seq, events.length, columns, end].join(" ");
+    const folds = axis.folds.map(({ from }) => from);
+    const key = [store.data.model.value?.root.path, events[0]?.seq, events.length, columns, end, ...folds].join(" ");
     if (key !== this.#key || !this.#density) {
-      this.#density = densityOf(events, whole, columns, store.data.model.value);
+      this.#density = densityOf(events, (t) => (x(t) - this.left) / COLUMN, columns, store.data.model.value);
       this.#key = key;
     }
     const { counts, failures, preempts, starts } = this.#density;
@@ -82,6 +85,16 @@ export class Strip {
       g.fillStyle = this.#colours.of(colour);
       for (const t of instants) g.fillRect(x(t) - thick / 2, top, thick, height - top);
     };
+    g.strokeStyle = this.#colours.of("muted");
+    g.lineWidth = 1.2;
+    for (const { from, to } of axis.folds) {
+      const [begin, last] = [x(from), x(to)];
+      g.fillStyle = this.#colours.of("depth2");
+      g.fillRect(begin, 0, last - begin, height);
+      g.beginPath();
+      for (let y = 0, side = -1; y <= height; y += 4, side = -side) g.lineTo((begin + last) / 2 + 2.5 * side, y);
+      g.stroke();
+    }
     ticks("preempted", preempts, 1.5, height / 2);
     ticks("ink", starts, 1.5, 0);
     ticks("failure", failures, FAILURE, 0);
@@ -123,24 +136,23 @@ export class Strip {
     const { left: edge } = this.canvas.getBoundingClientRect();
     const wide = width - this.left - RIGHT;
     if (!whole || e.button !== 0 || e.clientX - edge < this.left - GRIP) return;
-    const x = (t: number) => this.left + ((t - whole.from) / (whole.to - whole.from)) * wide;
-    const timeOf = (px: number) => ((px - edge - this.left) / wide) * (whole.to - whole.from);
-    const [left, right] = this.#ends(x, width);
+    const axis = new Axis(store.clock.folds(), whole, this.left, this.left + wide);
+    const [left, right] = this.#ends((t) => axis.x(t), width);
     const px = e.clientX - edge;
     let { from, to } = this.shown;
     const near = (end: number) => Math.abs(px - end) <= GRIP;
     const isLeft = near(left) && !(near(right) && px > (left + right) / 2);
     const isRight = !isLeft && near(right);
     if (!isLeft && !isRight && (px < left || px > right)) {
-      const middle = whole.from + timeOf(e.clientX);
-      [from, to] = [middle - (to - from) / 2, middle + (to - from) / 2];
+      const half = (axis.x(to) - axis.x(from)) / 2;
+      [from, to] = [axis.timeAt(px - half), axis.timeAt(px + half)];
       this.#onRange({ from, to });
     }
     drag((m) => {
-      const moved = timeOf(m.clientX) - timeOf(e.clientX);
-      if (isLeft) this.#onRange({ from: Math.min(from + moved, to - SHORTEST_MS), to });
-      else if (isRight) this.#onRange({ from, to: Math.max(to + moved, from + SHORTEST_MS) });
-      else this.#onRange({ from: from + moved, to: to + moved });
+      const moved = (t: number) => axis.timeAt(axis.x(t) + m.clientX - e.clientX);
+      if (isLeft) this.#onRange({ from: Math.min(moved(from), to - SHORTEST_MS), to });
+      else if (isRight) this.#onRange({ from, to: Math.max(moved(to), from + SHORTEST_MS) });
+      else this.#onRange({ from: moved(from), to: moved(to) });
     });
   }
 }

@@ -1,11 +1,13 @@
 // The part of the run that the timeline shows: a range of a length that ends at an instant, or moves on with the
 // present.
 
+import { Axis, lengthOf } from "#core/idle.ts";
 import { store } from "#core/store.ts";
 
 const LIVE_MS = 30_000; // shown at first
 const SHORTEST_MS = 200; // the shortest time that can fill the timeline
 const LONGEST_MS = 30 * 86_400_000;
+const WIDE = 1000; // about the width of the timeline [px]
 
 export class TimeWindow {
   length = LIVE_MS; // [ms]
@@ -21,8 +23,10 @@ export class TimeWindow {
     const first = store.data.run.first();
     const last = store.playback.nowMs();
     if (first == null) return;
-    this.length = Math.max(500, (last - first) * 1.04);
-    this.end = last + this.length * 0.02;
+    const folded = store.clock.folds().reduce((sum, one) => sum + lengthOf(one), 0);
+    const margin = Math.max(10, (last - first - folded) * 0.02);
+    this.length = Math.max(500, last - first + 2 * margin);
+    this.end = last + margin;
   }
 
   /** Show a visit with some time around it. @param to [ms] */
@@ -50,21 +54,33 @@ export class TimeWindow {
     return [end - this.length, end];
   }
 
+  /** Where the instants of the range are between two places. */
+  axis(left: number, right: number) {
+    const [from, to] = this.range();
+    return new Axis(store.clock.folds(), { from, to }, left, right);
+  }
+
   /** Let the range stay where it is. */
   hold() {
     this.end ??= this.range()[1];
   }
 
-  /** Move the range. @param time [ms] */
-  move(time: number) {
-    this.end = this.range()[1] + time;
+  /** Move the range by a part of what it shows. */
+  move(part: number) {
+    const axis = this.axis(0, WIDE);
+    const [from, to] = [part * WIDE, (1 + part) * WIDE].map((px) => axis.timeAt(px));
+    this.length = Math.max(SHORTEST_MS, to - from);
+    this.end = to;
   }
 
   /** Make the range longer by a factor, around an instant [ms]. */
   zoom(factor: number, at: number) {
-    const [, to] = this.range();
-    const length = Math.max(SHORTEST_MS, Math.min(this.length * factor, LONGEST_MS));
-    if (this.end !== null || store.playback.cursor.value !== null) this.end = at + ((to - at) * length) / this.length;
+    const axis = this.axis(0, WIDE);
+    const isHeld = this.end !== null || store.playback.cursor.value !== null;
+    const fixed = isHeld ? axis.x(at) : WIDE; // the present stays where it is
+    const [from, to] = [0, WIDE].map((px) => axis.timeAt(fixed + (px - fixed) * factor));
+    const length = Math.max(SHORTEST_MS, Math.min(to - from, LONGEST_MS));
+    if (isHeld) this.end = length === to - from ? to : at + ((to - at) * length) / (to - from);
     this.length = length;
   }
 

@@ -2,12 +2,13 @@
 // selected, outages, notes, and the instants at the pointer and shown.
 
 import { ms } from "#core/fold.ts";
+import type { Axis, Idle } from "#core/idle.ts";
 import { purposeOfVisit } from "#core/purposes.ts";
 import { pins } from "#core/reproduction.ts";
 import { store } from "#core/store.ts";
 import { askerText, duration } from "#core/text.ts";
 import type { Span } from "#core/types.ts";
-import { Bars, clipped, type Scale } from "#drawing/bars.ts";
+import { Bars, clipped } from "#drawing/bars.ts";
 import { Lanes } from "#drawing/lanes.ts";
 import { Colours, FONT, fitted } from "#drawing/theme.ts";
 import { TimeWindow } from "#drawing/time_window.ts";
@@ -16,6 +17,7 @@ import { drag } from "#drawing/viewport.ts";
 // Sizes in CSS pixels
 const NAMES = 168; // width of the lanes' names
 const NAMES_NARROW = 84; // on a narrow page
+const TOOLS_NARROW = 176; // width of the buttons at the axis there
 const RIGHT = 14;
 const TOP = 3;
 const FOOT = 26; // height of the axis and its buttons
@@ -32,7 +34,7 @@ export class Timeline {
   bars: Bars;
   top = 0; // vertical scroll [px]
   names = NAMES; // width of the lanes' names [px]
-  scale: Scale | null = null; // of the last drawing
+  scale: Axis | null = null; // of the last drawing
   tallest = 0; // height of all lanes and the axis [px]
   gaps: [number, number][] = []; // outages [px]
   #colours = new Colours();
@@ -50,7 +52,12 @@ export class Timeline {
     canvas.addEventListener("wheel", (e) => this.#wheel(e), { passive: false });
     canvas.addEventListener("pointermove", (e) => {
       const span = this.#spanAt(e);
-      canvas.title = span ? describe(span) : "";
+      const fold = this.#foldAt(e);
+      canvas.title = fold
+        ? `nothing happened for ${duration((fold.to - fold.from) / 1000)}: click to unfold it`
+        : span
+          ? describe(span)
+          : "";
       store.pointer.hover(span ? { path: span.path, from: span.from } : null);
       this.#hover(e.offsetX);
     });
@@ -108,10 +115,8 @@ export class Timeline {
     g.font = FONT;
     g.textBaseline = "middle";
     this.window.keepInView();
-    const [from, to] = this.window.range();
-    const [left, right] = [this.names, width - RIGHT];
-    const x = (t: number) => left + ((t - from) / (to - from)) * (right - left);
-    const scale = { from, to, left, right, x };
+    const scale = this.window.axis(this.names, width - RIGHT);
+    const { from, to } = scale;
     this.scale = scale;
     this.#grid(scale, width, height);
     this.lanes.update(model, store.data.run.spans);
@@ -128,6 +133,7 @@ export class Timeline {
       }
     });
     this.#outages(scale, room);
+    for (const fold of scale.folds) this.#fold(fold, scale, room);
     this.#stretch(scale, height);
     this.#notes(scale, height);
     this.#cursor(scale, height);
@@ -142,32 +148,40 @@ export class Timeline {
     document.documentElement.style.setProperty("--lanes", `${tallest}px`);
   }
 
-  #grid({ from, to, x }: Scale, width: number, height: number) {
+  #grid(axis: Axis, width: number, height: number) {
+    const { from, to } = axis;
     const g = this.context;
     const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
-    const widthOf = (s: number) => ((s * 1000) / (to - from)) * (width - this.names);
-    const step = 1000 * (STEPS_S.find((s) => widthOf(s) > 74) ?? 86_400 * Math.ceil((to - from) / 86_400_000 / 8));
+    const step =
+      1000 * (STEPS_S.find((s) => s * 1000 * axis.rate > 74) ?? 86_400 * Math.ceil(74 / axis.rate / 86_400_000));
     g.fillStyle = this.#colours.of("muted");
     g.strokeStyle = this.#colours.of("hair");
     g.textAlign = "left";
     g.lineWidth = 1;
-    for (let t = begun + Math.ceil((from - begun) / step) * step; t < to; t += step) {
-      const px = Math.round(x(t)) + 0.5;
+    const next = (t: number) => begun + Math.ceil((t - begun) / step) * step;
+    let free = this.names === NAMES_NARROW ? TOOLS_NARROW : 0; // where there is room for text
+    for (let t = next(from); t < to; t += step) {
+      const fold = axis.folds.find((one) => one.from < t && one.to > t);
+      if (fold) t = next(fold.to);
+      const px = Math.round(axis.x(t)) + 0.5;
       g.beginPath();
       g.moveTo(px, 0);
       g.lineTo(px, height - FOOT);
       g.stroke();
       const text = store.clock.instantText(t, step < 1000 ? 1 : 0);
-      if (px + 3 + g.measureText(text).width < width) g.fillText(text, px + 3, height - FOOT / 2);
+      const end = px + 3 + g.measureText(text).width;
+      if (px < free || end > width) continue;
+      g.fillText(text, px + 3, height - FOOT / 2);
+      free = end + 4;
     }
   }
 
   /** Draw the selected stretch. */
-  #stretch({ left: begin, x }: Scale, height: number) {
+  #stretch(axis: Axis, height: number) {
     const found = store.playback.stretch.value;
     if (!found) return;
     const g = this.context;
-    const [left, right] = [found.from, found.to].map((t) => Math.max(begin, x(t)));
+    const [left, right] = [found.from, found.to].map((t) => Math.max(axis.left, axis.x(t)));
     g.fillStyle = this.#colours.of("ink");
     g.globalAlpha = 0.1;
     g.fillRect(left, 0, right - left, height - FOOT);
@@ -177,13 +191,13 @@ export class Timeline {
   }
 
   /** Draw the outages. */
-  #outages({ from, to, x, ...edge }: Scale, height: number) {
+  #outages(axis: Axis, height: number) {
     const g = this.context;
     this.gaps = [];
     for (const [begin, end] of store.data.run.now.outages ?? []) {
-      if (end / 1e6 < from || begin / 1e6 > to) continue;
-      const left = Math.max(edge.left, x(begin / 1e6));
-      const right = Math.min(edge.right, Math.max(x(end / 1e6), left + 3));
+      if (end / 1e6 < axis.from || begin / 1e6 > axis.to) continue;
+      const left = Math.max(axis.left, axis.x(begin / 1e6));
+      const right = Math.min(axis.right, Math.max(axis.x(end / 1e6), left + 3));
       if (right <= left) continue;
       this.gaps.push([left, right]);
       g.fillStyle = this.#colours.of("background");
@@ -199,18 +213,45 @@ export class Timeline {
       }
       g.setLineDash([]);
       const text = duration((end - begin) / 1e9);
-      if (g.measureText(text).width + 8 > right - left) continue;
+      if (g.measureText(text).width + 8 > right - left || axis.foldAt((left + right) / 2)) continue;
       g.fillStyle = this.#colours.of("waiting-text");
       g.textAlign = "center";
       g.fillText(text, (left + right) / 2, 10);
     }
   }
 
+  /** Draw a folded idle time: a zigzag with its length, which a click unfolds. */
+  #fold({ from, to }: Idle, axis: Axis, height: number) {
+    const g = this.context;
+    const left = Math.max(axis.left, axis.x(from));
+    const right = Math.min(axis.right, axis.x(to));
+    const middle = (left + right) / 2;
+    g.fillStyle = this.#colours.of("depth2");
+    g.fillRect(left, 0, right - left, height);
+    g.strokeStyle = this.#colours.of("muted");
+    g.lineWidth = 1.2;
+    g.beginPath();
+    for (let y = 0, side = -1; y <= height; y += 5, side = -side) g.lineTo(middle + 3 * side, y);
+    g.stroke();
+    const text = duration((to - from) / 1000);
+    const half = g.measureText(text).width / 2 + 5;
+    const at = Math.max(axis.left + half, Math.min(axis.right - half, middle));
+    g.beginPath();
+    g.roundRect(at - half, height / 2 - 9, 2 * half, 18, 9);
+    g.fillStyle = this.#colours.of("background");
+    g.fill();
+    g.stroke();
+    g.fillStyle = this.#colours.of("ink");
+    g.textAlign = "center";
+    g.fillText(text, at, height / 2 + 0.5);
+  }
+
   /** Draw a pin at each note, with its text. */
-  #notes({ left: first, right: last, x }: Scale, height: number) {
+  #notes(axis: Axis, height: number) {
+    const { left: first, right: last } = axis;
     const g = this.context;
     for (const { at, text } of pins()) {
-      const px = x(at);
+      const px = axis.x(at);
       if (px < first || px > last) continue;
       g.fillStyle = this.#colours.of("ink");
       g.fillRect(px - 0.5, 0, 1, height - FOOT);
@@ -227,7 +268,9 @@ export class Timeline {
   }
 
   /** Draw the instants at the pointer and shown. */
-  #cursor({ left, right, x }: Scale, height: number) {
+  #cursor(axis: Axis, height: number) {
+    const { left, right } = axis;
+    const x = (t: number) => axis.x(t);
     const at = store.playback.cursor.value;
     const pointed = store.pointer.pointed.value;
     if (pointed !== null && x(pointed) >= left) this.#flag(x(pointed), pointed, height, "muted", 1);
@@ -257,8 +300,7 @@ export class Timeline {
   // -- input ------------------------------------------------------------------------------------
 
   #timeAt(px: number) {
-    const [from, to] = this.window.range();
-    return from + ((px - this.names) / (this.canvas.clientWidth - this.names - RIGHT)) * (to - from);
+    return this.window.axis(this.names, this.canvas.clientWidth - RIGHT).timeAt(px);
   }
 
   #hover(px: number | null) {
@@ -272,6 +314,11 @@ export class Timeline {
     return hit?.span ?? null;
   }
 
+  /** The folded idle time below the pointer; null for none, and at the axis. */
+  #foldAt(e: MouseEvent) {
+    return e.offsetY < this.canvas.clientHeight - FOOT ? (this.scale?.foldAt(e.offsetX) ?? null) : null;
+  }
+
   #down(e: PointerEvent) {
     const { left, bottom } = this.canvas.getBoundingClientRect();
     const from = e.clientX - left;
@@ -279,6 +326,7 @@ export class Timeline {
     const selects = e.pointerType === "mouse" && e.clientY < bottom - FOOT; // other drags move the instant shown
     const begin = this.#timeAt(from);
     const span = this.#spanAt(e);
+    const fold = this.#foldAt(e);
     let dragged = false;
     this.window.hold();
     const seek = (m: PointerEvent) =>
@@ -290,6 +338,10 @@ export class Timeline {
     };
     drag(move, (m) => {
       if (dragged && selects) return;
+      if (!dragged && fold) {
+        store.clock.unfold(fold);
+        return;
+      }
       seek(m);
       if (!dragged && span) this.onPick(span.path);
     });
@@ -303,8 +355,7 @@ export class Timeline {
   }
 
   #zoom(e: WheelEvent) {
-    if (Math.abs(e.deltaX) > Math.abs(e.deltaY))
-      this.window.move((e.deltaX / this.canvas.clientWidth) * this.window.length);
+    if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) this.window.move(e.deltaX / this.canvas.clientWidth);
     else this.window.zoom(Math.exp(e.deltaY * 0.0016), this.#timeAt(e.offsetX));
   }
 

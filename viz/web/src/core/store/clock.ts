@@ -1,7 +1,8 @@
-// How instants are told, everywhere on the page.
+// How instants are told, everywhere on the page, and which idle times take little room.
 
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
+import { type Idle, idleIn } from "#core/idle.ts";
 import { save, saved } from "#core/storage.ts";
 import type { Data } from "#core/store/data.ts";
 import type { Playback } from "#core/store/playback.ts";
@@ -11,6 +12,10 @@ export const CLOCKS: ClockName[] = ["run", "wall", "relative"];
 
 export class Clock {
   readonly chosen: Signal<ClockName> = signal(saved<ClockName>("clock", "run"));
+  /** Whether idle times are folded; those that the user unfolded are not, by their beginnings [ms]. */
+  readonly foldsIdle = signal(true);
+  readonly unfolded: Signal<ReadonlySet<number>> = signal(new Set());
+  #idle: { key: string; found: Idle[] } = { key: "", found: [] };
   #data: Data;
   #playback: Playback;
 
@@ -23,6 +28,29 @@ export class Clock {
     this.chosen.value = name;
     save("clock", name);
     this.#playback.updateSlow();
+  }
+
+  /** The idle times of the run. */
+  idle() {
+    const { events } = this.#data.run;
+    const key = `${this.#data.facts.value?.epoch} ${events[0]?.seq} ${events.at(-1)?.seq}`;
+    if (key !== this.#idle.key) this.#idle = { key, found: idleIn(events) };
+    return this.#idle.found;
+  }
+
+  /** Those that are folded. */
+  folds() {
+    return this.foldsIdle.value ? this.idle().filter(({ from }) => !this.unfolded.value.has(from)) : [];
+  }
+
+  /** Fold all idle times, or none. */
+  foldIdle(folds: boolean) {
+    this.unfolded.value = new Set();
+    this.foldsIdle.value = folds;
+  }
+
+  unfold({ from }: Idle) {
+    this.unfolded.value = new Set([...this.unfolded.value, from]);
   }
 
   /** An instant by the chosen clock: 00:32.0 since the run began, 10:42:59 of the day, or -12.3 s from now. */
