@@ -197,6 +197,14 @@ def _add_watching(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--control", action="store_true", help="let viewers pause, step, jump and preempt"
     )
+    group.add_argument(
+        "--autonomy",
+        type=int,
+        default=0,
+        metavar="N",
+        help="take the transitions with confirm up to this level without asking (default: "
+        "%(default)s)",
+    )
     group.add_argument("--record", type=Path, metavar="FILE", help="write the run to a file")
     group.add_argument(
         "--record-inputs",
@@ -231,6 +239,10 @@ def _run(args: argparse.Namespace) -> int:
         take_row(args)
     if args.ros2:
         refuse_simulation(args, "--ros2")
+    if args.autonomy:
+        from smachpy.states.confirming import set_autonomy
+
+        set_autonomy(args.autonomy)
     with contextlib.ExitStack() as stack:
         stack.enter_context(ros2_of_options(args))
         if args.json:  # standard output is for events only: a mission's prints go to standard error

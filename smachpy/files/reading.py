@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Section
+from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Limits, Section
 from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.inputs.yaml_text import YamlTextError, load_with_marks
 from smachpy.base.problems import unknown_name
@@ -347,10 +347,14 @@ class _Reader:
 
     def _find_problems(self, section: Section, made: Any) -> None:
         """Report what the machine says of itself, unless another problem is the reason."""
-        missing = [label for label in section.section("states") if label not in made.get_children()]
+        labels = tuple(section.section("states"))
+        missing = [label for label in labels if label not in made.get_children()]
         for problem in made._smachpy_problems("states"):
             place, _, text = problem.partition(": ")
             label = place.partition("/")[2]
+            if label not in labels:  # a state between, made for a transition
+                of = [one for one in labels if label.startswith(f"CONFIRM_{one}_")]
+                label = max(of, key=len, default=label)
             field = f"states.{label}" if label else ""
             known = not section.is_good(field) if field else bool(self.file.problems)
             if not known and not any(f"got {one!r}" in text for one in missing):
@@ -489,6 +493,8 @@ class _Reader:
 
     def _target(self, on: Section, outcome: str) -> Any:
         value = on.value(outcome)
+        if isinstance(value, dict):
+            return self._confirmed(on.section(outcome))
         if not isinstance(value, list):
             return None if value is None else on.text(outcome, REQUIRED)
         rows = on.rows(outcome)
@@ -511,6 +517,17 @@ class _Reader:
             row.allow("when")
             row.close()
         return found if len(found) > 1 else (found[0] if found else None)
+
+    @staticmethod
+    def _confirmed(row: Section) -> Any:
+        from smachpy.states.confirming import confirm  # here: few files need what it imports
+
+        target = row.text("to", REQUIRED)
+        level = row.integer("confirm", REQUIRED, Limits(low=1))
+        otherwise = row.text("otherwise", "preempted")
+        question = row.text("question", REQUIRED) if "question" in row else ""
+        row.close()
+        return confirm(target, level, otherwise=otherwise, question=question) if target else None
 
     # -- one state -----------------------------------------------------------------------------
 

@@ -69,8 +69,21 @@ def schema() -> dict[str, Any]:
         ]
     }
     case = _object({"when": {"type": "string"}, "to": {"type": "string"}}, ["to"])
+    confirmed = _object(
+        {
+            "to": {"type": "string"},
+            "confirm": {"type": "integer", "minimum": 1},
+            "otherwise": {"type": "string"},
+            "question": {"type": "string"},
+        },
+        ["to", "confirm"],
+    )
     target = {
-        "anyOf": [{"type": ["string", "null"]}, {"type": "array", "items": case, "minItems": 1}]
+        "anyOf": [
+            {"type": ["string", "null"]},
+            {"type": "array", "items": case, "minItems": 1},
+            confirmed,
+        ]
     }
     state = {
         **{key: {"type": "string"} for key in ("state", "mission", "plan")},

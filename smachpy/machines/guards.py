@@ -53,9 +53,24 @@ class When:
         return bool(no_coroutine(self.condition(userdata)))
 
 
-Target: TypeAlias = "str | Sequence[When | str | None] | None"
-"""What an outcome leads to: a label or outcome, None, or cases of which the last has no
-condition.
+@dataclass(frozen=True, slots=True)
+class Between:
+    """A state between an outcome and its target, such as that of `smachpy.states.confirm`.
+
+    Attributes:
+        prefix: Its label is "<prefix>_<label>_<outcome>".
+        state: The state.
+        transitions: Its own.
+    """
+
+    prefix: str
+    state: Any
+    transitions: Mapping[str, str]
+
+
+Target: TypeAlias = "str | Between | Sequence[When | str | None] | None"
+"""What an outcome leads to: a label or outcome, None, a state between, or cases of which the last
+has no condition.
 """
 Cases: TypeAlias = "tuple[When, ...]"
 
@@ -88,6 +103,18 @@ def when(condition: str | Callable[[Any], object], target: str) -> When:
     goal = problems.word("target", target)
     problems.raise_all()
     return When(condition, goal, expression)
+
+
+def between(label: str, given: Any) -> tuple[Any, dict[str, Between]]:
+    """Return the transitions of a child to the states between, and label -> each of these."""
+    if not hasattr(given, "items"):
+        return given, {}
+    targets, found = dict(given), {}
+    for outcome, target in targets.items():
+        if isinstance(target, Between):
+            targets[outcome] = name = f"{target.prefix}_{label}_{outcome}"
+            found[name] = target
+    return targets, found
 
 
 def split(given: Any, problems: Problems) -> tuple[Any, dict[str, Cases]]:

@@ -21,7 +21,7 @@ from smachpy.exceptions import (
 )
 from smachpy.machines.construction import construction_method
 from smachpy.machines.container import NO_STATES, Container
-from smachpy.machines.guards import choices_of, split
+from smachpy.machines.guards import between, choices_of, split
 from smachpy.machines.history import go_on
 from smachpy.machines.old_states import adopt_slips
 from smachpy.machines.state import DataOf, Shown
@@ -149,8 +149,9 @@ class StateMachine(Container):
             label: Its name here; unique.
             state: The state.
             transitions: Outcome of the state -> label of the next state, or outcome of this
-                machine; or cases, such as `[when("battery < 0.3", "RECHARGE"), "NEXT"]`. Outcomes
-                left out, or mapped to None, end the machine with the outcome of the same name.
+                machine; or cases, such as `[when("battery < 0.3", "RECHARGE"), "NEXT"]`; or
+                `smachpy.states.confirm("NEXT", level=2)`. Outcomes left out, or mapped to None, end
+                the machine with the outcome of the same name.
             remapping: Key of the state -> key of this machine's userdata.
             constants: Key of the state -> fixed value, kept in the userdata under "LABEL.key".
 
@@ -205,6 +206,7 @@ class StateMachine(Container):
             )
         problems = Problems(str(label))
         holds = "outcome -> label of the next state, outcome of this machine, or None"
+        transitions, steps = between(label, transitions)
         targets, guards = split(transitions, problems)
         given = problems.names_of("transitions", targets, holds, optional=True)
         fixed = problems.mapping("constants", constants, "key of the state -> value")
@@ -228,6 +230,9 @@ class StateMachine(Container):
             self.__connect(label, [self._smachpy.connector_outcome])
         if self._smachpy.initial is None:
             self._smachpy.initial = label
+        for own, step in steps.items():  # in no sequence: only the outcome leads there
+            self._smachpy_store_child(own, step.state, None, Problems(own), {})
+            self._smachpy.transitions[own] = dict(step.transitions)
         return state
 
     # -- structure -----------------------------------------------------------------------------

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from smachpy.states.ask_operator import AskOperator as AskOperator
     from smachpy.states.bags import RecordBag as RecordBag
     from smachpy.states.barrier import Barrier as Barrier
+    from smachpy.states.confirming import confirm as confirm
+    from smachpy.states.confirming import set_autonomy as set_autonomy
     from smachpy.states.driving import DRIVE_TIMEOUT as DRIVE_TIMEOUT
     from smachpy.states.driving import SIGNAL_TIMEOUT as SIGNAL_TIMEOUT
     from smachpy.states.driving import TURN_TIMEOUT as TURN_TIMEOUT
@@ -77,6 +79,7 @@ __all__ = [
     "Wait",
     "Waypoint",
     "clear_costmaps",
+    "confirm",
     "dock",
     "drive_back",
     "drive_to",
@@ -90,6 +93,7 @@ __all__ = [
     "pose_of",
     "serve_during",
     "serving_machine",
+    "set_autonomy",
     "turn",
     "undock",
 ]
@@ -117,6 +121,8 @@ _HOMES = {
     "SetLifecycle": "smachpy.states.ros2_nodes",
     "SetParameters": "smachpy.states.ros2_nodes",
     "TURN_TIMEOUT": "smachpy.states.driving",
+    "confirm": "smachpy.states.confirming",
+    "set_autonomy": "smachpy.states.confirming",
     "Wait": "smachpy.states.waiting",
     "Waypoint": "smachpy.states.waypoints",
     "clear_costmaps": "smachpy.states.nav2",
