@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import math
 from dataclasses import replace
 
 import pytest
 
+from smachpy import CBState, Concurrence, StateMachine
+from smachpy.events.introspection import describe
 from smachpy_viz.model.extract import extract
-from smachpy_viz.model.machine import Diagram
+from smachpy_viz.model.machine import Diagram, Marks
 from smachpy_viz.pictures import container_layout, curves, graphviz_process, layout, shapes
 from smachpy_viz.pictures.theme import LIGHT
 
@@ -242,3 +245,45 @@ def test_the_pieces_of_a_fold_follow_the_arrows(build, pieces):
         labels[name]: piece for name, piece in container_layout.pieces_of(root, pieces).items()
     }
     assert [dealt[f"S{i}"] for i in range(4)] == [i * pieces // 4 for i in range(4)]
+
+
+def labels(root):
+    return [html.unescape(pill.attributes["label"][1:-1]) for pill in root.pills]
+
+
+def test_equal_arrows_of_many_states_are_told_at_the_outcome():
+    sm = StateMachine(["done", "failed"], name="FLAT")
+    step = CBState(lambda _: "ok", outcomes=["ok", "failed"])
+    with sm:
+        for i in range(7):
+            StateMachine.add(f"S{i}", step, {"ok": f"S{i + 1}" if i < 6 else "done"})
+    root = shapes.shapes_of(Diagram(extract(describe(sm), show_implicit=True)), LIGHT)
+    assert labels(root) == ["done", "failed, from 7"]
+    assert len(root.arrows) == 1 + 7  # the start, and each `ok`
+    failed = Marks(visits={"/FLAT": 1}, taken={("/FLAT/S3", "failed"): 1})
+    root = shapes.shapes_of(Diagram(extract(describe(sm), show_implicit=True), failed), LIGHT)
+    assert labels(root) == ["done", "failed, from 6"]
+    assert len(root.arrows) == 1 + 7 + 1  # and the one that the run took
+
+
+@pytest.mark.parametrize(("branches", "arrows"), [(6, 2 * 6 + 1), (7, 0), (30, 0)])
+def test_many_branches_are_a_grid_whose_rules_are_told_at_the_outcomes(branches, arrows):
+    names = [f"BRANCH_{i:02}" for i in range(branches)]
+    sm = Concurrence(
+        ["all", "first", "failed"],
+        default_outcome="failed",
+        outcome_map={"all": dict.fromkeys(names, "ok"), "first": {names[0]: "late"}},
+        name="WIDE",
+    )
+    with sm:
+        for name in names:
+            Concurrence.add(name, CBState(lambda _: "ok", outcomes=["ok", "late"]))
+    found = Picture(describe(sm))
+    if arrows:
+        assert len(found.root.arrows) == arrows + 1
+        return
+    assert found.root.arrows == ()
+    told = [f"all, all {branches}", "first, BRANCH_00: late"]
+    assert labels(found.root)[:2] == told
+    places = [found.at(box.name) for box in found.root.boxes]
+    assert places == sorted(places, key=lambda at: (-at[1], at[0]))  # in the order of the machine

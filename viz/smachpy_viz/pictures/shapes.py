@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     from smachpy_viz.pictures.theme import Theme
 
 
+BUNDLE_FROM = 6
+"""Equal arrows to one outcome are told at the outcome if they are so many, as on the page."""
+
+MANY = 7
+"""Branches of a concurrence from which its arrows are told at the outcomes, as on the page."""
+
 SURE = 0.995
 """A larger share is shown without a number: the arrow is practically always taken."""
 
@@ -120,12 +126,52 @@ class _Interior:
         self._joins: list[Vertex] = []
         self._decided: set[tuple[str, str, Anchor]] = set()
         self._arrows: list[Arrow] = []
+        closed = all(box.entry is None for box in boxes.values())
+        # Compared versions show each change, so all of their arrows.
+        self._is_grid = (
+            node.kind == "concurrence" and len(boxes) >= MANY and closed and not diagram.compared
+        )
+        self._bundled = self._bundles()
+
+    def _bundles(self) -> dict[Edge, int]:
+        """Return the transitions that are told at their outcome, with the size of their bundle."""
+        node, taken = self._node, self._marks.taken
+        if self._diagram.compared or node.kind in {"plan", "concurrence"}:
+            return {}
+        groups: dict[tuple[str, ...], list[Edge]] = {}
+        for edge in node.edges:
+            source = self._nodes[edge.source].path
+            if (
+                edge.to_outcome
+                and not edge.note
+                and not any(taken.get((source, o)) for o in edge.outcomes)
+            ):
+                groups.setdefault((edge.target, *edge.outcomes), []).append(edge)
+        large = [group for group in groups.values() if len(group) >= BUNDLE_FROM]
+        return {edge: len(group) for group in large for edge in group}
+
+    def _told(self, outcome: str) -> str:
+        """Return what is told at an outcome in place of arrows."""
+        words = [
+            f"from {n}" for n in {n: n for e, n in self._bundled.items() if e.target == outcome}
+        ]
+        if self._is_grid:
+            sources = {
+                edge.source
+                for edge in self._node.edges
+                if edge.to_outcome and edge.target == outcome
+            }
+            words += [f"any of {len(sources)}"] if sources else []
+            words += [_rule_words(rule) for rule in self._node.rules if rule.outcome == outcome]
+        return "; ".join(filter(None, words))
 
     def box(self) -> Box:
-        self._starts()
-        for edge in self._node.edges:
-            self._transition(edge)
-        self._decisions()
+        if not self._is_grid:
+            self._starts()
+            for edge in self._node.edges:
+                if edge not in self._bundled:
+                    self._transition(edge)
+            self._decisions()
         node, theme = self._node, self._theme
         visited = node.path in self._marks.visits
         entry = style.entry(theme, touched=visited or not self._marks.has_run)
@@ -145,7 +191,12 @@ class _Interior:
         taken = self._marks.taken.get((self._node.path, pill.outcome), 0)
         faint = self._marks.has_run and not taken
         look = style.pill(
-            pill.outcome, self._node, self._theme, by_default=pill.by_default, faint=faint
+            pill.outcome,
+            self._node,
+            self._theme,
+            by_default=pill.by_default,
+            faint=faint,
+            told=self._told(pill.outcome),
         )
         return Vertex(self._pills[pill.outcome], look)
 
@@ -269,3 +320,14 @@ class _Interior:
     ) -> None:
         name = f"{self._name}_e{len(self._arrows)}"
         self._arrows.append(Arrow(name, tail, head, attributes, back))
+
+
+def _rule_words(rule: RulePicture) -> str:
+    """Return a rule of a grid in a few words: "all 30", "20 of 30", "any of 30", "A: done"."""
+    labels = {label for label, _ in rule.conditions}
+    quorum = rule.text.partition(" of ")[0]
+    if len(labels) == 1:
+        return "; ".join(f"{label}: {outcome}" for label, outcome in rule.conditions[:1])
+    if quorum == "any" or quorum.isdecimal():
+        return f"{quorum} of {len(labels)}"
+    return f"all {len(labels)}" if labels else rule.text

@@ -195,13 +195,16 @@ def entry(theme: Theme, *, touched: bool) -> Attributes:
     }
 
 
-def pill(outcome: str, node: Node, theme: Theme, *, by_default: bool, faint: bool) -> Attributes:
-    """Return the look of an outcome on the border of a container."""
+def pill(
+    outcome: str, node: Node, theme: Theme, *, by_default: bool, faint: bool, told: str = ""
+) -> Attributes:
+    """Return the look of an outcome on the border of a container; `told` in place of arrows."""
+    text = f"{outcome}, {told}" if told else outcome
     swatch = theme.outcome(outcome_class(outcome, node.success))
     attributes = {
         "fontsize": "9",
         "height": "0.21",
-        "label": f"<{markup(outcome)}>",
+        "label": f"<{markup(text)}>",
         "margin": "0.1,0.02",
         "penwidth": "1.2",
         "style": "rounded,filled,dashed" if by_default else "rounded,filled",
