@@ -14,7 +14,7 @@ from smachpy.engine.cleanup import run_with_cleanup
 from smachpy.engine.described import EPOCH
 from smachpy.engine.errors import already_runs
 from smachpy.engine.frame import Frame
-from smachpy.engine.interrupt import Interruption
+from smachpy.engine.interrupt import Interruption, uninterrupted
 from smachpy.engine.preempt import FLAGS, leave, on_preempt, request_soon
 from smachpy.exceptions import InconsistentMachineError
 from smachpy.userdata.user_data import begin_visit, data_of, leaves, write
@@ -68,8 +68,8 @@ def _run(frame: Frame, parent_ud: Any) -> str:
     around = live.callback
     if around is not None:  # the user's override of `execute`: its grace pauses meanwhile
         around.end()
+    frame.first.innermost = frame
     try:
-        frame.first.innermost = frame
         with FLAGS:  # a request comes either before this, or to this run
             live.frame = frame
             live.runs += live.root is None  # a root has counted its run already
@@ -94,8 +94,8 @@ def _run(frame: Frame, parent_ud: Any) -> str:
             _copy_out(container, parent_ud)
         return outcome
     finally:
+        uninterrupted(frame, partial(leave, frame))
         frame.first.innermost = frame.parent or frame
-        leave(frame)
         if around is not None and not frame.dead:
             around.begin()
 

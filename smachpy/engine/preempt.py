@@ -904,8 +904,23 @@ def forget_visit(frame: Frame) -> None:
         visit.settle()
 
 
+def leave_inner(frame: Frame) -> None:
+    """End the runs inside of `frame` that several interruptions in a row kept from ending.
+
+    A visit that had not ended would have the thread interrupted for ever.
+    """
+    first = frame.first
+    while (inner := first.innermost) is not None and inner is not frame:
+        leave(inner)
+        first.innermost = inner.parent
+
+
 def leave(frame: Frame) -> None:
-    """End a container's run; a request belongs to one run, so its flag is cleared."""
+    """End a container's run; a request belongs to one run, so its flag is cleared.
+
+    An interruption may end this, then it must be called again.
+    """
+    leave_inner(frame)
     live = frame.live
     with frame.run.lock:
         if frame.dead:

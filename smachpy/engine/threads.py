@@ -17,7 +17,7 @@ from smachpy.engine.child import run_child
 from smachpy.engine.container import run_container
 from smachpy.engine.errors import already_runs
 from smachpy.engine.frame import Frame, Run
-from smachpy.engine.interrupt import Interruption, use_signals
+from smachpy.engine.interrupt import Interruption, uninterrupted, use_signals
 from smachpy.engine.preempt import (
     FLAGS,
     REQUESTING,
@@ -26,6 +26,7 @@ from smachpy.engine.preempt import (
     asking,
     current_origin,
     forget_visit,
+    leave_inner,
     outcome_left,
     request_soon,
     shutdown_asking,
@@ -529,6 +530,8 @@ class Root(Branch):
                 if self.dead:
                     raise
                 outcome = "preempted"
+            finally:
+                uninterrupted(self, partial(leave_inner, self))
             if self.visit is not None and self.visit.has_answered(outcome):
                 self.visit.service()
             return outcome

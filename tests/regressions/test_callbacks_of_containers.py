@@ -260,18 +260,20 @@ def test_a_callback_that_swallows_the_interruption(place, execute):
                 pass
 
     machine = PLACES[place](deaf)
-    timers = [
-        threading.Timer(0.05, machine.request_preempt),
-        threading.Timer(0.4, stop.set),  # in the main thread nothing can be left behind
-    ]
-    for timer in timers:
-        timer.start()
+
+    def ask():
+        stop.wait(0.05)
+        machine.request_preempt()
+        stop.wait(0.35)
+        stop.set()  # in the main thread nothing can be left behind
+
+    asker = threading.Thread(target=ask)
+    asker.start()
     try:
         assert execute(machine) in {"done", "preempted"}
     finally:
         stop.set()
-        for timer in timers:
-            timer.join()
+        asker.join()
     assert not machine.is_running()
     assert not machine.preempt_requested()
 

@@ -106,6 +106,7 @@ def test_its_script_shows_the_picture_and_follows(machine, widget):
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         try:
             page = browser.new_page()
+            page.set_default_timeout(60_000)
             page.set_content(f"<div id='el'></div><script>{script}</script>")
             page.evaluate(
                 """(facts) => { const on = {}; window.changed = (name, value) => { facts[name] = value;

@@ -18,7 +18,9 @@ import pytest
 import smachpy
 from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, VirtualClock, current_clock, use_clock
-from smachpy.engine import preempt
+from smachpy.base.context import current_frame
+from smachpy.engine import frame, preempt, step
+from smachpy.engine.interrupt import Interruption
 from smachpy.events import Abandoned, Entered, Left, Preempted, PreemptRequested
 
 
@@ -701,6 +703,46 @@ def test_blocked_leaf_in_the_main_thread_is_broken(body, depth, quiet):
         sm = chain(sm)
     sm.register_start_cb(lambda *a: current_clock().call_later(0.01, sm.request_preempt))
     assert sm.execute() == "preempted"
+    assert_clean(sm)
+
+
+ON_THE_WAY_UP = {
+    "child": (step.Step, "interrupted"),
+    "container": (frame.Frame, "end_preempted"),
+    "leaves": (preempt, "forget_visit"),
+    "ends": (preempt.Visit, "end"),
+}
+
+
+@pytest.mark.parametrize("depth", [1, 3])
+@pytest.mark.parametrize(
+    "further", ["child", "leaves", "child leaves", "child ends", "child container leaves ends"]
+)
+def test_interruptions_in_a_row_end_with_the_run(depth, further, monkeypatch):
+    """A busy computer let the thread not go on between two of them: the visit never ended."""
+    visits, left = [], further.split()
+
+    def interrupting(place, real):
+        def function(*arguments):
+            if place in left and visits and visits[0]._is_on():
+                left.remove(place)
+                raise Interruption
+            return real(*arguments)
+
+        return function
+
+    def leave():
+        visits.append(current_frame().visit)
+        sm.request_preempt()
+        raise Interruption
+
+    sm = chain(Ignores(leave, preempt_timeout=None))
+    for _ in range(depth - 1):
+        sm = chain(sm)
+    for place, (owner, name) in ON_THE_WAY_UP.items():
+        monkeypatch.setattr(owner, name, interrupting(place, getattr(owner, name)))
+    assert sm.execute() == "preempted"
+    assert not visits[0]._is_on()
     assert_clean(sm)
 
 

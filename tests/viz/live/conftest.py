@@ -239,6 +239,7 @@ def look(chromium):
 
     def look(address, *, drawn=True, **options):
         context = chromium.new_context(viewport={"width": 1400, "height": 900}, **options)
+        context.set_default_timeout(60_000)
         contexts.append(context)
         page = context.new_page()
         page.foreign = []
@@ -258,7 +259,7 @@ def look(chromium):
         )
         page.goto(address)
         if drawn:
-            page.wait_for_selector("html[data-drawn]", timeout=60_000)
+            page.wait_for_selector("html[data-drawn]")
         return page
 
     yield look
@@ -270,6 +271,7 @@ def look(chromium):
 @pytest.fixture(scope="module")
 def first_page(chromium, delivery):
     context = chromium.new_context(viewport={"width": 1400, "height": 900})
+    context.set_default_timeout(60_000)
     page = context.new_page()
     page.foreign = []
     page.errors = []
@@ -281,7 +283,7 @@ def first_page(chromium, delivery):
         ),
     )
     page.goto(delivery.base + "?machine=delivery")
-    page.wait_for_selector("html[data-drawn]", timeout=60_000)
+    page.wait_for_selector("html[data-drawn]")
     yield page
     context.close()
 
