@@ -1,8 +1,8 @@
 """Who holds a resource, such as the base of a robot, and who waits for it.
 
 A resource has one holder. What runs inside of the holder may hold it too, then in its turn as the
-only one inside: so the holders of a resource form a stack, and it is free for a claim if the
-innermost of them is around the claim. The holders and claims of a process are in one table for
+only one inside: so the holders of a resource form a stack, and it is free for a claim if all
+of them are around the claim. The holders and claims of a process are in one table for
 each clock, as the runs on different virtual clocks have nothing to do with each other.
 """
 
@@ -108,8 +108,9 @@ class Resources:
                     table.pop(name, None)
 
     def _in_the_way(self, claim: Claim) -> Claim | None:
-        holders = self._holders.get(claim.resource)
-        return None if not holders or claim.is_inside(holders[-1]) else holders[-1]
+        """Return the outermost holder that is not around the claim; the others are inside of it."""
+        holders = self._holders.get(claim.resource, ())
+        return next((one for one in holders if not claim.is_inside(one)), None)
 
     def _circle(self, claim: Claim, holder: Claim) -> list[Claim]:
         """Return the claims that wait for each other if `claim` waits for `holder`; [] for none.

@@ -105,14 +105,13 @@ def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | 
 
 def _release(frame: Frame, all_of: Resources, claim: Claim) -> None:
     """Release the resource; a pending interruption of the state does not prevent it."""
-    held = None
     while True:
         try:
-            held = all_of.holds(claim) if held is None else held
             all_of.release(claim)
             break
         except Interruption:
             continue
-    if held and frame.visit is not None and not frame.dead:
-        frame.visit.holds = ""
+    visit = frame.visit
+    if visit is not None and visit.holds and not frame.dead:  # else it was never told to hold it
+        visit.holds = ""
         frame.emit(ResourceUse, claim.resource, "free")

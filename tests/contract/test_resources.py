@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+from functools import partial
+from random import Random
 from typing import Any
 
 import pytest
@@ -222,6 +224,41 @@ def test_a_wait_in_a_circle_is_refused_and_says_who_waits_for_whom():
     assert "arm" in text
 
 
+def test_a_circle_through_the_machine_around_a_holder_is_found():
+    """The holder itself waits for nothing; another branch of the machine around it does."""
+    one = Concurrence(ENDS, "done", resource="base")
+    one.add("USES", Step(2.0, resource="base"))
+    one.add("WAITS", _then(Step(1.0, resource="arm")))
+    late = StateMachine(ENDS, resource="arm")
+    late.add("FIRST", Wait(1.5), {"done": "NEXT"})
+    late.add("NEXT", Step(1.0, resource="base"))
+    with mission_kit() as mission, pytest.raises(smachpy.InvalidUserCodeError, match="circle"):
+        mission(together(A=one, B=late))
+
+
+def test_one_that_preempts_stops_the_outermost_holder():
+    late = StateMachine(["done", "preempted"])
+    late.add("WAIT", Wait(1.0), {"done": "USE"})
+    late.add("USE", Step(3.0, resource=("base", "preempt")))
+    holder = StateMachine(ENDS, resource="base")
+    holder.add("USE", Step(9.0, resource="base"), {"preempted": "MORE"})
+    holder.add("MORE", Step(50.0))
+    with mission_kit() as mission:
+        run = mission(together(A=holder, B=late))
+    assert (found["B"], run.duration < 60.0) == ("done", True)
+
+
+def test_one_that_is_stopped_as_it_becomes_free_never_had_it():
+    heard: list[Event] = []
+    with mission_kit() as mission:
+        machine = together(A=Step(2.0, resource="base"), B=Step(2.0, resource="base"))
+        machine.subscribe(heard.append)
+        mission.preempt(at=2.0)
+        mission(machine)
+    told = [use[:2] for use in uses(heard)]
+    assert all((path, "holds") in told for path, status in told if status == "free")
+
+
 def _then(state: State) -> StateMachine:
     sm = StateMachine(["done", "preempted"])
     sm.add("FIRST", Wait(1.0), {"done": "NEXT"})
@@ -295,3 +332,59 @@ def held_at_once(events: list[Event]) -> int:
             now += 1 if event.status == "holds" else -1
             most = max(most, now)
     return most
+
+
+def any_state(random: Random, depth: int) -> State:
+    """A state or machine with some resource, policy, timeout and retry."""
+    options: dict[str, Any] = {}
+    if random.random() < 0.6:
+        policy = random.choice(["wait", "wait", "preempt", "refuse"])
+        options["resource"] = random.choice(["base", "arm"]), policy
+        options["retry"] = (2, 0.5, ["refused"]) if policy == "refuse" else None
+    if random.random() < 0.2:
+        options["timeout"] = random.choice([0.5, 1.0, 2.0])
+    if depth == 0 or random.random() < 0.3:
+        return Step(random.choice([0.0, 0.5, 1.0, 2.0]), **options)
+    if random.random() < 0.5:
+        both = Concurrence(ENDS, "done", **options)
+        both.add("L", any_state(random, depth - 1))
+        both.add("R", any_state(random, depth - 1))
+        return both
+    machine = StateMachine(ENDS, **options)
+    machine.add("FIRST", any_state(random, depth - 1), {"done": "NEXT"})
+    machine.add("NEXT", any_state(random, depth - 1))
+    return machine
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_missions_end_and_leave_all_resources_free(seed: int):
+    random, clock, heard = Random(seed), VirtualClock(seed=seed), list[Event]()
+
+    errors: list[str] = []
+
+    def run(root: Concurrence) -> None:
+        try:
+            root.execute()
+        except smachpy.SmachError as error:
+            errors.append(_all_of(error))
+
+    with use_clock(clock):
+        roots = [together(A=any_state(random, 2), B=any_state(random, 2)) for _ in range(2)]
+        for root in roots:
+            root.subscribe(heard.append)
+        clock.call_later(random.random() * 4.0, roots[0].request_preempt)
+        tasks = [clock.spawn(partial(run, root), name="root") for root in roots]
+        assert all(task.join(500.0) for task in tasks)
+        began, last = clock.now(), inside(Step(1.0, resource="arm"), resource="base")
+        assert clock.spawn(last.execute, name="last").join(500.0)
+        assert clock.now() == pytest.approx(began + 1.0)  # both were free
+    assert all("circle" in error for error in errors)
+    told = [use[1] for use in uses(heard)]
+    assert told.count("holds") == told.count("free")
+
+
+def _all_of(error: BaseException | None) -> str:
+    if error is None:
+        return ""
+    inner = "".join(map(_all_of, getattr(error, "exceptions", ())))
+    return f"{error}{inner}{_all_of(error.__cause__)}"
