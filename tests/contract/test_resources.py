@@ -182,13 +182,15 @@ def test_it_is_free_after_an_exception():
     assert run.duration == 3.0
 
 
-def test_missions_of_one_process_share_it():
+@pytest.mark.parametrize("where", ["root", "state"])
+def test_missions_of_one_process_share_it(where: str):
     heard: list[Event] = []
     clock = VirtualClock()
 
     def mission() -> StateMachine:
-        sm = StateMachine(["done", "preempted"], name=f"M{len(missions)}")
-        sm.add("USE", Step(2.0, resource="base"))
+        root, state = ("base", None) if where == "root" else (None, "base")
+        sm = StateMachine(["done", "preempted"], name=f"M{len(missions)}", resource=root)
+        sm.add("USE", Step(2.0, resource=state))
         sm.subscribe(heard.append)
         return sm
 
