@@ -23,9 +23,9 @@ from smachpy.exceptions import (
     did_you_mean,
 )
 from smachpy.machines.construction import construction_method
-from smachpy.machines.container import NO_STATES, Container, below
+from smachpy.machines.container import NO_STATES, Container, shared_below
 from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
-from smachpy.machines.state import DataOf
+from smachpy.machines.state import DataOf, State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from smachpy.engine.frame import Frame
     from smachpy.engine.threads import ChildBranch
     from smachpy.events.introspection import Kind, Structure
-    from smachpy.machines.state import State, StateOptions
+    from smachpy.machines.state import StateOptions
     from smachpy.userdata.user_data import UserData
 
 __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
@@ -164,13 +164,13 @@ class Concurrence(Container):
         if self._smachpy.live.frame is not None:
             raise InvalidConstructionError(f"{label}: add: got a new state while it runs.")
         # One object in two threads would share its attributes and its preempt flag.
-        for other, child in self._smachpy.children.items():
-            if child is state:
+        if isinstance(state, State) and state._smachpy.is_child:
+            for other, child in self._smachpy.children.items():
                 problem = (
                     f"{label}: state: got the instance that runs as {other!r} at the same time; "
                     "expected one of its own."
                 )
-                if not accepts(problem):
+                if child is state and not accepts(problem):
                     raise InvalidStateError(problem)
         self._smachpy_store_child(label, state, remapping)
         return state
@@ -229,18 +229,11 @@ class Concurrence(Container):
 
     def __shared_states(self) -> Iterator[str]:
         """Yield a problem for each state that two branches would run at the same time."""
-        branches = self._smachpy.others()
-        if len(branches) == 1:
-            return
-        branch_of: dict[int, str] = {}
-        for label, child in branches.items():
-            for state in {id(state): state for state in below(child)}.values():
-                other = branch_of.setdefault(id(state), label)
-                if other != label:
-                    yield (
-                        f"one state in two branches: got one {type(state).__name__} below both "
-                        f"{other!r} and {label!r}; expected an instance for each."
-                    )
+        for state, first, second in shared_below(self._smachpy.others()):
+            yield (
+                f"one state in two branches: got one {type(state).__name__} below both {first!r} "
+                f"and {second!r}; expected an instance for each."
+            )
 
     def describe_structure(self) -> Structure:
         """Return the children and the rules."""

@@ -478,6 +478,16 @@ def below(state: State) -> Iterator[State]:
     return (each for _, each in walk(state))
 
 
+def shared_below(branches: Mapping[str, State]) -> Iterator[tuple[State, str, str]]:
+    """Yield each state that several branches contain, with the labels of the first and another."""
+    label_of: dict[int, str] = {}
+    for label, branch in branches.items():
+        for state in {id(state): state for state in below(branch)}.values():
+            first = label_of.setdefault(id(state), label)
+            if first != label:
+                yield state, first, label
+
+
 def _all_problems(container: Container, where: str) -> Iterator[str]:
     """Yield the problems of `container` and of all below it that was not checked since a change."""
     left = [(container, where)]

@@ -12,7 +12,7 @@ from smachpy.engine.described import ContainerData
 from smachpy.engine.step import Plan as CompiledChildren
 from smachpy.events.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.exceptions import InvalidStateError, did_you_mean
-from smachpy.machines.container import Container, below
+from smachpy.machines.container import Container, shared_below
 from smachpy.machines.state import DataOf, Shown
 from smachpy.pnp.actions import Binder, NotImported, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
@@ -380,15 +380,11 @@ class PetriNetPlan(Container):
 
     def __shared_states(self, where: str) -> Iterator[str]:
         # Actions run at the same time, and a state object has only one run at a time.
-        label_of: dict[int, str] = {}
-        for label, child in self._smachpy.others().items():
-            for state in {id(state): state for state in below(child)}.values():
-                other = label_of.setdefault(id(state), label)
-                if other != label:
-                    yield (
-                        f"{where}: one state for two actions: got one {type(state).__name__} below "
-                        f"both {other!r} and {label!r}; expected an instance for each."
-                    )
+        for state, first, second in shared_below(self._smachpy.others()):
+            yield (
+                f"{where}: one state for two actions: got one {type(state).__name__} below both "
+                f"{first!r} and {second!r}; expected an instance for each."
+            )
 
     def describe_structure(self) -> Structure:
         """Return the children and the net."""

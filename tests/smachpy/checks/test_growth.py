@@ -102,6 +102,15 @@ def test_check_grows_with_the_machine(make: Callable[[int], Any]) -> None:
     assert slope(make, smachpy.check) < 1.2
 
 
+def test_a_further_child_of_a_concurrence_is_no_dearer_than_the_first_ones() -> None:
+    def cost(size: int) -> int:
+        both, state = wide(size), CBState(work, outcomes=["ok"])
+        return lines_run(lambda: both.add("NEW", state))
+
+    cost(3)  # imports and caches
+    assert cost(LARGE) == cost(SMALL)
+
+
 @pytest.mark.parametrize("what", ["always_reaches(done)", "never(S2)", "after_preempt(S2)"])
 def test_properties_grow_with_the_machine(what: str) -> None:
     assert slope(chain, lambda machine: smachpy.check(machine, properties=[what])) < 1.2
