@@ -9,15 +9,15 @@ import pytest
 
 from smachpy.events.recording import read_recording
 from smachpy_viz.runs import concluding_charts
-from smachpy_viz.runs.conclusion import Bound, End, bounds, by_cause, end_of, headline
+from smachpy_viz.runs.conclusion import Bound, RunEnd, bounds, by_cause, end_of, headline
 from smachpy_viz.runs.report import collect, report
 from tests.viz.drives import run
 
-GOOD = End(good=True)
+GOOD = RunEnd(good=True)
 
 
 def bad(cause="the battery is empty at 3 %", path="/P/DOCK"):
-    return End(good=False, path=path, cause=cause)
+    return RunEnd(good=False, path=path, cause=cause)
 
 
 def test_the_headline_says_what_all_failures_share():

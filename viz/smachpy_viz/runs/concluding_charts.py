@@ -9,7 +9,7 @@ from smachpy_viz.model.labels import html_text, shorten
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from smachpy_viz.runs.conclusion import Bound, End
+    from smachpy_viz.runs.conclusion import Bound, RunEnd
 
 WIDE: Final = 640
 TALL: Final = 320
@@ -21,7 +21,7 @@ MOST_SQUARES: Final = 1_000
 LEAST_SPAN: Final = 1e-9
 
 
-def squares(ends: Sequence[End]) -> str:
+def squares(ends: Sequence[RunEnd]) -> str:
     """Return a square per run, those that failed with a cross, each a link to its row."""
     shown = ends[:MOST_SQUARES]
     parts = []
@@ -40,7 +40,7 @@ def squares(ends: Sequence[End]) -> str:
 
 
 def scatter(
-    ends: Sequence[End],
+    ends: Sequence[RunEnd],
     values: Sequence[Mapping[str, float]],
     keys: Sequence[str],
     shared: Sequence[Bound],
@@ -59,7 +59,7 @@ def scatter(
     return _plot(ends, xs, ys, (keys[0], keys[1] if len(keys) > 1 else "run"), by_key)
 
 
-def places(ends: Sequence[End]) -> str:
+def places(ends: Sequence[RunEnd]) -> str:
     """Return where the robots were last [m]; "" if no feedback says so."""
     there = [(end, number) for number, end in enumerate(ends) if end.place is not None]
     if not there:
@@ -71,7 +71,7 @@ def places(ends: Sequence[End]) -> str:
 
 
 def _plot(
-    ends: Sequence[End],
+    ends: Sequence[RunEnd],
     xs: Sequence[float],
     ys: Sequence[float],
     names: tuple[str, str],
@@ -130,7 +130,7 @@ def _within(bound: Bound | None, low: float, high: float) -> tuple[float, float]
     return (bound.limit, high) if bound.above else (low, bound.limit)
 
 
-def _link(number: int, end: End, inside: str) -> str:
+def _link(number: int, end: RunEnd, inside: str) -> str:
     what = "succeeded" if end.good else f"{end.path}: {end.cause}"
     return f'<a href="#run-{number}"><title>run {number + 1}: {html_text(what)}</title>{inside}</a>'
 

@@ -30,7 +30,7 @@ _NUMBER: Final = re.compile(r"\d+([.,]\d+)*")
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class RunEnd:
     """How one run ended.
 
     Attributes:
@@ -53,22 +53,22 @@ class End:
         return self.path, _NUMBER.sub("#", self.cause)
 
 
-def end_of(record: StateRecord, events: Sequence[dict[str, Any]]) -> End:
+def end_of(record: StateRecord, events: Sequence[dict[str, Any]]) -> RunEnd:
     """Return how the newest run of a machine ended."""
     run = newest_run(events, record.path)
     place = next((p for e in reversed(run) if (p := _place(e)) is not None), None)
     last = next((e for e in reversed(run) if e["kind"] == "Finished"), None)
     outcome = None if last is None else last.get("outcome") or RAISED
     if outcome not in {None, RAISED} and record.class_of(str(outcome)) in {"success", "other"}:
-        return End(good=True, place=place)
+        return RunEnd(good=True, place=place)
     found = why(record, events)
     if not found.steps or found.began is None:
-        return End(good=False, place=place)
+        return RunEnd(good=False, place=place)
     first = found.steps[0]
     # The end of a state says nothing that its name does not: the text of its goal or error does.
     cause = first.reason if first.what.startswith("goal to ") and first.reason else first.what
     at = (first.stamp_ns - found.began) / 1e9
-    return End(good=False, path=first.path, cause=shorten(cause, 120), at=at, place=place)
+    return RunEnd(good=False, path=first.path, cause=shorten(cause, 120), at=at, place=place)
 
 
 def _place(event: Mapping[str, Any]) -> tuple[float, float] | None:
@@ -91,9 +91,9 @@ def _place(event: Mapping[str, Any]) -> tuple[float, float] | None:
     )
 
 
-def by_cause(ends: Iterable[End]) -> list[tuple[End, list[int]]]:
+def by_cause(ends: Iterable[RunEnd]) -> list[tuple[RunEnd, list[int]]]:
     """Return the kinds of failures, the commonest first, each with the numbers of its runs."""
-    found: dict[tuple[str, str], tuple[End, list[int]]] = {}
+    found: dict[tuple[str, str], tuple[RunEnd, list[int]]] = {}
     for number, end in enumerate(ends):
         if not end.good:
             found.setdefault(end.kind, (end, []))[1].append(number)
@@ -118,7 +118,7 @@ class Bound:
 
 
 def bounds(
-    ends: Sequence[End], failed: Iterable[int], values: Sequence[Mapping[str, float]]
+    ends: Sequence[RunEnd], failed: Iterable[int], values: Sequence[Mapping[str, float]]
 ) -> tuple[Bound, ...]:
     """Return the one bound, or the two, that part some failures best from the good runs.
 
@@ -146,7 +146,7 @@ def bounds(
 
 
 def _purity(
-    ends: Sequence[End], values: Sequence[Mapping[str, float]], some: tuple[Bound, ...]
+    ends: Sequence[RunEnd], values: Sequence[Mapping[str, float]], some: tuple[Bound, ...]
 ) -> float:
     """Return the part of the runs within bounds that has failed; 0 if all runs are within."""
     inside = [
@@ -157,7 +157,7 @@ def _purity(
     return 0.0 if len(inside) == len(ends) else sum(not e.good for e in inside) / len(inside)
 
 
-def headline(ends: Sequence[End], values: Sequence[Mapping[str, float]]) -> tuple[str, str]:
+def headline(ends: Sequence[RunEnd], values: Sequence[Mapping[str, float]]) -> tuple[str, str]:
     """Return two sentences: how many succeeded, and what the failures share.
 
     Args:

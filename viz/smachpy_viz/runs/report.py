@@ -15,7 +15,7 @@ from smachpy_viz.pictures.theme import DARK, LIGHT
 from smachpy_viz.runs import charts
 from smachpy_viz.runs import concluding_charts as concluding
 from smachpy_viz.runs.compare import ComparedRun, unite
-from smachpy_viz.runs.conclusion import End, bounds, by_cause, end_of, headline
+from smachpy_viz.runs.conclusion import RunEnd, bounds, by_cause, end_of, headline
 from smachpy_viz.runs.statistics import Statistics, marks_of, quantile
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class MachineRuns:
     statistics: Statistics = field(default_factory=Statistics)
     ways: list[tuple[list[str], str]] = field(default_factory=list)
     files: list[tuple[str, str, float | None]] = field(default_factory=list)
-    ends: list[End] = field(default_factory=list)
+    ends: list[RunEnd] = field(default_factory=list)
 
 
 def collect(recordings: Iterable[Recording]) -> dict[str, MachineRuns]:
