@@ -34,7 +34,8 @@ from smachpy.durable.store import open_store
 
 ROBOTS = ("r1", "r2")
 NAMES = ("{}", "/{}", "")  # the last: the mission's action says which robot it is
-SUBMIT_S = 1.5  # between two missions
+SUBMIT_S = 0.5  # between two missions
+SUBMITTING = 3  # at the same time
 DRIVE_S = 0.4
 DRAIN_S = 90.0  # longest wait until the missions of the old version are over
 TICK_S = 0.1
@@ -134,6 +135,7 @@ class Fleet:
         self.laptop = Computer(place / "laptop")
         self.computers = [Computer(place / f"computer_{n}") for n in (1, 2)]
         self.servers: dict[str, subprocess.Popen[bytes]] = {}
+        self.submitting: dict[int, subprocess.Popen[bytes]] = {}
         self._place = place
         self._store = open_store(self.queue)
         self._domain = str(1 + os.getpid() % 9999)
@@ -190,14 +192,23 @@ class Fleet:
         named = ["--robot", name] if name else []
         words = ["submit", "errand:mission", "--db", self.queue, "--mission", str(number), *named]
         self.submitted[number] = self.version, robot, time.monotonic()
-        process = self._start(self.laptop.folder, "-m", "smachpy", *words, "--", str(number), robot)
-        if process.wait():
-            self.figures.problems.append(f"mission {number} cannot be submitted")
+        words += ["--", str(number), robot]
+        self.submitting[number] = self._start(self.laptop.folder, "-m", "smachpy", *words)
+
+    def _note_submitted(self) -> None:
+        for number, process in list(self.submitting.items()):
+            if process.poll() is not None:
+                del self.submitting[number]
+                if process.returncode:
+                    self.figures.problems.append(f"mission {number} cannot be submitted")
 
     # -- a campaign ----------------------------------------------------------------------------
 
     def update(self) -> None:
         """Bring the next version to all computers, while missions come in and run."""
+        while self.submitting:  # they read the mission that is to be replaced
+            self._note_submitted()
+            time.sleep(TICK_S)
         self.version += 1
         self.figures.counts["updates"] += 1
         self.install(self.laptop)
@@ -224,7 +235,8 @@ class Fleet:
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             newest = max((when for *_, when in self.submitted.values()), default=0.0)
-            if time.monotonic() > newest + SUBMIT_S:
+            self._note_submitted()
+            if time.monotonic() > newest + SUBMIT_S and len(self.submitting) < SUBMITTING:
                 self.submit()
             time.sleep(TICK_S)
 
@@ -250,11 +262,13 @@ class Fleet:
             self.update()
         last = time.monotonic() + DRAIN_S
         while self.unfinished(self.version) and time.monotonic() < last:
+            self._note_submitted()
             time.sleep(TICK_S)
 
     def close(self) -> None:
         """Leave nothing running."""
-        processes = [*self.servers.values(), *(one.runner for one in self.computers)]
+        runners = (one.runner for one in self.computers)
+        processes = [*self.servers.values(), *self.submitting.values(), *runners]
         for process in filter(None, processes):
             process.terminate()
         for process in filter(None, processes):
