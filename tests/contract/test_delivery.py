@@ -136,7 +136,7 @@ faults = st.builds(
 )
 
 
-@pytest.mark.timeout(300)  # on a busy computer
+@pytest.mark.timeout(900)  # on a busy computer
 @settings(deadline=None, max_examples=120)
 @given(
     seed=st.integers(0, 1000),
@@ -154,7 +154,7 @@ def test_drops_repeats_delays_and_short_cuts(seed, client_plan, server_plan, scr
         assert "LOST" not in list(pair.check(handles))
 
 
-@pytest.mark.timeout(300)  # on a busy computer
+@pytest.mark.timeout(900)  # on a busy computer
 @settings(deadline=None, max_examples=80)
 @given(
     seed=st.integers(0, 1000),
@@ -555,7 +555,7 @@ class Reign:
     gap: float
 
 
-@pytest.mark.timeout(300)  # on a busy computer
+@pytest.mark.timeout(900)  # on a busy computer
 @settings(deadline=None, max_examples=100)
 @given(
     seed=st.integers(0, 1000),

@@ -504,7 +504,7 @@ places:
 
 @pytest.mark.slow
 @pytest.mark.zenoh
-@pytest.mark.timeout(180)
+@pytest.mark.timeout(900)
 def test_two_processes_of_which_one_is_killed_on_the_way(tmp_path):
     site = tmp_path / "site.yaml"
     site.write_text(SMALL_SITE.format(folder=OFFICE_FLEET.parent))
@@ -518,7 +518,7 @@ def test_two_processes_of_which_one_is_killed_on_the_way(tmp_path):
         [*command, "run", "fleet", "--plain", "--out", str(tmp_path / "out"), "--", *words],
         capture_output=True,
         text=True,
-        timeout=170,
+        timeout=800,
         stdin=subprocess.DEVNULL,
     )
     assert done.returncode == 0, done.stdout + done.stderr

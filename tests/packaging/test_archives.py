@@ -17,7 +17,7 @@ import pytest
 from smachpy_viz.live import assets
 from tests.places import ROOT
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 PACKAGES = ("actionlib_core", "smachpy", "viz/smachpy_viz", "missions/smachpy_missions")
 NOT_SHIPPED = {

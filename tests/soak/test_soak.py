@@ -11,7 +11,7 @@ import pytest
 
 @pytest.mark.zenoh
 @pytest.mark.slow
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(900)
 def test_short_campaign_breaks_no_promise():
     campaign = Path(__file__).with_name("soak.py")
     ended = subprocess.run(

@@ -160,6 +160,6 @@ os._exit(0)
 def test_a_forked_child_has_threads_and_timers_of_its_own():
     """Its timers never came, as the thread of its parent's timers was not there."""
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", FORK], capture_output=True, text=True, timeout=120
+        [sys.executable, "-W", "ignore", "-c", FORK], capture_output=True, text=True, timeout=250
     )
     assert done.stdout.split() == ["True", "True", "True"], done.stderr

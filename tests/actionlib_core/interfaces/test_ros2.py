@@ -111,7 +111,7 @@ def test_distributions_differ() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # hundreds of classes are made
+@pytest.mark.timeout(900)  # hundreds of classes are made
 def test_every_definition_that_comes_with_us_is_a_class_with_a_hash_and_bytes() -> None:
     for distro in ros2.DISTROS:
         registry = Ros2Registry(distro, ours=True)

@@ -50,7 +50,7 @@ def test_own_package(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(180)  # mypy reads all interfaces anew
+@pytest.mark.timeout(900)  # mypy reads all interfaces anew
 def test_mypy_knows_the_fields(tmp_path: Path) -> None:
     _stubs.write(_stubs.package_stubs(own_package(tmp_path), "my_pkg"), tmp_path / "typings")
     program = tmp_path / "program.py"
@@ -68,7 +68,7 @@ def test_mypy_knows_the_fields(tmp_path: Path) -> None:
         [sys.executable, "-m", "mypy", "--strict", "--no-incremental", str(program)],
         capture_output=True,
         text=True,
-        timeout=170,
+        timeout=800,
         cwd=tmp_path,
         env={**os.environ, "MYPYPATH": os.pathsep.join([str(tmp_path / "typings"), str(ROOT)])},
     )

@@ -38,7 +38,7 @@ def question(path):
 
 @pytest.mark.slow
 @pytest.mark.zenoh
-@pytest.mark.timeout(300)  # six processes, one after another
+@pytest.mark.timeout(900)  # six processes, one after another
 def test_a_mission_in_another_process_is_answered_by_name(tmp_path):
     (tmp_path / "ask.py").write_text(textwrap.dedent(MISSION))
     env = {**os.environ, "SMACHPY_DOMAIN": str(1 + (os.getpid() * 11 + 5) % 9999)}

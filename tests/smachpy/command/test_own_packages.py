@@ -12,7 +12,7 @@ import pytest
 
 import smachpy
 
-pytestmark = pytest.mark.timeout(300)  # further Pythons, on a busy computer
+pytestmark = pytest.mark.timeout(900)  # further Pythons, on a busy computer
 
 ROOT = Path(smachpy.__file__).parents[1]
 # As where smachpy is installed as users install it: the finders of an editable one help out.

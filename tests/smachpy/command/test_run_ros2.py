@@ -56,7 +56,7 @@ def run(*argv, code=0):
 
 @pytest.mark.slow
 @pytest.mark.zenoh
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(900)
 def test_missions_drive_a_ros2_robot(tmp_path, monkeypatch):
     for name in ("SMACHPY_CONFIG", "SMACHPY_ROS2", "SMACHPY_ROS2_DISTRO"):
         monkeypatch.delenv(name, raising=False)

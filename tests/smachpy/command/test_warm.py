@@ -18,7 +18,7 @@ from smachpy.command.warm import Starter
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.timeout(120),
+    pytest.mark.timeout(900),
     pytest.mark.skipif(not warm._may_fork(), reason="needs Linux"),
 ]
 WITHIN_S = 60

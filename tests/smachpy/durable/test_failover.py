@@ -179,7 +179,7 @@ def crash_after(server: PostgresServer, kill_at: int) -> bool:
 
 @pytest.mark.postgres
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_each_mission_runs_once_if_the_database_is_killed_at_any_statement(folder: Path) -> None:
     """Four runners share a queue; after each statement of one of them, the server crashes once."""
     (folder / "own").mkdir()

@@ -23,7 +23,7 @@ from smachpy.durable.store import open_store
 from smachpy.events.recording import read_recording
 from tests.smachpy.durable.test_stores import ROW
 
-pytestmark = pytest.mark.timeout(240)  # several processes after one another, on a busy computer
+pytestmark = pytest.mark.timeout(900)  # several processes after one another, on a busy computer
 
 MISSION = """
 import os

@@ -146,7 +146,7 @@ def live(tree: Tree, world: World, store: KillingStore) -> tuple[str, dict[str, 
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # hundreds of runs; on a busy machine they take minutes
+@pytest.mark.timeout(900)  # hundreds of runs; on a busy machine they take minutes
 @settings(max_examples=60)
 @given(TREES)
 def test_a_run_killed_at_any_write_ends_as_one_that_is_not(tree: Tree) -> None:
@@ -170,7 +170,7 @@ def test_a_run_killed_at_any_write_ends_as_one_that_is_not(tree: Tree) -> None:
             check_deeds(calm, world, exact=written and not is_parallel(tree))
 
 
-@pytest.mark.timeout(300)  # hundreds of runs; on a busy machine they take minutes
+@pytest.mark.timeout(900)  # hundreds of runs; on a busy machine they take minutes
 @settings(max_examples=60)
 @given(TREES, st.lists(st.tuples(st.integers(1, 8), st.booleans()), min_size=1, max_size=6))
 def test_a_run_killed_again_and_again_ends_as_one_that_is_not(

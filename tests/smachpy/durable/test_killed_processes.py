@@ -139,7 +139,7 @@ def test_a_mission_killed_with_its_goal_under_way_follows_it(world: World) -> No
 
 @pytest.mark.slow
 @pytest.mark.zenoh
-@pytest.mark.timeout(120 + 10 * KILLS)
+@pytest.mark.timeout(900 + 10 * KILLS)
 def test_missions_killed_again_and_again_end_as_one_that_is_not(world: World) -> None:
     chance = random.Random(SEED)
     expected = calm(world, 0)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(900)]
 
 MISSION = """
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci

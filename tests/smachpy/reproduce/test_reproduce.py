@@ -603,7 +603,7 @@ def test_round_aborted(mission, action_server, topic):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # seven processes
+@pytest.mark.timeout(900)  # seven processes
 def test_the_written_test_reads_like_a_person_s_and_fails_after_a_change(night, tmp_path):
     file, path = night
     fresh = tmp_path / "fresh"

@@ -46,7 +46,7 @@ def recorded(mission, path, *options):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=250,
         check=False,
     )
     assert path.exists(), done.stderr

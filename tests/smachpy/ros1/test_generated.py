@@ -216,7 +216,7 @@ def test_a_node_is_reconfigured(package):
     script.parent.mkdir()
     script.write_text(SERVER)
     words = (sys.executable, "-m", "smachpy", "run", "--ros1", str(script), "--time", "virtual")
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=250)
     assert "ended: done" in done.stdout, done.stdout + done.stderr
 
 

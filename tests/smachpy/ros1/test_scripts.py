@@ -177,7 +177,7 @@ def test_who_waits_for_what_nobody_offers(smachpy, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", NAMES)
 def test_runs_renders_and_checks(name, scripts, smachpy, tmp_path):
     script = scripts / name

@@ -20,7 +20,7 @@ from smachpy.testing.coverage import Coverage
 pytest_plugins = ["pytester"]
 
 # Most of these start further Pythons, which a busy computer takes its time for.
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(900)
 
 TESTS = """
 import pytest
@@ -419,7 +419,7 @@ def test_the_alias_warns_of_nothing_where_the_package_is_installed(tmp_path):
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=250,
         check=False,
     )
     assert "plugged-1.0" in done.stdout

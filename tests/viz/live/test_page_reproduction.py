@@ -8,7 +8,7 @@ from smachpy.events.recording import Recorder
 from smachpy.testing import mission_kit
 from tests.browser import wait_for
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(900)]
 
 MISSION = """
 import smachpy
@@ -52,7 +52,7 @@ def test_the_difference_is_shown_and_a_test_is_written(start, look, incident):
     file, path = incident
     page = look(start.view(path, "--control", f"--allow={file}").address)
     page.get_by_role("button", name="Reproduce").click()
-    page.wait_for_selector(".first-difference", timeout=120_000)
+    page.wait_for_selector(".first-difference", timeout=400_000)
     assert "event 5" in page.inner_text(".first-difference")
     told = page.inner_text(".again")
     assert "EYE  seen" in told or "EYE seen" in told
@@ -63,7 +63,7 @@ def test_the_difference_is_shown_and_a_test_is_written(start, look, incident):
     page.get_by_role("button", name="One run").click()
     page.wait_for_selector(".two-runs", state="detached")
     page.get_by_role("button", name="Make a test").click()
-    page.wait_for_selector(".written-test", timeout=120_000)
+    page.wait_for_selector(".written-test", timeout=400_000)
     assert "def test_" in page.inner_text(".written-test")
     with page.expect_download() as saved:
         page.get_by_role("button", name="Save", exact=True).click()

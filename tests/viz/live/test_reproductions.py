@@ -68,12 +68,12 @@ def opened(incident, tmp_path):
 
 def ended(reproductions, number):
     for task in reproductions._tasks:
-        task.join(120.0)
+        task.join(400.0)
     return reproductions.row(number)
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_a_run_is_reproduced_and_the_new_one_is_a_machine_outside_the_list(opened, incident):
     machines, reproductions, runs = opened
     same = ended(reproductions, reproductions.start({"machine": "night", "what": "run"}))
@@ -95,7 +95,7 @@ def test_a_run_is_reproduced_and_the_new_one_is_a_machine_outside_the_list(opene
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_a_test_is_written(opened):
     _, reproductions, _ = opened
     found = ended(reproductions, reproductions.start({"machine": "night", "what": "test"}))["found"]
@@ -108,7 +108,7 @@ def test_a_test_is_written(opened):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_a_recording_cannot_name_code_that_nobody_allowed(incident, tmp_path):
     _, path = incident
     machines = Machines()
@@ -122,7 +122,7 @@ def test_a_recording_cannot_name_code_that_nobody_allowed(incident, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_one_that_never_ends_is_stopped_and_nothing_is_left(opened, incident):
     _, reproductions, _ = opened
     endless = MISSION.replace("SURE = True", "while True:\n    pass")
@@ -132,7 +132,7 @@ def test_one_that_never_ends_is_stopped_and_nothing_is_left(opened, incident):
         reproductions.start({"machine": "night", "what": "run"})
     assert reproductions.row(first)["running"]
     reproductions.stop(first)
-    reproductions._tasks[0].join(120.0)
+    reproductions._tasks[0].join(400.0)
     assert reproductions.row(first) == {
         "running": False,
         "problem": "it was stopped",

@@ -43,12 +43,12 @@ def simulations(tmp_path, job):
 def ended(simulations, name):
     """The batch, when its process has ended."""
     for task in simulations._tasks:
-        task.join(250.0)
+        task.join(400.0)
     return next(one for one in simulations.rows() if one["id"] == name)
 
 
 @pytest.mark.slow  # processes of processes
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 def test_a_batch_is_counted_reported_compared_and_found_again(simulations, tmp_path, job):
     asked = {"mission": job, "runs": 4, "vary": ["seconds=0.0..4.0"], "seed": 2, "limit": "1h"}
     first = ended(simulations, simulations.start(asked))
@@ -162,7 +162,7 @@ def test_only_who_has_the_token_starts_runs(served, simulations, job):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.browser
 def test_the_page_starts_runs_and_shows_the_report(served, look, simulations, job):
     address = served.start(simulations=simulations, token="right", home=True)
@@ -175,8 +175,8 @@ def test_the_page_starts_runs_and_shows_the_report(served, look, simulations, jo
     page.fill(".simulate label:has-text('Runs') input", "3")
     page.fill(".simulate textarea", "seconds=0.0..1.5")
     page.click(".simulate button[type=submit]")
-    page.wait_for_selector(".batches >> text=succeeded \u00d73", timeout=200_000)
-    page.wait_for_selector(".batches a", timeout=200_000)
+    page.wait_for_selector(".batches >> text=succeeded \u00d73", timeout=400_000)
+    page.wait_for_selector(".batches a", timeout=400_000)
     with page.context.expect_page() as opened:
         page.click(".batches a")
     assert opened.value.locator("h2:has-text('Ways taken')").count() == 1

@@ -257,7 +257,7 @@ def test_the_command_prints_a_table_and_writes_a_report(job, tmp_path, capsys):
         [sys.executable, "-m", "smachpy.command", *words, "--record", folder, "-o", page],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=250,
         check=True,
     )
     out = done.stdout

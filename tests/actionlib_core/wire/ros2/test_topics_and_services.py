@@ -155,7 +155,6 @@ def test_messages_of_several_threads_are_sent_in_the_order_of_their_numbers(monk
     assert [unpack_attachment(sample.attachment).sequence for sample in samples] == [1, 2]
 
 
-@pytest.mark.timeout(30)
 def test_a_message_published_by_a_signal_handler_during_another_one(world, monkeypatch):
     seen = world.inbox()
     Subscriber("chatter", String, seen, node=world.mission)
