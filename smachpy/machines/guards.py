@@ -67,6 +67,10 @@ class Between:
     state: Any
     transitions: Mapping[str, str]
 
+    def __repr__(self) -> str:
+        """Name what made it, as it is in errors about where it cannot stand."""
+        return f"{self.prefix.lower()}({next(iter(self.transitions.values()))!r})"
+
 
 Target: TypeAlias = "str | Between | Sequence[When | str | None] | None"
 """What an outcome leads to: a label or outcome, None, a state between, or cases of which the last

@@ -6,7 +6,7 @@ import pytest
 
 import smachpy
 from actionlib_core.interfaces.std_msgs.msg import String
-from smachpy import InvalidStateError, StateMachine
+from smachpy import InvalidStateError, StateMachine, when
 from smachpy.command import main
 from smachpy.events import QuestionAsked
 from smachpy.files import MissionFileError, load
@@ -115,6 +115,12 @@ def test_the_state_that_follows_in_a_sequence_is_the_next_one():
 def test_wrong_arguments_are_refused(given):
     with pytest.raises(InvalidStateError, match="confirm"):
         confirm(**{"target": "NEXT", **given})
+
+
+@pytest.mark.parametrize("cases", [[when("x", "A"), confirm("A")], [confirm("A"), "A"]])
+def test_it_stands_alone(cases):
+    with pytest.raises(InvalidStateError, match=r"confirm\('A'\)"):
+        StateMachine(["done"]).add("A", Wait(1.0), {"done": cases})
 
 
 @pytest.mark.parametrize("level", [-1, "2", 1.5, None])
