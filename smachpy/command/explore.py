@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 from actionlib_core.command_line.numbers import between, seconds
 from actionlib_core.process.output import printable
+from smachpy.command.durable import whole_target
+from smachpy.command.on import Progress, add_jobs_and_on, opened_cluster, workers_text
 from smachpy.command.run import add_input, read_inputs
 from smachpy.machines.container import Container
 
@@ -61,9 +63,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="S",
         help="the longest time [s] (default: %(default)g)",
     )
-    parser.add_argument(
-        "--jobs", type=between(1), metavar="N", help="at the same time (default: all cores)"
-    )
+    add_jobs_and_on(parser)
     parser.add_argument(
         "--pictures", type=Path, metavar="FOLDER", help="draw the run that breaks an invariant"
     )
@@ -74,17 +74,25 @@ def run(args: argparse.Namespace) -> int:
     """Explore the mission; return 1 if a run breaks an invariant."""
     from smachpy.testing.exploring.exploration import explore
 
-    make = MissionMaker(args.target, read_inputs(args.input), args.words)
+    target = args.target if args.on is None else whole_target(args.target)
+    make = MissionMaker(target, read_inputs(args.input), args.words)
     machine = make()
-    found = explore(
-        make,
-        max_runs=args.max_runs,
-        max_time=args.max_time,
-        faults=args.fault,
-        keep=reckoning_states(machine),
-        folder=None if args.pictures is None else lambda: args.pictures,
-        jobs=args.jobs,
-    )
+    with opened_cluster(args.on, target) as cluster:
+        progress = Progress("runs", workers_text(cluster, args.jobs, args.max_runs))
+        try:
+            found = explore(
+                make,
+                max_runs=args.max_runs,
+                max_time=args.max_time,
+                faults=args.fault,
+                keep=reckoning_states(machine),
+                folder=None if args.pictures is None else lambda: args.pictures,
+                jobs=args.jobs,
+                cluster=cluster,
+                progress=progress.show,
+            )
+        finally:
+            progress.end()
     print(printable(f"/{machine.name or args.target}: {found}"))
     return 0 if found.ok else 1
 

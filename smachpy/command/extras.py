@@ -17,6 +17,7 @@ EXTRAS: Final = {
     "textual": "tui",
     "mcap": "mcap",
     "cronsim": "cron",
+    "distributed": "dask",
     "psycopg": "postgres",
     "anywidget": "notebook",
 }

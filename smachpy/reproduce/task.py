@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import logging
 import sys
-from dataclasses import dataclass
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actionlib_core.clock import RealClock
@@ -60,6 +62,22 @@ def reproduce_file(
         () if difference is None else tuple(nearest(found.changed, difference.path)),
         found.notes,
     )
+
+
+def reproduce_content(path: str, content: bytes, options: Options) -> Verdict:
+    """Reproduce a file that is on another computer.
+
+    Args:
+        path: Its name there.
+        content: Its content.
+        options: How.
+    """
+    with tempfile.TemporaryDirectory(prefix="smachpy-reproduce-") as folder:
+        file = Path(folder) / "recording.jsonl"
+        file.write_bytes(content)
+        verdict = reproduce_file(str(file), options)
+        lines = tuple(line.replace(str(file), path) for line in verdict.lines)
+        return replace(verdict, path=path, lines=lines)
 
 
 def run_file(path: str, options: Options) -> Reproduction:

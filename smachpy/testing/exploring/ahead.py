@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import pickle
 from collections import deque
+from functools import partial
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.base.workers import MOST_TRIES, WorkerProcess, cores
+from actionlib_core.clock import RealClock
+from smachpy.base.workers import Workers, cores
 from smachpy.machines.container import Container
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from concurrent.futures import Future
     from typing import Self, TypeAlias
 
+    from smachpy.base.cluster import Cluster
     from smachpy.testing.exploring.search import ScheduleChoice, Search
     from smachpy.testing.runs import Run
 
     Prefix: TypeAlias = tuple[int, ...]
+    Known: TypeAlias = list[tuple[Prefix, list[ScheduleChoice]]]
     Found: TypeAlias = tuple[list[ScheduleChoice], Run | None]
 
 AFTER_S: Final = 2.0
@@ -36,34 +42,42 @@ COMPARED: Final = 4
 class Ahead:
     """Does the next runs of a search in other processes; a context manager.
 
-    A process in which the first runs are not the same as here is not used: such as one in which a
-    set of texts has another order.
+    If a process does the first runs not as this one, no other process is used: such as one in which
+    a set of texts has another order.
 
     Args:
         job: Machine, invariants, grace and options, as the function that is called has them. If
             they cannot be sent to another process (a machine instead of a function, a lambda, what
             a program's own file defines), no other process is used.
         jobs: Number of processes; None: all cores.
+        cluster: Has the processes; None: this computer.
         wants_runs: Whether the runs are needed, besides their choices.
     """
 
-    def __init__(self, job: tuple[Any, ...], jobs: int | None, *, wants_runs: bool) -> None:
-        self._count = cores() if jobs is None else jobs
+    def __init__(
+        self, job: tuple[Any, ...], jobs: int | None, cluster: Cluster | None, *, wants_runs: bool
+    ) -> None:
+        self._cluster = cluster
+        self._count = cluster.count if cluster is not None else cores() if jobs is None else jobs
         self._wants_runs = wants_runs
-        self._job = b"" if self._count == 1 else _pickled(job)
-        self._known: list[tuple[Prefix, list[ScheduleChoice]]] = []
-        self._processes: list[WorkerProcess] = []
-        self._asked: deque[tuple[int, list[Prefix], int]] = deque()  # process, runs, its try
+        self._job = b"" if cluster is None and self._count == 1 else _pickled(job)
+        self._known: Known = []
+        self._asked: deque[list[Prefix]] = deque()
         self._ready: deque[tuple[Prefix, Found | None]] = deque()
-        self._next = 0
+        self._answers: dict[int, list[Found | None] | None] = {}  # by the number of the question
+        self._sent = self._taken = 0
+        # The runs of this process have their own time, in which nothing can be waited for that
+        # others do. So a thread which is not in it asks, over queues that are not in it either.
+        self._questions: SimpleQueue[tuple[int, tuple[Any, ...]] | None] = SimpleQueue()
+        self._answered: SimpleQueue[tuple[int, list[Found | None] | None]] = SimpleQueue()
+        self._thread = RealClock().spawn(self._send, name="explore ahead")
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for process in self._processes:
-            process.kill()
-            process.end()
+        self._questions.put(None)
+        self._thread.join()
 
     def found(self, prefix: Prefix, search: Search) -> Found | None:
         """Return a run that keeps all invariants; None if it is not known to be one.
@@ -74,11 +88,8 @@ class Ahead:
 
         Blocks: until the run has been done.
         """
-        if not self._job or not self._known:
+        if not self._known:
             return None
-        if not self._processes:
-            self._processes = [WorkerProcess() for _ in range(self._count)]
-            self._compare()
         if self._job and not self._ready and not self._asked:
             self._ask([prefix])
         self._ask_for(search)
@@ -91,26 +102,14 @@ class Ahead:
 
     def note(self, prefix: Prefix, choices: list[ScheduleChoice]) -> None:
         """Note a run that this process has done, and that keeps all invariants."""
-        if self._job and len(self._known) < COMPARED:
+        if self._job and not self._sent and len(self._known) < COMPARED:
             self._known.append((prefix, choices))
-
-    def _compare(self) -> None:
-        """Use no other process unless all do the known runs as this one."""
-        prefixes = [prefix for prefix, _ in self._known]
-        for number in range(self._count):
-            self._ask(prefixes, process=number)
-        while self._asked:
-            self._receive()
-        results = [None if found is None else found[0] for _, found in self._ready]
-        self._ready.clear()
-        if results != [choices for _, choices in self._known] * self._count:
-            self._job = b""
 
     def _ask_for(self, search: Search) -> None:
         """Keep all processes busy with the runs that come next."""
         if not self._job:
             return
-        begun = len(self._ready) + sum(len(prefixes) for _, prefixes, _ in self._asked)
+        begun = len(self._ready) + sum(map(len, self._asked))
         # The search waits for the first of these, and no longer has it.
         waiting = search.waiting(begun - 1, 2 * self._count * TOGETHER)
         while waiting and len(self._asked) < 2 * self._count:
@@ -119,40 +118,50 @@ class Ahead:
             self._ask(waiting[:size])
             waiting = waiting[size:]
 
-    def _ask(self, prefixes: list[Prefix], tries: int = 1, process: int | None = None) -> None:
-        if process is None:  # in turn, as the answers are taken in the order of the questions
-            process, self._next = self._next, (self._next + 1) % self._count
-        self._asked.append((process, prefixes, tries))
-        self._send(process, prefixes)
-
-    def _send(self, process: int, prefixes: list[Prefix]) -> None:
-        task: Any = (runs_of, (self._job, prefixes, self._wants_runs), {})
-        try:
-            self._processes[process].connection.send(task)
-        except ConnectionError:  # it is dead; `_receive` finds out
-            return
+    def _ask(self, prefixes: list[Prefix]) -> None:
+        self._asked.append(prefixes)
+        self._questions.put(
+            (self._sent, (self._job, self._known, prefixes, self._wants_runs)),
+        )
+        self._sent += 1
 
     def _receive(self) -> None:
-        """Take the next answer; if its process has died, another one does the runs again."""
-        number, prefixes, tries = self._asked[0]
-        try:
-            results, error = self._processes[number].connection.recv()
-        except (EOFError, ConnectionError):
-            self._processes[number].end()
-            self._processes[number] = WorkerProcess()
-            again = [(p, runs, n) for p, runs, n in self._asked if p == number]
-            self._asked[0] = (number, prefixes, tries + 1)
-            if tries < MOST_TRIES:
-                for _, runs, _ in again:
-                    self._send(number, runs)
-                return
-            results, error = None, "it dies"
+        """Take the answer to the first question that has none yet."""
+        while self._taken not in self._answers:
+            number, results = self._answered.get()
+            self._answers[number] = results
+        found = self._answers.pop(self._taken)
+        self._taken += 1
+        prefixes = self._asked.popleft()
+        if found is None:
+            # Such as a module that cannot be imported there, or processes that die.
             self._job = b""
-        if error is not None:  # such as a module that cannot be imported there
-            self._job, self._asked = b"", deque()
+            self._asked.clear()
             return
-        self._asked.popleft()
-        self._ready.extend(zip(prefixes, results, strict=True))
+        self._ready.extend(zip(prefixes, found, strict=True))
+
+    def _send(self) -> None:
+        """Ask what `found` wants to know, in a thread of its own, until the end."""
+        own: Workers | None = None
+        futures: list[Future[Any]] = []
+        while (question := self._questions.get()) is not None:
+            if self._cluster is None and own is None:
+                own = Workers(self._count)
+            executor = self._cluster or own
+            assert executor is not None
+            number, arguments = question
+            future = executor.submit(runs_of, *arguments)
+            future.add_done_callback(partial(self._on_answer, number))
+            futures = [one for one in (*futures, future) if not one.done()]
+        for future in futures:
+            future.cancel()
+        if own is not None:
+            own.kill()
+            own.shutdown()
+
+    def _on_answer(self, number: int, future: Future[list[Found | None] | None]) -> None:
+        failed = future.cancelled() or future.exception() is not None
+        self._answered.put((number, None if failed else future.result()))
 
 
 def _pickled(job: tuple[Any, ...]) -> bytes:
@@ -166,8 +175,19 @@ def _pickled(job: tuple[Any, ...]) -> bytes:
     return b"" if b"__main__" in made else made
 
 
-def runs_of(job: bytes, prefixes: Sequence[Prefix], wants_runs: bool) -> list[Found | None]:
+_compared: dict[bytes, bool] = {}  # by the job: whether this process does what its sender does
+
+
+def runs_of(
+    job: bytes, known: Known, prefixes: Sequence[Prefix], wants_runs: bool
+) -> list[Found | None] | None:
     """Do runs; return None for each that breaks an invariant, or is not possible.
+
+    Args:
+        job: What is run.
+        known: Runs of the process that asks; if they are not the same here, None is returned.
+        prefixes: The runs.
+        wants_runs: Whether the runs are needed, besides their choices.
 
     Blocks: until they are done.
     """
@@ -175,15 +195,18 @@ def runs_of(job: bytes, prefixes: Sequence[Prefix], wants_runs: bool) -> list[Fo
     from smachpy.testing.exploring.verdicts import judge
 
     machine, invariants, grace, options = pickle.loads(job)  # noqa: S301  of the process that began this one
-    found: list[Found | None] = []
     with RepeatedRun("explore", machine, options, merges=not invariants) as runner:
-        for prefix in prefixes:
+
+        def found(prefix: Prefix) -> Found | None:
             try:
                 run, error = runner.run(prefix)
             except ReplayError:
-                found.append(None)
-                continue
+                return None
             explorer = runner.explorer
             is_ok = judge(run, error, explorer, grace=grace, invariants=invariants) is None
-            found.append((explorer.choices, run if wants_runs else None) if is_ok else None)
-    return found
+            return (explorer.choices, run if wants_runs else None) if is_ok else None
+
+        if job not in _compared:
+            mine = [found(prefix) for prefix, _ in known]
+            _compared[job] = [one and one[0] for one in mine] == [choices for _, choices in known]
+        return [found(prefix) for prefix in prefixes] if _compared[job] else None

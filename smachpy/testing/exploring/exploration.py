@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
     from typing import Self, TypeAlias, Unpack
 
+    from smachpy.base.cluster import Cluster
     from smachpy.events.introspection import StateRecord
     from smachpy.testing.exploring.kills import Kill, MemoryJournal
     from smachpy.testing.exploring.search import ScheduleChoice
@@ -141,6 +142,8 @@ def explore(
     folder: Callable[[], Path] | None = None,
     on_run: Callable[[Run], object] | None = None,
     jobs: int | None = None,
+    cluster: Cluster | None = None,
+    progress: Callable[[int], object] | None = None,
     **options: Unpack[RunOptions],
 ) -> Exploration:
     """Run a mission with every combination of leaf outcomes, preempts, faults and interleavings.
@@ -172,6 +175,8 @@ def explore(
             process can import, and there are no kills; 1: this one only; by default all cores, for
             explorations that take some seconds. The result does not depend on it, if `invariants`
             only look at the run.
+        cluster: Has the processes, on other computers; None: this computer.
+        progress: Called before each run with the number of those done.
         **options: See `RunOptions`.
 
     Raises:
@@ -189,14 +194,16 @@ def explore(
     budget = _Budget(max_runs, max_time)
     search = Search(max_depth)
     with (
-        Ahead((machine, own, grace, options), jobs, wants_runs=on_run is not None) as ahead,
+        Ahead(
+            (machine, own, grace, options), jobs, cluster, wants_runs=on_run is not None
+        ) as ahead,
         RepeatedRun("explore", machine, options, merges=not own) as runner,
     ):
 
         def verdict_on(run: Run, error: Exception | None) -> Verdict | None:
             return judge(run, error, runner.explorer, grace=grace, invariants=own)
 
-        tries = _Tries(runner, ahead, search, budget, verdict_on, on_run)
+        tries = _Tries(runner, ahead, search, budget, verdict_on, on_run, progress)
         example, stopped_by = tries.all(max_time)
     stopped_by = "counterexample" if example is not None else stopped_by
     stopped_by = stopped_by or ("max_depth" if search.is_cut else "")
@@ -229,6 +236,7 @@ class _Tries:
     budget: _Budget
     verdict_on: Callable[[Run, Exception | None], Verdict | None]
     on_run: Callable[[Run], object] | None
+    progress: Callable[[int], object] | None
 
     def all(self, max_time: float) -> tuple[Counterexample | None, str]:
         """Try what the search asks for; return the counterexample, and why not all was tried."""
@@ -236,6 +244,8 @@ class _Tries:
             stopped_by = self.budget.take()
             if stopped_by:
                 return None, stopped_by
+            if self.progress is not None:
+                self.progress(self.budget.runs - 1)
             if self._was_done_elsewhere(prefix):
                 continue
             run, error = self.runner.run(prefix)

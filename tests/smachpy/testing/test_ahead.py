@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from smachpy.base.workers import WorkerProcess
+from smachpy.base import workers
+from smachpy.base.workers import WorkerProcess, Workers
 from smachpy.testing import explore
 from smachpy.testing.exploring import ahead
 
@@ -61,6 +62,24 @@ def test_what_is_found_does_not_depend_on_the_number_of_processes(mine, invarian
     assert seen[0][0][1] > 3
 
 
+class Others(Workers):
+    """Processes as a cluster has them: not begun, and not ended, by the exploration."""
+
+    count = 3
+
+
+def test_the_processes_of_a_cluster_find_the_same(mine):
+    alone = explore(mine.wide, max_runs=60, max_time=3600.0, jobs=1)
+    counts = []
+    with Others(Others.count) as cluster:
+        found = explore(
+            mine.wide, max_runs=60, max_time=3600.0, cluster=cluster, progress=counts.append
+        )
+        assert cluster.submit(os.getpid).result() != os.getpid()
+    assert facts(found) == facts(alone)
+    assert counts == list(range(60))
+
+
 def test_a_process_that_is_killed_costs_its_runs_again(mine, monkeypatch, tmp_path):
     alone = explore(
         mine.wide, invariants=[mine.is_killed_once], max_runs=60, max_time=3600.0, jobs=1
@@ -88,7 +107,7 @@ def test_nothing_is_left_after_ctrl_c(mine, monkeypatch):
             super().__init__()
             made.append(self)
 
-    monkeypatch.setattr(ahead, "WorkerProcess", Noted)
+    monkeypatch.setattr(workers, "WorkerProcess", Noted)
     count = 0
 
     def interrupt(_run):

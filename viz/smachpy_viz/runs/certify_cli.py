@@ -14,6 +14,8 @@ from actionlib_core.clock import RealClock
 from actionlib_core.command_line.numbers import between, seconds
 from actionlib_core.process.output import printable
 from smachpy.command import UsageError
+from smachpy.command.durable import whole_target
+from smachpy.command.on import add_jobs_and_on, opened_cluster
 from smachpy.command.queued import add_allow_packages
 from smachpy.command.run import add_input, read_inputs
 from smachpy.userdata.secret import MASK, hides, holds_secret
@@ -21,6 +23,7 @@ from smachpy.userdata.secret import MASK, hides, holds_secret
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from smachpy.base.cluster import Cluster
     from smachpy.command.arguments import Text
     from smachpy.command.explore import MissionMaker
 
@@ -92,9 +95,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser.add_argument(
         "--recordings", metavar="DIR", help="run these recordings again; all must be the same"
     )
-    parser.add_argument(
-        "--jobs", type=between(1), metavar="N", help="at the same time (default: all cores)"
-    )
+    add_jobs_and_on(parser)
     add_allow_packages(parser)
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="a new file, .json"
@@ -135,14 +136,15 @@ def _run(args: argparse.Namespace) -> int:
         "assumed": list(ASSUMED),
     }
     taken: dict[str, set[str]] = {"explored": set(), "simulated": set(), "recorded": set()}
-    for name, part in (
-        ("check", _checked(args, inputs)),
-        ("explore", _explored(args, inputs, taken["explored"])),
-        ("simulate", _simulated(args, inputs, taken["simulated"])),
-        ("reproduce", _reproduced(args, taken["recorded"])),
-    ):
-        evidence[name] = part
-        print(printable(f"{target.name}: {name}: {part['said']}"), flush=True)
+    with opened_cluster(args.on, _named(args), args.allow) as cluster:
+        for name, part in (
+            ("check", _checked(args, inputs)),
+            ("explore", _explored(args, inputs, taken["explored"], cluster)),
+            ("simulate", _simulated(args, inputs, taken["simulated"], cluster)),
+            ("reproduce", _reproduced(args, taken["recorded"], cluster)),
+        ):
+            evidence[name] = part
+            print(printable(f"{target.name}: {name}: {part['said']}"), flush=True)
     evidence["taken"] = {kind: sorted(found) for kind, found in taken.items()}
     evidence["ok"] = all(evidence[n]["ok"] for n in ("check", "explore", "simulate", "reproduce"))
     if mission_facts(target, args.mission) != mission:
@@ -155,6 +157,11 @@ def _run(args: argparse.Namespace) -> int:
     verdict = "all is good" if evidence["ok"] else "something was found"
     print(printable(f"{args.output}: {target.name} {mission['hash']}: {verdict}"))
     return 0 if evidence["ok"] else 1
+
+
+def _named(args: argparse.Namespace) -> str:
+    """Return the mission as those know it who do the runs."""
+    return args.mission if args.on is None else whole_target(args.mission)
 
 
 def _checked(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str, Any]:
@@ -187,11 +194,14 @@ def _checked(args: argparse.Namespace, inputs: Mapping[str, Text]) -> dict[str, 
 def _maker(args: argparse.Namespace, inputs: Mapping[str, Text]) -> MissionMaker:
     from smachpy.command.explore import MissionMaker
 
-    return MissionMaker(args.mission, inputs, imports=True, allow=tuple(args.allow))
+    return MissionMaker(_named(args), inputs, imports=True, allow=tuple(args.allow))
 
 
 def _explored(
-    args: argparse.Namespace, inputs: Mapping[str, Text], taken: set[str]
+    args: argparse.Namespace,
+    inputs: Mapping[str, Text],
+    taken: set[str],
+    cluster: Cluster | None,
 ) -> dict[str, Any]:
     from smachpy.command.explore import reckoning_states
     from smachpy.events.introspection import describe
@@ -209,6 +219,7 @@ def _explored(
         keep=keep,
         on_run=coverage.add,
         jobs=args.jobs,
+        cluster=cluster,
     )
     taken.update(coverage.machines[0].taken["edges"])
     leaves = [one.path for one in describe(machine).walk() if not one.is_container]
@@ -230,7 +241,10 @@ def _explored(
 
 
 def _simulated(
-    args: argparse.Namespace, inputs: Mapping[str, Text], taken: set[str]
+    args: argparse.Namespace,
+    inputs: Mapping[str, Text],
+    taken: set[str],
+    cluster: Cluster | None,
 ) -> dict[str, Any]:
     from smachpy.command.evidence import transitions_of
     from smachpy.events.recording import read_recording
@@ -240,8 +254,8 @@ def _simulated(
         return {"ok": True, "said": "no runs", "runs": 0, "outcomes": {}, "failed": []}
     given = [Vary(key, choices=(str(value),)) for key, value in inputs.items()]
     with tempfile.TemporaryDirectory(prefix="smachpy-certify-") as folder:
-        plan = SimulationPlan(args.mission, args.runs, Path(folder), given, allow=args.allow)
-        results = simulate(plan, jobs=args.jobs)
+        plan = SimulationPlan(_named(args), args.runs, Path(folder), given, allow=args.allow)
+        results = simulate(plan, cluster, jobs=args.jobs)
         for one in results:
             if one.outcome is not None:
                 taken |= transitions_of(read_recording(one.task.file).events)
@@ -258,7 +272,9 @@ def _simulated(
     }
 
 
-def _reproduced(args: argparse.Namespace, taken: set[str]) -> dict[str, Any]:
+def _reproduced(
+    args: argparse.Namespace, taken: set[str], cluster: Cluster | None
+) -> dict[str, Any]:
     from smachpy.command.evidence import transitions_of
     from smachpy.events.recording import find_recordings, read_recording
     from smachpy.reproduce.report import summary
@@ -272,8 +288,8 @@ def _reproduced(args: argparse.Namespace, taken: set[str]) -> dict[str, Any]:
         raise UsageError(
             f"smachpy certify: --recordings {args.recordings!r}: got none; expected *.jsonl files."
         )
-    options = Options(args.mission, tuple(args.allow))
-    verdicts = list(verdicts_of(paths, options, args.jobs))
+    options = Options(_named(args), tuple(args.allow))
+    verdicts = list(verdicts_of(paths, options, args.jobs, cluster))
     for one in verdicts:
         if one.kind != "failed":
             taken |= transitions_of(read_recording(one.path).events)

@@ -4,17 +4,31 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections import deque
+from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.process.output import printable
 from smachpy.command import UsageError
+from smachpy.command.durable import whole_target
+from smachpy.command.on import (
+    Progress,
+    add_jobs_and_on,
+    opened_cluster,
+    whole_place,
+    workers_text,
+)
 from smachpy.command.queued import add_allow
+from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from smachpy.base.cluster import Cluster
+    from smachpy.base.workers import Workers
     from smachpy.reproduce.report import Verdict
     from smachpy.reproduce.run import Reproduction
     from smachpy.reproduce.task import Options
@@ -56,9 +70,7 @@ def add(actions: Any) -> None:
         "it; may be repeated",
     )
     parser.add_argument("--seed", type=int, help="another order of what happens at one moment")
-    parser.add_argument(
-        "--jobs", type=int, metavar="N", help="at the same time (default: all cores)"
-    )
+    add_jobs_and_on(parser)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write a report for CI")
     parser.add_argument("--json", action="store_true", help="one JSON object per recording")
     parser.add_argument(
@@ -118,8 +130,6 @@ def _run(args: argparse.Namespace) -> int:
     from smachpy.reproduce.report import junit, summary
     from smachpy.reproduce.task import Options
 
-    if args.jobs is not None and args.jobs < 1:
-        raise UsageError(f"smachpy runs reproduce: --jobs: got {args.jobs}; expected 1 or more.")
     paths = [str(path) for path in find_recordings(args.places)]
     if not paths:
         raise UsageError(
@@ -127,10 +137,19 @@ def _run(args: argparse.Namespace) -> int:
             "files."
         )
     options = Options(args.mission, tuple(args.allow), args.seed, tuple(args.tolerate))
+    if args.on is not None:  # as the workers know them
+        mission, allow = whole_target(args.mission), map(whole_place, args.allow)
+        options = replace(options, mission=mission if args.mission else "", allow=tuple(allow))
     verdicts = []
-    for verdict in verdicts_of(paths, options, args.jobs, args.record):
-        verdicts.append(verdict)
-        _show(verdict, many=len(paths) > 1, as_json=args.json)
+    with opened_cluster(args.on, options.mission, options.allow) as cluster:
+        who = workers_text(cluster, args.jobs, len(paths))
+        progress = Progress(f"of {len(paths)} recordings", who)
+        for verdict in verdicts_of(paths, options, args.jobs, cluster, args.record):
+            progress.end()
+            verdicts.append(verdict)
+            _show(verdict, many=len(paths) > 1, as_json=args.json)
+            progress.show(len(verdicts))
+        progress.end()
     if len(paths) > 1 and not args.json:
         print(printable(summary(verdicts)))
     if args.junit is not None:
@@ -173,31 +192,59 @@ def _show(verdict: Verdict, *, many: bool, as_json: bool) -> None:
 
 
 def verdicts_of(
-    paths: list[str], options: Options, jobs: int | None, record: Path | None = None
+    paths: list[str],
+    options: Options,
+    jobs: int | None,
+    cluster: Cluster | None,
+    record: Path | None = None,
 ) -> Iterator[Verdict]:
-    """Yield the verdicts in the order of the files, whatever the number of processes."""
+    """Yield the verdicts in the order of the files, whoever does them."""
+    from smachpy.base.workers import Workers, cores
     from smachpy.reproduce.report import Verdict
     from smachpy.reproduce.task import reproduce_file
 
-    if len(paths) == 1:
+    if len(paths) == 1 and cluster is None:
         yield reproduce_file(paths[0], options, partial(_record, record))
         return
     if record is not None:
         raise UsageError(
-            f"smachpy runs reproduce: --record: got {len(paths)} recordings; expected one."
+            f"smachpy runs reproduce: --record: got {len(paths)} recordings, or --on; expected one "
+            "recording here."
         )
-    from smachpy.base.workers import WorkerError, Workers, cores
-
-    workers = Workers(min(jobs or cores(), len(paths)))
+    count = min(jobs or cores(), len(paths)) if cluster is None else cluster.count
+    workers = cluster or Workers(count)
+    begun: deque[tuple[str, Future[Verdict]]] = deque()
     try:
-        futures = [workers.submit(reproduce_file, path, options) for path in paths]
-        for path, future in zip(paths, futures, strict=True):
-            try:
-                yield future.result()
-            except (WorkerError, RuntimeError) as error:
-                yield Verdict(path, "failed", (f"{path}: {error}",))
+        for path in [*paths, *[""] * 2 * count]:  # no more than these are in memory at once
+            if path:
+                begun.append((path, _begun(workers, path, options)))
+            if begun and (not path or len(begun) > 2 * count):
+                name, future = begun.popleft()
+                try:
+                    yield future.result()
+                except (SmachError, RuntimeError, OSError) as error:
+                    yield Verdict(name, "failed", (f"{name}: {error}",))
     except BaseException:  # such as Ctrl-C
-        workers.kill()
+        if isinstance(workers, Workers):
+            workers.kill()
         raise
     finally:
-        workers.shutdown(cancel_futures=True)
+        if isinstance(workers, Workers):
+            workers.shutdown(cancel_futures=True)
+
+
+def _begun(workers: Workers | Cluster, path: str, options: Options) -> Future[Verdict]:
+    from actionlib_core.inputs.checked_file import read_limited
+    from smachpy.base.workers import Workers
+    from smachpy.events.recording import LARGEST
+    from smachpy.reproduce.task import reproduce_content, reproduce_file
+
+    if isinstance(workers, Workers):
+        return workers.submit(reproduce_file, path, options)
+    try:
+        content = read_limited(path, LARGEST)
+    except (OSError, ValueError) as error:
+        failed: Future[Verdict] = Future()
+        failed.set_exception(RuntimeError(str(error)))
+        return failed
+    return workers.submit(reproduce_content, path, content, options)

@@ -130,6 +130,7 @@ class SimulatedRun:
         file: File for the recording.
         limit: Virtual time after which the run is preempted [s].
         allow: Packages of which a mission file may name code.
+        sends: The recording is sent back: the file's folder is not that of the process which runs.
     """
 
     mission: str
@@ -139,6 +140,7 @@ class SimulatedRun:
     file: Path
     limit: float
     allow: Sequence[str] = ()
+    sends: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +151,7 @@ class Result:
         task: The run.
         outcome: None if it raised an exception, could not begin or did not end.
         error: The reason for no outcome.
-        recording: Content of the recording, if the worker does not have the task's folder.
+        recording: Content of the recording, if it is sent.
     """
 
     task: SimulatedRun
@@ -251,8 +253,7 @@ def simulate(
     Args:
         plan: The runs.
         executor: Does the runs; by default a pool of processes. Its workers need this package and
-            the mission; those on other computers, without the plan's folder, send their recordings
-            back.
+            the mission, and send their recordings back.
         on_result: Called in the caller's thread after each run.
         jobs: Number of processes in the default pool; by default one per core.
 
@@ -271,20 +272,22 @@ def simulate(
                 task.file, "the file exists; expected a new name, runs are never overwritten."
             )
     with contextlib.ExitStack() as stack:
+        sends = executor is not None
         if executor is None:
             executor = stack.enter_context(_pool(jobs, len(tasks)))
-        futures = {executor.submit(run_one, task): task for task in tasks}
+        futures = {executor.submit(run_one, replace(task, sends=sends)): task for task in tasks}
         results = {}
         # In the order of their ends, for the progress; the results are sorted at the end.
         for future in as_completed(futures):
             task = futures[future]
             error = future.exception()
             result = future.result() if error is None else Result(task, None, _words(error))
+            result = replace(result, task=task)
             if result.recording:
                 # Written at once and dropped: thousands of recordings would fill the memory.
                 with open_private(task.file, "wb") as file:
                     file.write(result.recording)
-                result = replace(result, task=task, recording=b"")
+                result = replace(result, recording=b"")
             results[task.number] = result
             on_result(result)
     return [results[task.number] for task in tasks]
@@ -333,15 +336,18 @@ def run_one(task: SimulatedRun) -> Result:
     try:
         with quiet, contextlib.ExitStack() as stack:
             here = task
-            if not task.file.parent.is_dir():  # on another computer
+            if task.sends:
                 folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="smachpy-run-"))
                 here = replace(task, file=Path(folder) / task.file.name)
             # An executor of threads runs this in the caller's process: restore its `random`.
             stack.callback(random.setstate, random.getstate())
             random.seed(task.seed)
             here.file.unlink(missing_ok=True)  # of a process that died
-            outcome, error = _execute(here)
-            recording = b"" if here is task else here.file.read_bytes()
+            try:
+                outcome, error = _execute(here)
+            except Exception as problem:  # noqa: BLE001  as below, and there may be a recording
+                outcome, error = None, _words(problem)
+            recording = here.file.read_bytes() if task.sends and here.file.exists() else b""
             return Result(task, outcome, error, recording)
     except Exception as error:  # noqa: BLE001  whatever the mission's code does is a result
         return Result(task, None, _words(error))

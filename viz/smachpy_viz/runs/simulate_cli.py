@@ -11,12 +11,12 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actionlib_core.clock import RealClock
 from actionlib_core.command_line.numbers import between
 from actionlib_core.process.output import printable
 from actionlib_core.process.private_files import make_private_folder
-from smachpy.base.workers import cores
 from smachpy.command import UsageError
+from smachpy.command.durable import whole_target
+from smachpy.command.on import Progress, add_jobs_and_on, opened_cluster, workers_text
 from smachpy.command.queued import add_allow_packages
 from smachpy.command.run import time_span
 
@@ -72,12 +72,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         default=1,
         help="the same seed makes the same runs (default: %(default)s)",
     )
-    parser.add_argument(
-        "--jobs",
-        type=between(1, MAX_RUNS),
-        metavar="N",
-        help="runs at the same time (default: one per core)",
-    )
+    add_jobs_and_on(parser)
     parser.add_argument(
         "--limit",
         type=time_span,
@@ -159,15 +154,19 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
                 f"{str(args.output.parent)!r}; expected one that exists."
             )
     before = None if args.compare is None else collect_one(args.compare, "simulate --compare")
-    plan = SimulationPlan(
-        args.mission, args.runs, folder, args.vary, args.seed, args.limit, args.allow
-    )
-    count = min(args.jobs or cores(), args.runs)
-    processes = "" if args.executor else f", {count} process{'es' * (count > 1)}"
-    progress = _RunCounter(args.runs, processes, as_json=args.json)
-    with _executor(args.executor) as executor:
+    if args.on is not None and args.executor is not None:
+        raise UsageError("smachpy simulate: got --on and --executor; expected one of them.")
+    mission = args.mission if args.on is None else whole_target(args.mission)
+    plan = SimulationPlan(mission, args.runs, folder, args.vary, args.seed, args.limit, args.allow)
+    plan.tasks()  # a mistake is to be told before the workers are asked
+    with (
+        opened_cluster(args.on, mission, args.allow) as cluster,
+        _executor(args.executor) as executor,
+    ):
+        who = "" if args.executor else workers_text(cluster, args.jobs, args.runs)
+        progress = _RunCounter(args.runs, who, as_json=args.json)
         try:
-            results = simulate(plan, executor, progress.on_result, jobs=args.jobs)
+            results = simulate(plan, cluster or executor, progress.on_result, jobs=args.jobs)
         finally:
             progress.end()
     failed = [result for result in results if result.outcome is None]
@@ -249,16 +248,14 @@ class _RunCounter:
     The lines are in the order of the runs, however many are done at the same time.
     """
 
-    def __init__(self, runs: int, processes: str, *, as_json: bool) -> None:
-        self._runs = runs
-        self._processes = processes
-        self._clock = RealClock()
-        self._begun = self._clock.now()
+    def __init__(self, runs: int, who: str, *, as_json: bool) -> None:
         self._done = 0
         self._json = as_json
         self._waiting: dict[int, Result] = {}
         self._printed = 0
-        self._shown = sys.stderr.isatty() and not as_json
+        shown = sys.stderr.isatty() and not as_json
+        self._progress = Progress(f"of {runs} runs", who, shown=shown)
+        self.end = self._progress.end
 
     def on_result(self, result: Result) -> None:
         """Count an ended run."""
@@ -276,14 +273,4 @@ class _RunCounter:
                 "seed": task.seed,
             }
             print(json.dumps(facts), flush=True)
-        if self._shown:
-            rate = self._done / max(1e-3, self._clock.now() - self._begun)
-            done = f"{self._done:d} of {self._runs:d} runs, {rate:.2g} per s"
-            sys.stderr.write(f"\r{printable(done + self._processes)}\x1b[K")
-            sys.stderr.flush()
-
-    def end(self) -> None:
-        """Remove the line from the terminal."""
-        if self._shown:
-            sys.stderr.write("\r\x1b[K")
-            sys.stderr.flush()
+        self._progress.show(self._done)
