@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import signal
 import threading
 import warnings
 from functools import partial
+from itertools import accumulate
 from typing import Any
 
 import pytest
@@ -15,7 +17,7 @@ from hypothesis import strategies as st
 import smachpy
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.interfaces.std_srvs.srv import Trigger
-from smachpy import Concurrence, State, StateMachine
+from smachpy import Concurrence, Iterator, State, StateMachine
 from smachpy.checks import check
 from smachpy.modes import Modes, ModesError, Table, on_service, on_signal, on_topic
 from smachpy.testing import explore, mission_kit, replay
@@ -600,3 +602,109 @@ def test_one_mission_at_a_time_one_clean_up_each_and_no_stop_is_lost(events, res
         releases = [t for t, event in events if event in {"reset", "go on"} and t >= at]
         assert entered_after(run, at, min([*releases, 200.0])) == []
     assert start <= run.events[-1].t
+
+
+GAPS = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0, 7.0]), EVENTS), max_size=10)
+LEAVES = st.one_of(st.sampled_from([0.0, 1.0, 7.0]), st.just("raises"))
+MISSIONS = st.recursive(
+    LEAVES,
+    lambda parts: st.tuples(
+        st.sampled_from(["machine", "concurrence", "iterator"]),
+        st.lists(parts, min_size=1, max_size=2),
+        st.booleans(),
+    ),
+    max_leaves=5,
+)
+
+
+@smachpy.state(["done", "preempted"])
+def raises(userdata: Any) -> str:
+    raise OSError("no motor")
+
+
+def made(part: Any) -> State:
+    """Build a random mission: a leaf, or a container of parts, maybe with a clean-up."""
+    if not isinstance(part, tuple):
+        return copy.copy(raises) if part == "raises" else Step(part)
+    kind, parts, cleans = part
+    container: Any
+    if kind == "iterator":
+        container = Iterator(
+            ["done", "preempted"], [], [], [1, 2][: len(parts)], exhausted_outcome="done"
+        )
+        container.set_contained_state("EACH", made(parts[0]), loop_outcomes=["done"])
+    elif kind == "concurrence":
+        container = Concurrence(["done", "preempted"], "done")
+    else:
+        container = StateMachine(["done", "preempted"])
+    for number, inner in enumerate(parts if kind != "iterator" else ()):
+        after = {"done": f"P{number + 1}"} if number + 1 < len(parts) else {}
+        words = (after,) if kind == "machine" else ()
+        container.add(f"P{number}", made(inner), *words)
+    if cleans:
+        container.add_cleanup("CLEAN", Step(1.0))
+    return container
+
+
+@pytest.mark.slow
+@example(  # a stop of the clean-ups, which begin again
+    [(1.0, "joy"), (0.5, "stop"), (1.0, "go on"), (0.5, "low")],
+    ("machine", [("concurrence", [7.0, ("machine", [7.0], True)], True)], True),
+    1.0,
+    True,
+)
+@settings(max_examples=60, deadline=None)
+@given(GAPS, MISSIONS, MISSIONS, st.booleans())
+def test_random_missions_run_one_at_a_time_clean_up_once_and_stop(gaps, auto, charge, resume):
+    times = accumulate([1.0, *(gap for gap, _ in gaps)])
+    events = [*zip(times, ["start", *(event for _, event in gaps)], strict=True)]
+
+    def mission_of(part: Any) -> Any:
+        return lambda: made(("machine", [part], True))
+
+    modes = Modes(
+        [
+            "idle",
+            {"name": "auto", "mission": mission_of(auto), "resume": resume},
+            "teleop",
+            {"name": "charging", "mission": mission_of(charge)},
+            "estop",
+        ],
+        WAYS,
+        emergency="estop",
+        name="ROBOT",
+    )
+    special = {"stop": stop, "go on": lambda m: m.release()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        run = run_of(modes, *[(at, special.get(event, event)) for at, event in events], end=300.0)
+    assert run.outcome == "preempted"
+    cleans = {path.rpartition("/")[0] for path in _cleanups(modes)}
+    active: list[str] = []
+    begun: dict[str, list[int]] = {}  # containers that run: children that began, clean-ups done
+    for event in run.events:
+        kind, path = type(event).__name__, event.path
+        around = path.rpartition("/")[0]
+        if kind == "Entered":
+            if path.count("/") == 2:
+                assert active == [], f"{path} begins beside {active}"
+                active = [path]
+            begun[path] = [0, 0]
+            if around in begun:
+                begun[around][0] += 1
+        elif kind in {"Left", "Failed"} and path != "/ROBOT":
+            if path.count("/") == 2:
+                active = []
+            if path.endswith("/CLEAN") and event.outcome == "done":
+                begun[around][1] += 1
+            children, cleaned = begun.pop(path)
+            if path in cleans:
+                assert cleaned == bool(children), f"{path}: cleaned up {cleaned} times"
+    for at in [at for at, event in events if event == "stop"]:
+        releases = [t for t, event in events if event in {"reset", "go on"} and t >= at]
+        assert entered_after(run, at, min([*releases, 300.0])) == []
+
+
+def _cleanups(modes: Modes) -> list[str]:
+    paths = [state.path for state in smachpy.describe(modes).walk()]
+    return [path for path in paths if path.endswith("/CLEAN")]
