@@ -88,6 +88,8 @@ def _wait_at_gate(frame: Frame, step: Step) -> None:
     choose(frame, step)
     if run.control is not None:
         run.control.pass_gate(frame, step)
+        if frame.tidying is not None:
+            frame.tidying.begins()
     if run.has_shutdown_check and is_shutdown() and not frame.is_in_cleanup():
         with asking("shutdown", "", "the shutdown check says so"):
             request_soon(frame.container)

@@ -14,7 +14,7 @@ from smachpy.base.context import current_frame
 from smachpy.engine.child import run_child
 from smachpy.engine.interrupt import Interruption
 from smachpy.engine.preempt import ask, asking, current_origin, grace_of
-from smachpy.engine.visit import Why
+from smachpy.engine.visit import CHOSEN, Why
 from smachpy.exceptions import InvalidUserCodeError, error_text
 
 if TYPE_CHECKING:
@@ -65,6 +65,16 @@ class Tidying:
             return
         self.requested = True
         self._origin = current_origin()
+        self._start_grace()
+
+    def begins(self) -> None:
+        """Give the clean-up its whole grace again: an operator may have held it before."""
+        with self._frame.run.lock:
+            if self.requested:
+                self.end()
+                self._start_grace()
+
+    def _start_grace(self) -> None:
         grace = grace_of(self._frame, self._step.state)
         if grace is not None:
             self._timer = self._frame.run.clock.call_later(grace, self._over)
@@ -73,7 +83,10 @@ class Tidying:
         frame = self._frame
         assert self._origin is not None
         with asking(*self._origin), frame.run.lock:
-            if frame.tidying is self and not frame.dead:
+            visit = frame.visit
+            held = frame.run.control is not None and (visit is None or visit.phase is CHOSEN)
+            # Called off while an operator holds it, it would never run: see `begins`.
+            if frame.tidying is self and not frame.dead and not held:
                 ask(frame, self._step)
         frame.run.flush_soon()
 

@@ -508,3 +508,18 @@ def test_each_machine_that_began_cleans_up_once_whenever_somebody_asks(tree, fir
         begun, cleaned = run.visits(f"{owner}/{first_child}"), run.visits(f"{owner}/Z")
         assert cleaned <= 1
         assert cleaned == 1 or not begun
+
+
+def test_it_is_not_lost_if_an_operator_holds_it_for_longer_than_its_grace():
+    """Asked to stop, then cancelled by a pause, it was called off after its grace."""
+    dock = Dock(5.0)
+    both = Concurrence(["done", "preempted"], "done", name="BOTH")
+    both.add("BROKEN", Raising())  # the other is asked to stop, and then its clean-up
+    both.add("WORK", machine_of(Step(0.0), dock))
+    with mission_kit() as mission:
+        mission.clock.call_later(1.0, lambda: both.control.pause(running="cancel"))
+        mission.clock.call_later(60.0, both.control.resume)
+        with pytest.raises(InvalidUserCodeError, match="no such door"):
+            mission(both)
+        assert mission.clock.now() >= 65.0
+    assert len(dock.endings) == 2

@@ -653,6 +653,12 @@ def made(part: Any) -> State:
     1.0,
     True,
 )
+@example(  # a stop of a clean-up that had been asked to hurry, for longer than its grace
+    [(0.5, "stop")],
+    ("concurrence", ["raises", ("machine", [0.0], True)], False),
+    0.0,
+    False,
+)
 @settings(max_examples=60, deadline=None)
 @given(GAPS, MISSIONS, MISSIONS, st.booleans())
 def test_random_missions_run_one_at_a_time_clean_up_once_and_stop(gaps, auto, charge, resume):
