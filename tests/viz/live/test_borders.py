@@ -139,7 +139,7 @@ def use(machines, *, drawn=True):
             side = (name, machine.record, machine.events())
             json.dumps(compared(side, side), allow_nan=False)
             for make, _ in EXPORTS.values():
-                make(machine, machine.record)
+                make(machine, machine.record, "", [])
         marks, scene, state = History(), Scene(machine.record, "/one"), RunState()
         for one in machine.events():
             marks.on_record(one)
