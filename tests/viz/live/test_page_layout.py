@@ -354,3 +354,15 @@ def test_titles_that_are_enlarged_stay_inside_their_containers(served, look):
     assert {one["name"] for one in sizes} == {"CHAIN", "RECHARGE_THE_BATTERY"}
     assert max(one["font"] for one in sizes) > 11  # enlarged
     assert all(one["over"] < 0 for one in sizes)
+
+
+def test_an_outline_is_offered_where_names_are_small(served, look):
+    served.add("deep", sm=nested(4, 2))
+    page = look(served.start())
+    outline = page.get_by_role("button", name="Outline")
+    all_levels(page)
+    wait_for(page, "smachpy.page.view.k < 0.9")
+    outline.click()
+    wait_for(page, "smachpy.store.view.opened.value.size === 1")
+    wait_for(page, "!smachpy.store.view.namesAreSmall.value")
+    outline.wait_for(state="detached")

@@ -3329,6 +3329,8 @@ var View = class {
   // the name under which answers are given
   tokenAsked = y3(false);
   // whether the viewer refused this page's token
+  namesAreSmall = y3(false);
+  // names of states in the diagram, under 11 px
   treeOpen = y3(false);
   // on small screens, where the tree covers the page
   overview = y3(false);
@@ -7926,6 +7928,7 @@ function describe2(span) {
 }
 
 // src/drawing/page.ts
+var READABLE4 = 0.98;
 var Page = class {
   map;
   diagram;
@@ -7952,6 +7955,7 @@ var Page = class {
     this.diagram = new Diagram(svg2, (path, active) => this.minimap.light(path, active));
     this.view = new Viewport(svg2, this.diagram.world, () => {
       this.diagram.showScale(this.view.k);
+      store.view.namesAreSmall.value = this.view.k < READABLE4;
       this.minimap.showWindow(this.view);
     });
     this.timeline = new Timeline(canvas2, {
@@ -17576,7 +17580,13 @@ function TimeTools() {
   ] });
 }
 function ZoomButtons() {
+  const { view: view2 } = store;
+  const outline = () => {
+    if (view2.opened.value.size > 1) page.layouts.setDepth(1);
+    else view2.treeOpen.value = true;
+  };
   return /* @__PURE__ */ a4("span", { class: "zoom", children: [
+    view2.namesAreSmall.value && (view2.opened.value.size > 1 || view2.isPhone.value) && /* @__PURE__ */ a4("button", { title: "the names are small: show less of the machine", onClick: outline, children: "Outline" }),
     /* @__PURE__ */ a4("button", { title: "smaller (-)", "aria-label": "zoom out", onClick: () => page.view.zoom(0.8), children: "−" }),
     /* @__PURE__ */ a4("button", { title: "larger (+)", "aria-label": "zoom in", onClick: () => page.view.zoom(1.25), children: "+" }),
     /* @__PURE__ */ a4("button", { title: "show everything (0)", onClick: () => page.layouts.refit(), children: "Fit" })

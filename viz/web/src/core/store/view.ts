@@ -26,6 +26,7 @@ export class View {
   readonly sound: Signal<boolean> = signal(saved("sound", true)); // whether a new question makes a sound
   readonly operator: Signal<string> = signal(saved("operator", "")); // the name under which answers are given
   readonly tokenAsked = signal(false); // whether the viewer refused this page's token
+  readonly namesAreSmall = signal(false); // names of states in the diagram, under 11 px
   readonly treeOpen = signal(false); // on small screens, where the tree covers the page
   readonly overview = signal(false); // whether states are tiles without arrows, because many are open
   readonly laidOut: Signal<{ done: number; all: number } | null> = signal(null); // progress of a long layout [states]
