@@ -161,12 +161,14 @@ def _reason(row: MissionRow, holders: list[MissionRow]) -> str:
         return ""
     reasons = [
         f"waits: {what} {name!r} is used by mission {other.id}"
+        + (", which was interrupted: resume or forget it" if other.status == INTERRUPTED else "")
         for other in holders
         for what, name, used in (
             ("robot", row.held_robot, other.held_robot),
             ("group", row.group, other.group),
         )
         if other.id != row.id and name is not None and name == used
+        if row.status == QUEUED or other.status != INTERRUPTED
     ]
     return "; ".join([*reasons, *([row.note] if row.note else [])])
 

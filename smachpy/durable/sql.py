@@ -358,11 +358,16 @@ class SqlStore(ABC):
     def holders(self) -> list[MissionRow]:
 
         def work(cursor: Cursor, _: bool) -> list[MissionRow]:
-            columns = f"{_COLUMNS}, {_HELD}"
-            self._do(cursor, f"SELECT {columns} FROM smachpy_missions WHERE owner IS NOT NULL")
+            select = f"SELECT {_COLUMNS}, {_HELD} FROM smachpy_missions WHERE"
+            begun = "status = 'interrupted' AND waits = 0 AND owner IS NULL"
+            self._do(cursor, f"{select} owner IS NOT NULL UNION ALL {select} {begun}")
             rows, now = cursor.fetchall(), self._now(cursor)
-            held = len(_COLUMNS.split(", "))
-            return [self._row(row, now) for row in rows if not self._may_take(row[held:], now)]
+            return [
+                mission
+                for row in rows
+                if (mission := self._row(row, now)).status == INTERRUPTED
+                or not self._may_take(row[len(_FIELDS) :], now)
+            ]
 
         return self._transact(work, reads=True)
 
@@ -505,16 +510,21 @@ class SqlStore(ABC):
             conditions += "AND NOT (m.target = ? AND m.structure = ?) "
             values += [target, shape]
         # Evaluated once, unlike `NOT EXISTS`: a long queue may wait for one robot.
-        held = (
-            "NOT IN (SELECT {0} FROM smachpy_missions WHERE owner IS NOT NULL AND {0} IS NOT NULL)"
+        used = "SELECT {0} FROM smachpy_missions WHERE owner IS NOT NULL AND {0} IS NOT NULL"
+        begun = (
+            " UNION ALL SELECT {0} FROM smachpy_missions WHERE status = 'interrupted' "
+            "AND waits = 0 AND owner IS NULL AND {0} IS NOT NULL"
         )
-        robot, robots_held = _ROBOT.format("m."), held.format(_ROBOT.format(""))
+        robot = _ROBOT.format("m.")
 
         # If the answer is lost, nobody uses the reservation; `look` frees it when it has expired.
         def work(cursor: Cursor, _: bool) -> tuple[MissionRow, Lease] | None:
             now = self._now_text()
             for status in (INTERRUPTED, QUEUED):
                 late = f"AND (m.not_after IS NULL OR m.not_after > {now}) "
+                # The goals of a mission that was interrupted may still drive its robot: until it
+                # goes on or is cancelled, no other one begins there.
+                held = f"NOT IN ({used}{begun if status == QUEUED else ''})"
                 self._do(
                     cursor,
                     "UPDATE smachpy_missions SET owner = ?, mark = ?, fence = fence + 1, "
@@ -522,7 +532,7 @@ class SqlStore(ABC):
                     "WHERE id = (SELECT m.id FROM smachpy_missions AS m "
                     f"WHERE m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL "
                     f"{late if status == QUEUED else ''}{conditions}"
-                    f"AND ({robot} IS NULL OR {robot} {robots_held}) "
+                    f"AND ({robot} IS NULL OR {robot} {held.format(_ROBOT.format(''))}) "
                     f"AND (m.grp IS NULL OR m.grp {held.format('grp')}) "
                     f"ORDER BY m.priority DESC, m.ready, m.id LIMIT 1{self.dialect.skip_locked}) "
                     f"RETURNING {_COLUMNS}, {_HELD}, fence",

@@ -213,7 +213,11 @@ class Store(Protocol):
         ...
 
     def holders(self) -> list[MissionRow]:
-        """Return the missions that a process runs or is about to run."""
+        """Return the missions that hold their robot and group.
+
+        A process runs them or is about to, or they were interrupted: goals of theirs may still
+        drive the robot.
+        """
         ...
 
     def look(self, *, robots: Collection[str] = ()) -> QueueNews:

@@ -93,6 +93,19 @@ def test_a_robot_and_a_group_have_one_mission_at_a_time(store):
     assert taken(store) == ["e"]
 
 
+def test_what_was_interrupted_keeps_its_robot_and_group_until_it_is_over(store):
+    """A runner that could not go on with it began another mission while the robot still drove."""
+    put(store, "begun", robot="/r1", group="lift")
+    store.release(store.claim("begun", this_runner(), seconds=LONG_S), "interrupted")
+    put(store, "robot", robot="r1")
+    put(store, "group", group="lift")
+    put(store, "other", robot="r2")
+    assert taken(store, leave=["begun"]) == ["other"]
+    assert "begun" in {row.id for row in store.holders()}
+    store.forget("begun")
+    assert sorted(taken(store)) == ["group", "robot"]
+
+
 def test_what_a_runner_leaves_stays_for_others(store):
     for name in "abc":
         put(store, name, robot=f"r{name}", target=f"{name}.py")
