@@ -178,6 +178,8 @@ class Recorder(RunJournal):
         }
         self._knowledge: dict[str, Any] = {}  # path of a plan -> its conditions and events
         self._known_changes: dict[str, int] = {}  # path of a plan -> its changes that were written
+        # Container -> child -> keys that it writes while it runs, side by side with others.
+        self._writes: dict[str, dict[str, frozenset[str]]] = {}
         # Path -> key -> the value, and its JSON, or the digest of a long one, as last written.
         self._known: dict[str, dict[str, tuple[Any, str]]] = {}
         for path, container in self._containers.items():
@@ -245,7 +247,7 @@ class Recorder(RunJournal):
             if value:
                 entry[value] = journal.compact(facts[value], json.dumps(facts[value]))
             if frame is not None:
-                entry.update(self._changes(frame, step))
+                entry.update(self._changes(frame, step, path))
             if entry.pop("only_changes", False) and "userdata" not in entry:
                 return True
             number = journal.put(entry)
@@ -268,11 +270,14 @@ class Recorder(RunJournal):
         with asking("program", "journal", str(error)):
             request_soon(self._machine)
 
-    def _changes(self, frame: Frame, step: Step | None) -> dict[str, Any]:
-        """Return the changes in the userdata of the container of `frame`, for an entry.
+    def _changes(self, frame: Frame, step: Step | None, child: str) -> dict[str, Any]:
+        """Return the changes in the userdata of the container of `frame`, for an entry of `child`.
 
         A state may change a list or message in place, so identity proves nothing for the values
         that `step` can write, or for all without a `step`: their JSON is compared.
+
+        What only others write that run side by side is not in it. It is written as they end: one
+        that is executed again after a kill begins with the userdata with which it began.
         """
         userdata = frame.container.userdata
         path = self._homes.get(id(userdata))
@@ -281,8 +286,11 @@ class Recorder(RunJournal):
         written = None if step is None else set(getattr(step.userdata, "_output", {}).values())
         data = dict(data_of(userdata))  # a copy, as other branches may write at the same time
         known = self._known.setdefault(path, {})
+        others = self._written_by_others(frame.path, child)
         changed: dict[str, Any] = {}
         for key, value in data.items():
+            if key in others:
+                continue
             before = known.get(key)
             if before is not None and before[0] is value:
                 if type(value) in ATOMS or (written is not None and key not in written):
@@ -295,11 +303,21 @@ class Recorder(RunJournal):
             if before is None or before[1] != short:
                 changed[key] = self._journal.compact(encoded, text)
             known[key] = (value, short)
-        gone = [key for key in known if key not in data]
+        gone = [key for key in known if key not in data and key not in others]
         for key in gone:
             del known[key]
         found: dict[str, Any] = {"userdata": {path: changed}} if changed else {}
         return {**found, "deleted": {path: gone}} if gone else found
+
+    def _written_by_others(self, container: str, child: str) -> frozenset[str]:
+        """Return the keys that only siblings of a child write that run now."""
+        visits, writes = self._journal.position.visits, self._writes.get(container, {})
+        found: frozenset[str] = frozenset()
+        for each, keys in writes.items():
+            visit = visits.get(each)
+            if each != child and visit is not None and visit["outcome"] is None:
+                found |= keys
+        return found - writes.get(child, frozenset()) if found else found
 
     def _is_kept(self, path: str, key: str, value: object) -> bool:
         """Return whether a key is kept; constants come from the machine's code."""
@@ -374,6 +392,7 @@ class Recorder(RunJournal):
         if frame.path not in self._containers:
             return None  # a state runs this container by itself; it is not part of the machine
         path = step.path_in(frame)
+        self._note_writes(frame, step, path)
         visit = self._unresumed.pop(path, None)
         outcome: str | None = None
         if visit is None:
@@ -409,6 +428,14 @@ class Recorder(RunJournal):
                 ask(frame, step)
             frame.run.flush()
         return outcome
+
+    def _note_writes(self, frame: Frame, step: Step, path: str) -> None:
+        """Note what a leaf writes while others run beside it; a container does so as it ends."""
+        kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
+        if kind in {"concurrence", "plan"} and not isinstance(step.state, Container):
+            keys = frozenset(getattr(step.userdata, "_output", {}).values())
+            with self._journal.lock:
+                self._writes.setdefault(frame.path, {})[path] = keys
 
     def _held_outcome(
         self, step: Step, visit: dict[str, Any] | None, outcome: str | None

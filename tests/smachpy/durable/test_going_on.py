@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -654,3 +655,50 @@ def test_a_dot_does_not_take_a_key_past_the_check_of_typed_userdata() -> None:
     state = smachpy.CBState(fine, outcomes=["ok"], output_keys=["arm.pose"])
     with pytest.raises(smachpy.InconsistentMachineError, match=r"arm\.pose"), machine:
         StateMachine.add("A", state)
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_a_branch_begins_again_with_the_values_with_which_it_began(
+    store: KillingStore, in_place: bool
+) -> None:
+    """The end of another branch had written the half-finished work of this one into the journal."""
+    begun: list[Any] = []
+    wrote, other_left = threading.Event(), threading.Event()
+
+    def work(_: State, userdata: Any) -> str:
+        begun.append(list(userdata.value))
+        if in_place:
+            userdata.value.append("work")
+        else:
+            userdata.value = [*userdata.value, "work"]
+        if len(begun) == 1:
+            wrote.set()
+            assert other_left.wait(60)
+            store.dead = True
+        return "ok"
+
+    def other(_: State, userdata: Any) -> str:
+        assert wrote.wait(60)
+        userdata.value = "done"
+        return "ok"
+
+    def live() -> tuple[str, dict[str, Any]]:
+        machine = Concurrence(["ok"], "ok", name="M")
+        machine.userdata.value, machine.userdata.other = [], ""
+        with machine:
+            machine.add("WORK", Doing(work))
+            machine.add("OTHER", Doing(other), remapping={"value": "other"})
+        machine.subscribe(
+            lambda event: (
+                other_left.set()
+                if isinstance(event, events.Left) and event.path == "/M/OTHER"
+                else None
+            )
+        )
+        return smachpy.run_durable(machine, store, mission="m"), dict(machine.userdata)
+
+    with pytest.raises(Kill):
+        live()
+    store.arm(0, written=False)
+    assert live() == ("ok", {"value": ["work"], "other": "done"})
+    assert begun == [[], []]
