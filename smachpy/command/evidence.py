@@ -232,8 +232,8 @@ def check_evidence(places: Sequence[str], target: Target, text: str) -> Seal:
     seal = find_seal(places, target, text)
     if not seal.is_valid:
         raise EvidenceError(
-            f"mission {target.name!r}: evidence: got {seal.text}; expected one that is good. "
-            f"Try 'smachpy certify {text} -o FILE'."
+            f"mission {target.name!r}: evidence: got none that is good ({seal.text}); expected "
+            f"one of these files. Try 'smachpy certify {text} -o FILE'."
         )
     return seal
 

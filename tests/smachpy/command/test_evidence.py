@@ -137,7 +137,7 @@ def test_a_mission_with_evidence_runs_until_it_is_changed(folder, capsys):
     assert main(run) == 0
     Path("evidence_parts/second.py").write_text("def part():\n    return 7\n")
     assert main(run) == 2
-    assert "evidence: got none of this mission; hash " in capsys.readouterr().err
+    assert "evidence: got none that is good (none of this mission; hash " in capsys.readouterr().err
 
 
 def noted(capsys, *words, code=0):
