@@ -548,7 +548,8 @@ def _target(text: str, name: str, source: str, thing: Any) -> Target:
 
 
 def _suggest(word: str, names: list[str]) -> str:
-    return f"expected one of {sorted(names)}.{did_you_mean(word, names)}"
+    expected = f"one of {sorted(names)}" if names else "one that is there"
+    return f"expected {expected}.{did_you_mean(word, names)}"
 
 
 def raised_text(error: BaseException, said: str = "") -> str:

@@ -302,6 +302,13 @@ def test_a_file_may_change_the_folder_and_the_python_path(file, monkeypatch, lin
     assert load_target("drive_about.py").build().execute() == "done"
 
 
+@pytest.mark.parametrize("name", ["drive.yaml", "drive.pnml"])
+def test_where_no_file_of_its_kind_is_no_list_of_them_is_shown(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TargetError, match=f"no file '{name}'; expected one that is there\\."):
+        load_target(name)
+
+
 def test_a_folder_is_not_suggested_as_a_file(tmp_path):
     (tmp_path / "drive.py").mkdir()
     with pytest.raises(TargetError, match=r"no file .*drive\.py'\. Try 'smachpy new drive'\.\n"):
