@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -71,9 +72,10 @@ def run(tmp_path):
 def viewer_of(process):
     """The process id of the viewer that a mission has started."""
     for task in Path(f"/proc/{process.pid}/task").iterdir():
-        for word in (task / "children").read_text().split():
-            if b"view" in Path(f"/proc/{word}/cmdline").read_bytes().split(b"\0"):
-                return int(word)
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # another one has ended
+            for word in (task / "children").read_text().split():
+                if b"view" in Path(f"/proc/{word}/cmdline").read_bytes().split(b"\0"):
+                    return int(word)
     raise AssertionError("no viewer")
 
 
