@@ -920,7 +920,8 @@ def leave(frame: Frame) -> None:
 
     An interruption may end this, then it must be called again.
     """
-    leave_inner(frame)
+    if frame.first.innermost is not frame:
+        leave_inner(frame)
     live = frame.live
     with frame.run.lock:
         if frame.dead:
