@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias
 from weakref import WeakKeyDictionary
 
 from actionlib_core.clock import RealClock
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 Policy: TypeAlias = Literal["wait", "preempt", "refuse"]
 """What a claim does while another one holds the resource."""
-
-POLICIES: Final[tuple[str, ...]] = get_args(Policy)
 
 
 @dataclass(slots=True, eq=False)

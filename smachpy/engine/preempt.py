@@ -920,8 +920,7 @@ def leave(frame: Frame) -> None:
 
     An interruption may end this, then it must be called again.
     """
-    if frame.first.innermost is not frame:
-        leave_inner(frame)
+    leave_inner(frame)
     live = frame.live
     with frame.run.lock:
         if frame.dead:
