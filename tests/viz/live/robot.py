@@ -134,17 +134,22 @@ def hostile(pace, args):
 
 
 def asking(pace, args):
-    """Asks again and again, with a picture."""
+    """Asks again and again, with a picture: by turns in two states, so that an answer stays on the page."""
     sm = StateMachine(outcomes=OUTCOMES, name="ERRAND")
-    question = AskOperator(
-        "Delivery to lab: may I hand it over?",
-        {"yes": "Yes, hand over", "no": "No, come back"},
-        patience=args.ask,
-        picture=lambda _userdata: PNG,
-    )
+
+    def ask(after):
+        question = AskOperator(
+            "Delivery to lab: may I hand it over?",
+            {"yes": "Yes, hand over", "no": "No, come back"},
+            patience=args.ask,
+            picture=lambda _userdata: PNG,
+        )
+        return question, {"yes": after, "no": after, "no_answer": "aborted"}
+
     with sm:
         StateMachine.add("GO", Work(pace), {"succeeded": "CONFIRM"})
-        StateMachine.add("CONFIRM", question, {"yes": "GO", "no": "GO", "no_answer": "aborted"})
+        StateMachine.add("CONFIRM", *ask("CONFIRM_AGAIN"))
+        StateMachine.add("CONFIRM_AGAIN", *ask("GO"))
     return sm
 
 
