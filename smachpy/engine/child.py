@@ -17,9 +17,12 @@ from smachpy.events import Entered, Failed, Left
 from smachpy.exceptions import SmachError, error_text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from smachpy.engine.frame import Frame
     from smachpy.engine.step import Step
     from smachpy.engine.visit import Decision
+    from smachpy.events import Event
 
 _new = tuple.__new__  # takes half as long as the `__new__` of a NamedTuple
 
@@ -104,24 +107,37 @@ def _watched(frame: Frame, step: Step) -> Any:
     clock, path = run.clock, step.path_in(frame)
     if run.pending:
         run.flush()
-    frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
     try:
+        frame.publish(_new(Entered, (path, clock.now(), clock.time_ns())))
         window = step.watched_userdata(frame) if step.writes else step.userdata
         outcome = run.journal.execute(frame, step, window)
     except Interruption:
-        frame.emit_at(path, Left, "preempted")
+        _tell_end(frame, path, Left, "preempted")
         raise
     except BaseException as error:
-        frame.emit_at(path, Failed, error_text(error), trace_of(error))
+        _tell_end(frame, path, Failed, error_text(error), trace_of(error))
         raise
     if visit is not None and visit.phase is not RUNNING and visit.has_answered(outcome):
         visit.service()
     if run.pending:
-        run.flush()
-    text = outcome
-    if type(outcome) is not str:  # one that is no string at all is refused right after this
-        text = plain(outcome) if isinstance(outcome, str) else repr(outcome)
-    frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), text)))
+        uninterrupted(frame, run.flush)
+    text = outcome if type(outcome) is str else _text_of(outcome)
+    try:
+        frame.publish(_new(Left, (path, clock.now(), clock.time_ns(), text)))
+    except Interruption:  # of a listener: the child has ended, which counts
+        if frame.dead:
+            raise
     if run.control is not None:
         run.control.note_outcome(frame, step, outcome)
     return outcome
+
+
+def _text_of(outcome: object) -> str:
+    """Return the text of an outcome; one that is no string at all is refused right after this."""
+    return plain(outcome) if isinstance(outcome, str) else repr(outcome)
+
+
+def _tell_end(frame: Frame, path: str, kind: Callable[..., Event], *fields: Any) -> None:
+    """Publish how a child ended: queued first, as a further interruption may come at any step."""
+    frame.note(path, kind, *fields)
+    uninterrupted(frame, frame.run.flush)

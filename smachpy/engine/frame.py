@@ -19,6 +19,7 @@ from smachpy.base.context import current_frame
 from smachpy.base.log import MESSAGES
 from smachpy.base.problems import name_of
 from smachpy.engine.described import EPOCH
+from smachpy.engine.interrupt import Interruption
 from smachpy.engine.shutdown_check import SHUTDOWN_CHECK
 from smachpy.events import CallbackFailed, Preempted
 from smachpy.exceptions import error_text
@@ -313,23 +314,34 @@ class Frame:
     def publish(self, event: Event, subscribers: Subscribers | None = None) -> None:
         """Give `event` to the listeners of this container and of all above it.
 
-        A listener that raises is reported in the log; the others still get the event.
+        A listener that raises is reported in the log, and an interruption ends only the listener
+        in which it comes; the others still get the event.
 
         Args:
             event: The event.
             subscribers: Those who get it; None: those of now.
+
+        Raises:
+            Interruption: it came in a listener.
         """
         if subscribers is None:
             subscribers = self.subscribers
             if subscribers is None or subscribers.epoch is not EPOCH.value:
                 subscribers = self.find_subscribers()
-        for listener in subscribers.all:
-            try:
-                listener(event)
-            except Exception as error:  # noqa: BLE001  the user's listener: reported in the log
-                where = f"{self.path or self.here()}: listener {name_of(listener)}"
-                on = type(event).__name__
-                log.log_exception(f"{where} raised {error_text(error)} on {on}", error)
+        listeners = subscribers.all
+        try:
+            for listener in listeners:
+                try:
+                    listener(event)
+                except Exception as error:  # noqa: BLE001  the user's: reported in the log
+                    where = f"{self.path or self.here()}: listener {name_of(listener)}"
+                    on = type(event).__name__
+                    log.log_exception(f"{where} raised {error_text(error)} on {on}", error)
+        except Interruption:
+            if not self.dead:
+                rest = listeners[listeners.index(listener) + 1 :]
+                self.publish(event, subscribers._replace(all=rest))
+            raise
 
     def find_subscribers(self) -> Subscribers:
         """Look up the subscribers of this frame, and keep them until somebody comes or goes."""

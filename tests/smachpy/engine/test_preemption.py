@@ -21,7 +21,15 @@ from actionlib_core.clock import RealClock, VirtualClock, current_clock, use_clo
 from smachpy.base.context import current_frame
 from smachpy.engine import frame, preempt, step
 from smachpy.engine.interrupt import Interruption
-from smachpy.events import Abandoned, Entered, Left, Preempted, PreemptRequested
+from smachpy.events import (
+    Abandoned,
+    CallbackFailed,
+    Entered,
+    Failed,
+    Left,
+    Preempted,
+    PreemptRequested,
+)
 
 
 class Work(smachpy.State):
@@ -743,6 +751,40 @@ def test_interruptions_in_a_row_end_with_the_run(depth, further, monkeypatch):
         monkeypatch.setattr(owner, name, interrupting(place, getattr(owner, name)))
     assert sm.execute() == "preempted"
     assert not visits[0]._is_on()
+    assert_clean(sm)
+
+
+@pytest.mark.parametrize("during", [CallbackFailed, (Left, Failed)])
+@pytest.mark.parametrize("how", ["preempted", "ok", "ValueError: gripper"])
+def test_an_interruption_in_a_listener_hides_no_end_from_the_others(how, during):
+    """On a busy computer it comes while the child's end, or what is before it, is being told."""
+    before, after, interrupted = [], [], []
+
+    def end():
+        sm.request_preempt()
+        current_frame().note("/SM_ROOT", CallbackFailed, "is published before the end", "")
+        if how == "preempted":
+            raise Interruption
+        if how != "ok":
+            raise ValueError("gripper")
+
+    def interrupt(event):
+        if isinstance(event, during) and not interrupted:
+            interrupted.append(event)
+            raise Interruption
+
+    sm = chain(Ignores(end, preempt_timeout=None))
+    for listener in (before.append, interrupt, after.append):
+        sm.subscribe(listener)
+    if how.startswith("ValueError"):
+        with pytest.raises(smachpy.InvalidUserCodeError, match="gripper"):
+            sm.execute()
+    else:
+        sm.execute()
+    assert interrupted
+    for heard in (before, after):
+        ends = [event for event in heard if isinstance(event, (Left, Failed))]
+        assert [event[3] for event in ends] == [how]
     assert_clean(sm)
 
 
