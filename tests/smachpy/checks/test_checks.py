@@ -782,15 +782,6 @@ def test_the_run_that_shows_a_problem_is_drawn(tmp_path):
     assert "ABORT" in file.read_text()
 
 
-def test_a_check_takes_milliseconds():
-    children = [(f"S{i}", Leaf("done", "failed"), {"done": f"S{i + 1}"}) for i in range(99)]
-    sm = machine(*children, ("S99", Leaf("done", "failed"), {}), outcomes=["done", "failed"])
-    check(sm)
-    begun = time.process_time()
-    check(sm)
-    assert time.process_time() - begun < 0.2
-
-
 def test_a_report_is_true_when_it_is_ok_and_gives_its_problems():
     noted = check(machine(("WRITE", Leaf(output_keys=["junk"]), {})))
     assert (bool(noted), len(noted), [p.severity for p in noted]) == (True, 1, ["note"])

@@ -162,11 +162,9 @@ def test_a_loop_in_which_no_time_passes(outcomes):
     sm = StateMachine(outcomes, name="M")
     with sm.opened(check=False):
         sm.add("A", CBState(lambda _: "again", outcomes=["again"]), {"again": "A"})
-    begun = time.process_time()
     found = explore(sm, keep=["A"], max_time=0.5, steps=10_000)
     assert reason(found).startswith("it never ends: /M: it took 10000 steps at 0 s, in /M/A")
     assert "or try explore(..., steps=...)" in reason(found)
-    assert time.process_time() - begun < 30
 
 
 def through(item, count):
@@ -374,14 +372,6 @@ def test_explored_runs_are_the_same_twice():
         return found.runs, found.counterexample.choices, found.counterexample.run.explain()
 
     assert len({verdict() for _ in range(3)}) == 1
-
-
-def test_exploring_costs_little():
-    begun = time.process_time()
-    with mission_kit() as mission:
-        found = mission.explore(sound(), max_runs=300, max_time=60, invariants=[lambda run: True])
-    assert found.ok
-    assert (time.process_time() - begun) / found.runs < 0.01
 
 
 def test_equal_situations_are_entered_once_and_nothing_is_missed():

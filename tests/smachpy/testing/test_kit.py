@@ -468,35 +468,6 @@ def test_seeds_give_the_same_events_twice():
     assert len({tuple(run) for run in first}) > 3
 
 
-def test_ten_thousand_transitions_cost_little_more_than_in_real_time():
-    left = [0]
-
-    def step(ud):
-        left[0] -= 1
-        return "again" if left[0] else "done"
-
-    sm = StateMachine(["done"], name="M")
-    with sm:
-        sm.add("A", CBState(step, outcomes=["again", "done"]), {"again": "A"})
-
-    def cost(run):
-        best = 1e9
-        for _ in range(3):
-            left[0] = 10_000
-            begun = time.process_time()
-            run()
-            best = min(best, time.process_time() - begun)
-        return best
-
-    # With the same listener: a mission under test is always watched.
-    events = []
-    unsubscribe = sm.subscribe(events.append)
-    real = cost(sm.execute)
-    unsubscribe()
-    with mission_kit() as mission:
-        assert cost(lambda: mission(sm)) < 5 * real
-
-
 def timed():
     sm = StateMachine(["succeeded", "aborted", "preempted"], name="TIMED")
     with sm:
