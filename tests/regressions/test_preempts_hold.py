@@ -18,6 +18,7 @@ from actionlib_core.node import Node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy import Concurrence, Iterator, State, StateMachine
+from smachpy.base.context import current_frame
 from smachpy.engine.preempt import on_preempt
 from smachpy.events import (
     Abandoned,
@@ -29,7 +30,7 @@ from smachpy.events import (
 )
 from smachpy.network.server import IntrospectionServer
 
-LONG_S = 20.0
+LONG_S = 60.0
 
 
 class Work(State):
@@ -790,9 +791,26 @@ def test_a_request_between_two_attempts_of_the_root_is_heard_and_told(clock):
     assert not machine.preempt_requested()
 
 
+class Awaited:
+    """A lock that tells when a thread has to wait for it."""
+
+    def __init__(self, lock, awaited):
+        self.lock = lock
+        self.awaited = awaited
+
+    def __enter__(self):
+        if not self.lock.acquire(blocking=False):
+            self.awaited.set()
+            self.lock.acquire()
+
+    def __exit__(self, *_):
+        self.lock.release()
+
+
 def test_requests_that_begin_at_different_containers_do_not_wait_for_each_other():
     """A callback below asks the root while another thread passes the root's request on."""
-    below, above = threading.Event(), threading.Event()
+    begun, below, above = threading.Event(), threading.Event(), threading.Event()
+    met = []
 
     class Both(State):
         def __init__(self):
@@ -800,36 +818,34 @@ def test_requests_that_begin_at_different_containers_do_not_wait_for_each_other(
 
         def execute(self, userdata):
             def callback():
-                below.set()
-                above.wait(0.2)  # the other thread is on its way down by now
+                if not met:
+                    below.set()
+                    met.append(above.wait(LONG_S))  # the other thread is on its way down
                 machine.request_preempt()
 
+            run = current_frame().run
+            run.lock = Awaited(run.lock, above)
             forget = on_preempt(self, callback)
+            begun.set()
             try:
-                return "preempted" if self.sleep(30.0) else "done"
+                return "preempted" if self.sleep(2 * LONG_S) else "done"
             finally:
                 forget()
 
     inner = chain(Both())
     machine = chain(inner)
-
-    def ask_root():
-        below.wait(LONG_S)
-        machine.request_preempt()
-
     with use_clock(RealClock()):
-        started = threading.Event()
-        inner.register_start_cb(lambda *_: started.set())
         outcomes = []
         threads = [
             threading.Thread(target=lambda: outcomes.append(machine.execute())),
-            threading.Thread(target=lambda: started.wait(LONG_S) and inner.request_preempt()),
-            threading.Thread(target=ask_root),
+            threading.Thread(target=lambda: begun.wait(LONG_S) and inner.request_preempt()),
+            threading.Thread(target=lambda: below.wait(LONG_S) and machine.request_preempt()),
         ]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join(LONG_S)
+    assert met == [True]
     assert outcomes == ["preempted"]
 
 
