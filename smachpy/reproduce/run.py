@@ -26,7 +26,8 @@ from smachpy.reproduce.changes import changes
 from smachpy.reproduce.compare import compare, steps_of, unknown_tolerated
 from smachpy.reproduce.play import Player
 from smachpy.reproduce.world import first_run, world_of
-from smachpy.testing.kit import MissionKit, TimeLimitError
+from smachpy.testing.kit import MissionKit
+from smachpy.testing.runs import TimeLimitError
 from smachpy.userdata.json_text import decoded
 from smachpy.userdata.secret import MASK
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from smachpy.testing.exploring.exploration import explore as explore
     from smachpy.testing.exploring.exploration import replay as replay
     from smachpy.testing.kit import MissionKit as MissionKit
-    from smachpy.testing.kit import TimeLimitError as TimeLimitError
     from smachpy.testing.kit import UnfiredWarning as UnfiredWarning
     from smachpy.testing.kit import mission_kit as mission_kit
     from smachpy.testing.runs import Run as Run
+    from smachpy.testing.runs import TimeLimitError as TimeLimitError
     from smachpy.testing.runs import UnknownStateError as UnknownStateError
 
 __all__ = [
@@ -49,7 +49,7 @@ _HOMES = {
     "MissionKit": "kit",
     "MissionTestCase": "cases",
     "Run": "runs",
-    "TimeLimitError": "kit",
+    "TimeLimitError": "runs",
     "UnfiredWarning": "kit",
     "UnknownStateError": "runs",
     "explore": "exploring.exploration",

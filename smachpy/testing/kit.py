@@ -17,14 +17,14 @@ from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
 from smachpy.engine.preempt import asking
 from smachpy.events.introspection import describe
-from smachpy.exceptions import SmachError, error_text
+from smachpy.exceptions import error_text
 from smachpy.machines.container import Container
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.process import MissionNode, Process
 from smachpy.testing.recorder import STEPS, TURN_STEPS, MissionClock, RunRecorder, Stuck, Trigger
 from smachpy.testing.ros2_node import ScriptedNode, ScriptedRos1Node
-from smachpy.testing.runs import Run
+from smachpy.testing.runs import Run, TimeLimitError
 from smachpy.testing.servers import (
     ScriptedActionServer,
     ScriptedEnd,
@@ -52,34 +52,6 @@ if TYPE_CHECKING:
 
 LIMIT_S = 6 * 3600.0  # [s] virtual time of a run, unless the test gives a limit
 SETTLE_S = 0.1  # [s] after a run, for messages that are still on their way to a server
-
-
-class TimeLimitError(SmachError):
-    """A mission under test exceeded the time limit, or ran endlessly while no time passed.
-
-    Try: look for a loop without a wait, or raise the limit with the call that is named.
-
-    Args:
-        run: The run so far.
-        limit: Its limit [s].
-        steps: What it did while no time passed, in words; "" if the time limit was exceeded.
-        call: The function that accepts another limit.
-
-    Attributes:
-        run: See above.
-    """
-
-    def __init__(self, run: Run, limit: float, steps: str = "", call: str = "mission") -> None:
-        self.run = run
-        active = ", ".join(run.active) or "nothing"
-        what = f"it still ran after {limit:g} s, in {active}; expected an end. Try"
-        if steps:
-            what = (
-                f"{steps} at {run.duration:g} s, in {active}; expected time to pass, "
-                "or an end. Let a state or a server take time, or try"
-            )
-        word = "steps" if steps else "limit"
-        super().__init__(f"{run.record.path}: {what} {call}(..., {word}=...).\n{run.explain()}")
 
 
 class UnfiredWarning(UserWarning):

@@ -257,6 +257,34 @@ class Run:
         raise AssertionError(f"{text}\n{self.explain()}{shown}")
 
 
+class TimeLimitError(SmachError):
+    """A mission under test exceeded the time limit, or ran endlessly while no time passed.
+
+    Try: look for a loop without a wait, or raise the limit with the call that is named.
+
+    Args:
+        run: The run so far.
+        limit: Its limit [s].
+        steps: What it did while no time passed, in words; "" if the time limit was exceeded.
+        call: The function that accepts another limit.
+
+    Attributes:
+        run: See above.
+    """
+
+    def __init__(self, run: Run, limit: float, steps: str = "", call: str = "mission") -> None:
+        self.run = run
+        active = ", ".join(run.active) or "nothing"
+        what = f"it still ran after {limit:g} s, in {active}; expected an end. Try"
+        if steps:
+            what = (
+                f"{steps} at {run.duration:g} s, in {active}; expected time to pass, "
+                "or an end. Let a state or a server take time, or try"
+            )
+        word = "steps" if steps else "limit"
+        super().__init__(f"{run.record.path}: {what} {call}(..., {word}=...).\n{run.explain()}")
+
+
 def _summary(events: Iterable[Event]) -> list[str]:
     """Return one line per state that ended, and for other important events."""
     lines: list[str] = []

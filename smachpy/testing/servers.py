@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from actionlib_core.action.server import ServerGoalHandle
     from actionlib_core.clock import Event, VirtualClock
     from actionlib_core.transport.memory import MemoryNetwork
+    from smachpy.testing.process import MissionNode
 
 Status: TypeAlias = Literal["succeeded", "aborted", "preempted", "rejected"]
 STATUSES = ("succeeded", "aborted", "preempted", "rejected")
@@ -86,7 +87,7 @@ class Reply:
 
 
 class Test(Protocol):
-    """The part of the test (`smachpy.testing.kit`) that a scripted end needs."""
+    """The part of the test (`smachpy.testing.kit`) that its scripted ends need."""
 
     @property
     def clock(self) -> VirtualClock:
@@ -96,6 +97,16 @@ class Test(Protocol):
     @property
     def network(self) -> MemoryNetwork:
         """Its network."""
+        ...
+
+    @property
+    def node(self) -> MissionNode:
+        """The mission's node."""
+        ...
+
+    @property
+    def ends(self) -> tuple[ScriptedEnd, ...]:
+        """Its scripted servers and topics."""
         ...
 
     def add_end(self, end: ScriptedEnd) -> None:

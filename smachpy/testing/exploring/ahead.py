@@ -17,7 +17,7 @@ from smachpy.base.workers import Workers, cores
 from smachpy.machines.container import Container
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Future
     from typing import Self, TypeAlias
 
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     Prefix: TypeAlias = tuple[int, ...]
     Known: TypeAlias = list[tuple[Prefix, list[ScheduleChoice]]]
     Found: TypeAlias = tuple[list[ScheduleChoice], Run | None]
-
-AFTER_S: Final = 2.0
-"""Explorations that take no longer have one process: others take a second to begin [s]."""
 
 TOGETHER: Final = 16
 """Runs that a process does without asking for more."""
@@ -46,6 +43,7 @@ class Ahead:
     a set of texts has another order.
 
     Args:
+        runs_of: Does runs of a job; see `exploration.runs_of`.
         job: Machine, invariants, grace and options, as the function that is called has them. If
             they cannot be sent to another process (a machine instead of a function, a lambda, what
             a program's own file defines), no other process is used.
@@ -55,8 +53,15 @@ class Ahead:
     """
 
     def __init__(
-        self, job: tuple[Any, ...], jobs: int | None, cluster: Cluster | None, *, wants_runs: bool
+        self,
+        runs_of: Callable[[bytes, Known, Sequence[Prefix], bool], list[Found | None] | None],
+        job: tuple[Any, ...],
+        jobs: int | None,
+        cluster: Cluster | None,
+        *,
+        wants_runs: bool,
     ) -> None:
+        self._runs_of = runs_of
         self._cluster = cluster
         self._count = cluster.count if cluster is not None else cores() if jobs is None else jobs
         self._wants_runs = wants_runs
@@ -150,7 +155,7 @@ class Ahead:
             executor = self._cluster or own
             assert executor is not None
             number, arguments = question
-            future = executor.submit(runs_of, *arguments)
+            future = executor.submit(self._runs_of, *arguments)
             future.add_done_callback(partial(self._on_answer, number))
             futures = [one for one in (*futures, future) if not one.done()]
         for future in futures:
@@ -173,40 +178,3 @@ def _pickled(job: tuple[Any, ...]) -> bytes:
     except Exception:  # noqa: BLE001  of any kind: the values' own code decides
         return b""
     return b"" if b"__main__" in made else made
-
-
-_compared: dict[bytes, bool] = {}  # by the job: whether this process does what its sender does
-
-
-def runs_of(
-    job: bytes, known: Known, prefixes: Sequence[Prefix], wants_runs: bool
-) -> list[Found | None] | None:
-    """Do runs; return None for each that breaks an invariant, or is not possible.
-
-    Args:
-        job: What is run.
-        known: Runs of the process that asks; if they are not the same here, None is returned.
-        prefixes: The runs.
-        wants_runs: Whether the runs are needed, besides their choices.
-
-    Blocks: until they are done.
-    """
-    from smachpy.testing.exploring.exploration import RepeatedRun, ReplayError
-    from smachpy.testing.exploring.verdicts import judge
-
-    machine, invariants, grace, options = pickle.loads(job)  # noqa: S301  of the process that began this one
-    with RepeatedRun("explore", machine, options, merges=not invariants) as runner:
-
-        def found(prefix: Prefix) -> Found | None:
-            try:
-                run, error = runner.run(prefix)
-            except ReplayError:
-                return None
-            explorer = runner.explorer
-            is_ok = judge(run, error, explorer, grace=grace, invariants=invariants) is None
-            return (explorer.choices, run if wants_runs else None) if is_ok else None
-
-        if job not in _compared:
-            mine = [found(prefix) for prefix, _ in known]
-            _compared[job] = [one and one[0] for one in mine] == [choices for _, choices in known]
-        return [found(prefix) for prefix in prefixes] if _compared[job] else None

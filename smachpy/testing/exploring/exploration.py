@@ -8,6 +8,7 @@ import copy
 import inspect
 import logging
 import math
+import pickle
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,6 @@ from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container, below
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
-from smachpy.testing.exploring import ahead as _ahead
 from smachpy.testing.exploring.ahead import Ahead
 from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions
 from smachpy.testing.exploring.search import Search
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
     from smachpy.base.cluster import Cluster
     from smachpy.events.introspection import StateRecord
+    from smachpy.testing.exploring.ahead import Found, Known, Prefix
     from smachpy.testing.exploring.kills import Kill, MemoryJournal
     from smachpy.testing.exploring.search import ScheduleChoice
     from smachpy.testing.exploring.verdicts import Verdict
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 COMPUTER = RealClock()  # measures the computer's time: a run's own time is virtual
 SHRINKING_RUNS = 300  # the most runs to shorten a counterexample
+AHEAD_AFTER_S = 2.0  # [s] shorter explorations have one process: others take a second to begin
 ORDERS = 100  # the most thread orders that are compared with a run with a kill
 
 
@@ -195,7 +197,11 @@ def explore(
     search = Search(max_depth)
     with (
         Ahead(
-            (machine, own, grace, options), jobs, cluster, wants_runs=on_run is not None
+            runs_of,
+            (machine, own, grace, options),
+            jobs,
+            cluster,
+            wants_runs=on_run is not None,
         ) as ahead,
         RepeatedRun("explore", machine, options, merges=not own) as runner,
     ):
@@ -263,7 +269,7 @@ class _Tries:
 
     def _was_done_elsewhere(self, prefix: tuple[int, ...]) -> bool:
         """Take a run that another process has done, and that keeps all invariants."""
-        if "kill" in self.runner.options["faults"] or self.budget.seconds < _ahead.AFTER_S:
+        if "kill" in self.runner.options["faults"] or self.budget.seconds < AHEAD_AFTER_S:
             return False
         found = self.ahead.found(prefix, self.search)
         if found is None:
@@ -535,6 +541,40 @@ class RepeatedRun:
                 userdata = None if journal.position.visits else userdata
             else:
                 return
+
+
+_compared: dict[bytes, bool] = {}  # by the job: whether this process does what its sender does
+
+
+def runs_of(
+    job: bytes, known: Known, prefixes: Sequence[Prefix], wants_runs: bool
+) -> list[Found | None] | None:
+    """Do runs; return None for each that breaks an invariant, or is not possible.
+
+    Args:
+        job: What is run.
+        known: Runs of the process that asks; if they are not the same here, None is returned.
+        prefixes: The runs.
+        wants_runs: Whether the runs are needed, besides their choices.
+
+    Blocks: until they are done.
+    """
+    machine, invariants, grace, options = pickle.loads(job)  # noqa: S301  of the process that began this one
+    with RepeatedRun("explore", machine, options, merges=not invariants) as runner:
+
+        def found(prefix: Prefix) -> Found | None:
+            try:
+                run, error = runner.run(prefix)
+            except ReplayError:
+                return None
+            explorer = runner.explorer
+            is_ok = judge(run, error, explorer, grace=grace, invariants=invariants) is None
+            return (explorer.choices, run if wants_runs else None) if is_ok else None
+
+        if job not in _compared:
+            mine = [found(prefix) for prefix, _ in known]
+            _compared[job] = [one and one[0] for one in mine] == [choices for _, choices in known]
+        return [found(prefix) for prefix in prefixes] if _compared[job] else None
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.search import ScheduleChoice
 from smachpy.testing.recorder import STEPS
 from smachpy.testing.runs import find_path
-from smachpy.testing.servers import Reply
+from smachpy.testing.servers import Reply, ScriptedActionServer
 from smachpy.userdata.readonly import writable
 
 if TYPE_CHECKING:
@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from smachpy.events.introspection import StateRecord
     from smachpy.machines.state import State
     from smachpy.testing.doubles import Replacement
-    from smachpy.testing.kit import MissionKit
-    from smachpy.testing.servers import ScriptedEnd
+    from smachpy.testing.servers import ScriptedEnd, Test
 
 PREEMPTED = "preempted"
 FAULTS = frozenset({"hang", "raise", "deaf", "kill"})
@@ -233,7 +232,7 @@ class Explorer:
 
     def begin(
         self,
-        kit: MissionKit,
+        kit: Test,
         prefix: Sequence[int | str],
         *,
         picks: Mapping[Hashable, str] | None = None,
@@ -242,7 +241,7 @@ class Explorer:
         """Prepare for the next run.
 
         Args:
-            kit: The kit in which it runs.
+            kit: The test in which it runs.
             prefix: Its first choices, as indices or texts.
             picks: All its choices except the turns of threads, which `prefix` has then: the choices
                 of a run to follow.
@@ -437,7 +436,7 @@ class Explorer:
         def serve(name: str, type_name: str) -> None:
             if kit.node.resolve(name) not in names:
                 names.add(kit.node.resolve(name))
-                server = kit.action_server(name, get_action(type_name))
+                server = ScriptedActionServer(kit, name, get_action(type_name))
                 server.choose_by(partial(self._choose_reply, server.name))
 
         for state in describe(self._root).walk():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from actionlib_core.clock import Deadlock
 from smachpy.events import Abandoned, Finished, PreemptRequested
 from smachpy.exceptions import SmachError, UserDataKeyError
-from smachpy.testing.kit import TimeLimitError
+from smachpy.testing.runs import TimeLimitError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -11,14 +11,14 @@ import pytest
 from smachpy.base import workers
 from smachpy.base.workers import WorkerProcess, Workers
 from smachpy.testing import explore
-from smachpy.testing.exploring import ahead
+from smachpy.testing.exploring import exploration
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(autouse=True)
 def _at_once(monkeypatch):
-    monkeypatch.setattr(ahead, "AFTER_S", -1.0)
+    monkeypatch.setattr(exploration, "AHEAD_AFTER_S", -1.0)
 
 
 @pytest.fixture
