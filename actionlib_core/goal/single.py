@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from actionlib_core.goal.server import ServerGoal
 
 
-class Goal(Protocol):
+class RecordedGoal(Protocol):
     """A goal, as far as these rules need it."""
 
     @property
@@ -29,7 +29,7 @@ class Goal(Protocol):
         ...
 
 
-G = TypeVar("G", bound=Goal)
+G = TypeVar("G", bound=RecordedGoal)
 
 Policy = Literal["preempt", "queue", "reject"]
 POLICIES: tuple[Policy, ...] = ("preempt", "queue", "reject")

@@ -18,7 +18,7 @@ from actionlib_core.interfaces import _arrays
 from actionlib_core.interfaces._codegen import (
     TEXT,
     Cursor,
-    Source,
+    FunctionSource,
     checked,
     new_scope,
     read_message,
@@ -72,7 +72,7 @@ class _Output:
     `_modulus`, the padding is computed at run time.
     """
 
-    def __init__(self, source: Source, modulus: int = 1) -> None:
+    def __init__(self, source: FunctionSource, modulus: int = 1) -> None:
         self.source = source
         self._at = 0
         self._modulus = modulus
@@ -111,7 +111,7 @@ class _Output:
 
 
 def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any]) -> str:
-    source = Source(scope)
+    source = FunctionSource(scope)
     source.add("b = bytearray()")
     output = _Output(source, modulus=_WIDEST)
     _write_fields(output, definition.fields, "m", resolve)
@@ -195,7 +195,7 @@ def _write_loop(output: _Output, kind: FieldType, values: str, resolve: Resolve)
 class _AlignedCursor(Cursor):
     """Reads aligned values; the position is known to be `_at` modulo `_modulus`."""
 
-    def __init__(self, source: Source, offset: str) -> None:
+    def __init__(self, source: FunctionSource, offset: str) -> None:
         super().__init__(source, offset)
         self._at = 0
         self._modulus = _WIDEST if offset == "0" else 1
@@ -245,7 +245,7 @@ def _make_reader(
     cls: type[Message], definition: Definition, resolve: Resolve, order: str
 ) -> Callable[[bytes], Any]:
     scope = new_scope()
-    source = Source(scope, order)
+    source = FunctionSource(scope, order)
     source.add(f"d = bytes(memoryview(d)[{len(_HEADER)}:])")
     source.add("try:")
     source.indent += 1

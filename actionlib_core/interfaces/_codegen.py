@@ -45,7 +45,7 @@ WRITE_ERRORS = (
 """Exceptions of the fast path for values that it does not handle."""
 
 
-class Source:
+class FunctionSource:
     """Source lines of a function; `scope` becomes the function's globals.
 
     Attributes:
@@ -144,7 +144,7 @@ def new_scope() -> dict[str, Any]:
 class _Items:
     """The parts of the payload in order: packed scalars, and expressions of bytes."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: FunctionSource) -> None:
         self._source = source
         self._parts: list[str] = []
         self._codes = ""
@@ -170,7 +170,7 @@ class _Items:
 
 
 def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any]) -> str:
-    source = Source(scope)
+    source = FunctionSource(scope)
     items = _Items(source)
     _write_fields(source, items, definition.fields, "m", resolve)
     parts = items.parts()
@@ -182,7 +182,7 @@ def _write_source(definition: Definition, resolve: Resolve, scope: dict[str, Any
 
 
 def _write_fields(
-    source: Source, items: _Items, fields: tuple[Field, ...], owner: str, resolve: Resolve
+    source: FunctionSource, items: _Items, fields: tuple[Field, ...], owner: str, resolve: Resolve
 ) -> None:
     for field in fields:
         value = f"{owner}.{field.attribute}"
@@ -193,7 +193,7 @@ def _write_fields(
 
 
 def _write_one(
-    source: Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
+    source: FunctionSource, items: _Items, kind: FieldType, value: str, resolve: Resolve
 ) -> None:
     if kind.base == "bool":
         items.scalar("B", f"BOOLS[{value}]")
@@ -214,7 +214,7 @@ def _write_one(
         _write_fields(source, items, nested._definition.fields, name, resolve)
 
 
-def checked(source: Source, value: str, cls: type) -> str:
+def checked(source: FunctionSource, value: str, cls: type) -> str:
     """Assign `value` to a local, after a check that it is exactly of a class."""
     name = source.local()
     source.add(f"{name} = {value}")
@@ -223,7 +223,7 @@ def checked(source: Source, value: str, cls: type) -> str:
 
 
 def _write_array(
-    source: Source, items: _Items, kind: FieldType, value: str, resolve: Resolve
+    source: FunctionSource, items: _Items, kind: FieldType, value: str, resolve: Resolve
 ) -> None:
     name = source.local("a")
     code = _arrays.STRUCT_CODES.get(kind.base)
@@ -247,7 +247,7 @@ def _write_array(
         items.ready(_write_loop(source, kind, name, resolve))
 
 
-def _write_loop(source: Source, kind: FieldType, values: str, resolve: Resolve) -> str:
+def _write_loop(source: FunctionSource, kind: FieldType, values: str, resolve: Resolve) -> str:
     """Write the elements one by one; return the expression of their bytes."""
     element, parts = source.local("x"), source.local("p")
     source.add(f"{parts} = []")
@@ -276,7 +276,7 @@ class Cursor:
     alignment of values.
     """
 
-    def __init__(self, source: Source, offset: str) -> None:
+    def __init__(self, source: FunctionSource, offset: str) -> None:
         self.source = source
         self._offset = offset  # "0" or a variable; then plus `_skip` bytes
         self._skip = 0
@@ -356,7 +356,7 @@ class Cursor:
 def _read_source(
     cls: type[Message], definition: Definition, resolve: Resolve, scope: dict[str, Any]
 ) -> str:
-    source = Source(scope)
+    source = FunctionSource(scope)
     source.add("if d.__class__ is not bytes: d = bytes(memoryview(d))")
     source.add("try:")
     source.indent += 1

@@ -25,7 +25,7 @@ MAX_NODES = 200_000  # a larger machine is refused: its parts can be checked one
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class GraphNode:
     """A moment of a run.
 
     Attributes:
@@ -43,8 +43,8 @@ class Node:
 class _GraphPiece:
     """A state in the graph: the node where it begins, and the nodes where it ends, by outcome."""
 
-    enter: Node
-    ends: dict[str, Node]
+    enter: GraphNode
+    ends: dict[str, GraphNode]
 
 
 @dataclass(slots=True)
@@ -61,7 +61,7 @@ class Graph:
         ends: The root's outcomes.
     """
 
-    nodes: list[Node] = field(default_factory=list)
+    nodes: list[GraphNode] = field(default_factory=list)
     edges: list[list[int]] = field(default_factory=list)
     only_preempt: set[tuple[int, int]] = field(default_factory=set)
     by_framework: set[tuple[int, int]] = field(default_factory=set)
@@ -70,9 +70,9 @@ class Graph:
     ends: dict[str, int] = field(default_factory=dict)
     _begins: dict[str, set[int]] = field(default_factory=dict)  # by path
 
-    def add(self, record: StateRecord, outcome: str | None) -> Node:
+    def add(self, record: StateRecord, outcome: str | None) -> GraphNode:
         """Add a moment, without successors."""
-        node = Node(len(self.nodes), record, outcome)
+        node = GraphNode(len(self.nodes), record, outcome)
         self.nodes.append(node)
         self.edges.append([])
         if outcome is None:
@@ -130,7 +130,7 @@ class Graph:
         avoid: Collection[int] = (),
         preempt: bool = True,
         framework: bool = True,
-    ) -> list[Node] | None:
+    ) -> list[GraphNode] | None:
         """Return a shortest run from `start` to one of `goals` that avoids all of `avoid`."""
         came: dict[int, int | None] = {number: None for number in start if number not in avoid}
         queue = deque(came)
@@ -252,7 +252,7 @@ class _Builder:
             The container without its clean-up, and the beginnings of the copies as its ends.
         """
         (cleanup,) = (child for child in record.children if child.label == record.cleanup)
-        begins: dict[str, Node] = {}
+        begins: dict[str, GraphNode] = {}
         for outcome, end in part.ends.items():
             copy = self.state(cleanup)
             begins[outcome] = copy.enter
@@ -337,7 +337,7 @@ class _Builder:
         for outcome, allowed in outcomes_of(record, self._subject).items():
             if outcome not in part.ends:
                 continue
-            at: list[Node] = [part.enter]
+            at: list[GraphNode] = [part.enter]
             for child_record in record.children:
                 child = self.state(child_record)
                 for node in at:
@@ -350,11 +350,16 @@ class _Builder:
         if PREEMPTED in part.ends:
             self._edge(part.enter, part.ends[PREEMPTED], preempt=True, framework=True)
 
-    def _node(self, record: StateRecord, outcome: str | None) -> Node:
+    def _node(self, record: StateRecord, outcome: str | None) -> GraphNode:
         return self.graph.add(record, outcome)
 
     def _edge(
-        self, source: Node, target: Node, *, preempt: bool = False, framework: bool = False
+        self,
+        source: GraphNode,
+        target: GraphNode,
+        *,
+        preempt: bool = False,
+        framework: bool = False,
     ) -> None:
         pair = (source.number, target.number)
         graph = self.graph
@@ -411,6 +416,6 @@ def outcomes_of(record: StateRecord, subject: Subject) -> dict[str, dict[str, se
     return found
 
 
-def moments(steps: Iterable[Node]) -> Moments:
+def moments(steps: Iterable[GraphNode]) -> Moments:
     """Return a run as pairs (path, outcome); the outcome is None where the state begins."""
     return tuple((node.record.path, node.outcome) for node in steps)

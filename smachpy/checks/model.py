@@ -15,7 +15,7 @@ Moments: TypeAlias = tuple[tuple[str, str | None], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class CheckRule:
     """One rule.
 
     Attributes:
@@ -31,40 +31,54 @@ class Rule:
     is_on: bool = True
 
 
-RULES: dict[str, Rule] = {
+RULES: dict[str, CheckRule] = {
     rule.name: rule
     for rule in (
-        Rule("inconsistent", "error", "the machine is inconsistent and would not run"),
-        Rule("wrong-signature", "error", "`execute` cannot be called as the machine calls it"),
-        Rule("unreachable-state", "error", "no run can reach the state"),
-        Rule("unmapped-outcome", "error", "an outcome of a state leads nowhere"),
-        Rule("impossible-outcome", "warning", "a declared outcome that nothing can produce"),
-        Rule("undeclared-outcome", "error", "code returns an outcome that is not declared"),
-        Rule("dead-case", "warning", "a condition of a transition that decides nothing"),
-        Rule("unset-key", "error", "a userdata key is read on some path before it is written"),
-        Rule("unread-key", "warning", "a userdata key is written and never read"),
-        Rule("changed-input", "warning", "code changes the value of a key that is only an input"),
-        Rule("kept-value", "warning", "a nested machine begins with what its former visit left"),
-        Rule("endless-loop", "error", "a loop of states with no way out"),
-        Rule("no-timeout", "warning", "a wait without a timeout", is_on=False),
-        Rule("outside", "note", "code reads what no recording has", is_on=False),
-        Rule("deaf-loop", "warning", "`execute` loops without checking for a preempt"),
-        Rule("stuck-concurrence", "error", "a concurrence that cannot finish"),
-        Rule("resource-order", "warning", "resources that are taken in different orders"),
-        Rule("ambiguous-map", "warning", "two rules of an outcome map hold with equal conditions"),
-        Rule("preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"),
-        Rule("property", "error", "a property that does not hold"),
-        Rule("net-label", "error", "a label, a condition or a name of a plan that looks wrong"),
-        Rule("net-unmatched", "warning", "a plan starts or ends an action without its exec place"),
-        Rule("net-unbound", "error", "a plan names an action that nothing does"),
-        Rule("net-condition", "warning", "a guard asks for what nobody is known to say"),
-        Rule("net-bound", "error", "a place of a plan can hold any number of tokens"),
-        Rule("net-deadlock", "error", "a plan gets stuck outside its goal"),
-        Rule("net-goal", "error", "the goal of a plan cannot be reached, or there is none"),
-        Rule("net-dead", "warning", "a transition that never fires, a place that is never marked"),
-        Rule("net-race", "warning", "nothing decides which of two ends of an action fires"),
-        Rule("net-shared", "warning", "two tokens share one run of an action"),
-        Rule("net-busy", "warning", "a loop of a plan that takes no time"),
+        CheckRule("inconsistent", "error", "the machine is inconsistent and would not run"),
+        CheckRule("wrong-signature", "error", "`execute` cannot be called as the machine calls it"),
+        CheckRule("unreachable-state", "error", "no run can reach the state"),
+        CheckRule("unmapped-outcome", "error", "an outcome of a state leads nowhere"),
+        CheckRule("impossible-outcome", "warning", "a declared outcome that nothing can produce"),
+        CheckRule("undeclared-outcome", "error", "code returns an outcome that is not declared"),
+        CheckRule("dead-case", "warning", "a condition of a transition that decides nothing"),
+        CheckRule("unset-key", "error", "a userdata key is read on some path before it is written"),
+        CheckRule("unread-key", "warning", "a userdata key is written and never read"),
+        CheckRule(
+            "changed-input", "warning", "code changes the value of a key that is only an input"
+        ),
+        CheckRule(
+            "kept-value", "warning", "a nested machine begins with what its former visit left"
+        ),
+        CheckRule("endless-loop", "error", "a loop of states with no way out"),
+        CheckRule("no-timeout", "warning", "a wait without a timeout", is_on=False),
+        CheckRule("outside", "note", "code reads what no recording has", is_on=False),
+        CheckRule("deaf-loop", "warning", "`execute` loops without checking for a preempt"),
+        CheckRule("stuck-concurrence", "error", "a concurrence that cannot finish"),
+        CheckRule("resource-order", "warning", "resources that are taken in different orders"),
+        CheckRule(
+            "ambiguous-map", "warning", "two rules of an outcome map hold with equal conditions"
+        ),
+        CheckRule(
+            "preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"
+        ),
+        CheckRule("property", "error", "a property that does not hold"),
+        CheckRule(
+            "net-label", "error", "a label, a condition or a name of a plan that looks wrong"
+        ),
+        CheckRule(
+            "net-unmatched", "warning", "a plan starts or ends an action without its exec place"
+        ),
+        CheckRule("net-unbound", "error", "a plan names an action that nothing does"),
+        CheckRule("net-condition", "warning", "a guard asks for what nobody is known to say"),
+        CheckRule("net-bound", "error", "a place of a plan can hold any number of tokens"),
+        CheckRule("net-deadlock", "error", "a plan gets stuck outside its goal"),
+        CheckRule("net-goal", "error", "the goal of a plan cannot be reached, or there is none"),
+        CheckRule(
+            "net-dead", "warning", "a transition that never fires, a place that is never marked"
+        ),
+        CheckRule("net-race", "warning", "nothing decides which of two ends of an action fires"),
+        CheckRule("net-shared", "warning", "two tokens share one run of an action"),
+        CheckRule("net-busy", "warning", "a loop of a plan that takes no time"),
     )
 }
 

@@ -13,10 +13,10 @@ from smachpy.exceptions import SmachError, did_you_mean
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from smachpy.checks.graph import Graph, Node
+    from smachpy.checks.graph import Graph, GraphNode
     from smachpy.checks.model import Subject
 
-    Broken: TypeAlias = tuple[str, list[Node]] | None  # the violation in words, and a run
+    Broken: TypeAlias = tuple[str, list[GraphNode]] | None  # the violation in words, and a run
 
 
 class PropertyError(SmachError):

@@ -15,7 +15,7 @@ from smachpy.checks.graph import moments
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from smachpy.checks.graph import Graph, Node
+    from smachpy.checks.graph import Graph, GraphNode
     from smachpy.checks.model import Problem, Subject
     from smachpy.events.introspection import StateRecord
 
@@ -83,7 +83,7 @@ class _Flow:
         parent = self._parents.get(record.path)
         return None if parent is None else (parent.path, dict(record.remapping).get(key, key))
 
-    def _pass(self, node: Node, written: frozenset[Variable]) -> frozenset[Variable]:
+    def _pass(self, node: GraphNode, written: frozenset[Variable]) -> frozenset[Variable]:
         """Return the variables that are written after a moment."""
         record = node.record
         new: set[Variable] = set()
@@ -188,7 +188,7 @@ class _Flow:
                     yield self._unset(node, key, variable, sure=sure, shows=shows)
 
     def _unset(
-        self, node: Node, key: str, variable: Variable, *, sure: bool, shows: bool
+        self, node: GraphNode, key: str, variable: Variable, *, sure: bool, shows: bool
     ) -> Problem:
         path = node.record.path
         alias = "" if variable[1] == key else f" ({key!r} there)"
@@ -224,7 +224,7 @@ class _Flow:
                 if outer is not None:
                     yield outer
 
-    def _witness(self, goal: Node, variable: Variable) -> list[Node]:
+    def _witness(self, goal: GraphNode, variable: Variable) -> list[GraphNode]:
         """Return a shortest run that reaches `goal` with `variable` unwritten."""
         graph = self._graph
         first = (graph.start, self._preset)

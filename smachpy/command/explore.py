@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from actionlib_core.command_line.numbers import between, seconds
 from actionlib_core.process.output import printable
 from smachpy.command.durable import whole_target
-from smachpy.command.on import Progress, add_jobs_and_on, opened_cluster, workers_text
+from smachpy.command.on import ProgressLine, add_jobs_and_on, opened_cluster, workers_text
 from smachpy.command.run import add_input, read_inputs
 from smachpy.machines.container import Container
 
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     make = MissionMaker(target, read_inputs(args.input), args.words)
     machine = make()
     with opened_cluster(args.on, target) as cluster:
-        progress = Progress("runs", workers_text(cluster, args.jobs, args.max_runs))
+        progress = ProgressLine("runs", workers_text(cluster, args.jobs, args.max_runs))
         try:
             found = explore(
                 make,

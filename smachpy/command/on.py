@@ -145,7 +145,7 @@ def _hash_of(places: Sequence[str]) -> str:
     return found.hexdigest()[:16]
 
 
-class Progress:
+class ProgressLine:
     """Shows in a terminal how many runs have been done, how many a second, and by whom.
 
     Args:

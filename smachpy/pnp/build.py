@@ -77,7 +77,7 @@ class Sequence_(Part):  # noqa: N801  `Sequence` is a container of smachpy
 
 
 @dataclass(frozen=True)
-class Rule:
+class Interrupt:
     """A condition that interrupts an action, and the recovery that follows.
 
     Attributes:
@@ -105,7 +105,7 @@ class Action(Part):
 
     name: str = ""
     seconds: str | None = None
-    rules: tuple[Rule, ...] = ()
+    rules: tuple[Interrupt, ...] = ()
     branches: tuple[tuple[str, Part], ...] = ()
 
     def interrupt(self, condition: str, *recovery: Part, then: str = "restart_action") -> Action:
@@ -128,7 +128,7 @@ class Action(Part):
                 f"{did_you_mean(then, LASTS)}"
             )
         problems.raise_all()
-        rule = Rule(condition, tuple(_flat(recovery)), then)
+        rule = Interrupt(condition, tuple(_flat(recovery)), then)
         return replace(self, rules=(*self.rules, rule))
 
     def within(self, seconds: float) -> Action:
@@ -431,7 +431,13 @@ class _NetBuilder:
         return out
 
     def _rule(
-        self, part: Action, rule: Rule, execs: list[int], stop: str, entry: int, out: int | None
+        self,
+        part: Action,
+        rule: Interrupt,
+        execs: list[int],
+        stop: str,
+        entry: int,
+        out: int | None,
     ) -> int | None:
         """Add an interrupt and its recovery; return the last place of the action."""
         begin = self._place("", part.line)

@@ -28,10 +28,10 @@ Dialect: TypeAlias = Literal["pnp", "2009"]
 NAMESPACE: Final = "http://www.pnml.org/version-2009/grammar/pnml"
 PT_NET: Final = "http://www.pnml.org/version-2009/grammar/ptnet"
 MAX_TOKENS: Final = 1000
+"""Tokens of one place or arc: more is a mistake or an attack, as markings list each token."""
+
 LARGEST_FILE: Final = 2_000_000
 """Largest file of a plan in any form [bytes]."""
-
-"""Tokens of one place or arc: more is a mistake or an attack, as markings list each token."""
 
 _LINE: Final = "{smachpy}line"  # in a namespace, as the file may have an attribute "line"
 _PLAN_NAME: Final = "PLAN NAME:"
@@ -40,7 +40,7 @@ _NOT_XML: Final = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010
 
 
 @dataclass
-class _Found:
+class _ReadNet:
     """The parts of a net that were read so far."""
 
     file: str
@@ -95,7 +95,7 @@ def parse_pnml(
         name: The name of the plan, unless it is in a comment "PLAN NAME:".
         file: The file, for the problems.
     """
-    found = _Found(file, name=name)
+    found = _ReadNet(file, name=name)
     root = _parse(data, found)
     if root is not None:
         _read_root(root, found)
@@ -108,7 +108,7 @@ def parse_pnml(
     return net, tuple(found.problems)
 
 
-def _parse(data: bytes | str, found: _Found) -> Element | None:
+def _parse(data: bytes | str, found: _ReadNet) -> Element | None:
     """Return the root of the XML, with the line of each element; None if it is not XML."""
     from xml.etree.ElementTree import ParseError, TreeBuilder
 
@@ -137,7 +137,7 @@ def _parse(data: bytes | str, found: _Found) -> Element | None:
     return None
 
 
-def _read_root(root: Element, found: _Found) -> None:
+def _read_root(root: Element, found: _ReadNet) -> None:
     if _tag(root) != "pnml":
         found.problem("error", "xml", root, f"got <{_tag(root)}>; expected <pnml>.")
         return
@@ -164,7 +164,7 @@ def _read_root(root: Element, found: _Found) -> None:
 _MAX_PAGE_DEPTH: Final = 50  # pages may contain pages; the reader is recursive
 
 
-def _read_nodes(parent: Element, found: _Found, depth: int) -> None:
+def _read_nodes(parent: Element, found: _ReadNet, depth: int) -> None:
     if depth > _MAX_PAGE_DEPTH:
         found.problem("error", "xml", parent, f"got more than {_MAX_PAGE_DEPTH} pages deep.")
         return
@@ -181,7 +181,7 @@ def _read_nodes(parent: Element, found: _Found, depth: int) -> None:
                 found.name = text.removeprefix(_PLAN_NAME).strip() or found.name
 
 
-def _report_excess(element: Element, found: _Found) -> None:
+def _report_excess(element: Element, found: _ReadNet) -> None:
     """Report what a plan cannot mean: errors at each element, warnings at the first of a kind."""
     for severity, message, hint in excess(element):
         if severity == "error":
@@ -195,7 +195,7 @@ def _report_excess(element: Element, found: _Found) -> None:
             )
 
 
-def _read_node(element: Element, tag: str, found: _Found) -> None:
+def _read_node(element: Element, tag: str, found: _ReadNet) -> None:
     _report_excess(element, found)
     identity = element.get("id")
     line = int(element.get(_LINE, "0"))
@@ -218,7 +218,7 @@ def _read_node(element: Element, tag: str, found: _Found) -> None:
         found.transitions[identity] = Transition(identity, _label(element, found), line)
 
 
-def _read_arc(element: Element, found: _Found) -> None:
+def _read_arc(element: Element, found: _ReadNet) -> None:
     source, target = element.get("source", ""), element.get("target", "")
     if not (source and target):
         text = f"got source {source!r}, target {target!r}; expected the ids of two nodes."
@@ -237,7 +237,7 @@ def _read_arc(element: Element, found: _Found) -> None:
     found.arcs.append((Arc(source, target, weight), element))
 
 
-def _checked_arcs(found: _Found) -> tuple[Arc, ...]:
+def _checked_arcs(found: _ReadNet) -> tuple[Arc, ...]:
     """Return the arcs whose two nodes exist, and record the problems of the others.
 
     PNP drops an arc that stands above one of its nodes, so it is dropped here too, with a warning.
@@ -270,7 +270,7 @@ def _checked_arcs(found: _Found) -> tuple[Arc, ...]:
     return tuple(arcs)
 
 
-def _resolved(name: str, found: _Found) -> str:
+def _resolved(name: str, found: _ReadNet) -> str:
     seen: set[str] = set()  # references may form a circle
     while name in found.references and name not in seen:
         seen.add(name)
@@ -278,7 +278,7 @@ def _resolved(name: str, found: _Found) -> str:
     return name
 
 
-def _number(element: Element, names: tuple[str, ...], default: int, found: _Found) -> int:
+def _number(element: Element, names: tuple[str, ...], default: int, found: _ReadNet) -> int:
     """Return the number in the first child or attribute of these names, or `default`."""
     name = names[0]
     if any(_tag(child) == name for child in element):
@@ -300,11 +300,11 @@ def _number(element: Element, names: tuple[str, ...], default: int, found: _Foun
     return default
 
 
-def _label(element: Element, found: _Found) -> str:
+def _label(element: Element, found: _ReadNet) -> str:
     return _text_below(element, "name", found) or element.get("name", "")
 
 
-def _text_below(element: Element, tag: str | None, found: _Found) -> str:
+def _text_below(element: Element, tag: str | None, found: _ReadNet) -> str:
     """Return the text of `element`'s child `tag`; it is in that child's `value` or `text`."""
     holder = element
     if tag is not None:

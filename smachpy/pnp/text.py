@@ -17,7 +17,18 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from smachpy.exceptions import InvalidStateError, did_you_mean
-from smachpy.pnp.build import LASTS, Action, Choice, Fork, GoTo, Mark, Part, Rule, Sequence_, action
+from smachpy.pnp.build import (
+    LASTS,
+    Action,
+    Choice,
+    Fork,
+    GoTo,
+    Interrupt,
+    Mark,
+    Part,
+    Sequence_,
+    action,
+)
 from smachpy.pnp.conditions import ConditionError, parse
 from smachpy.pnp.problems import PlanError, PlanProblem
 
@@ -48,7 +59,7 @@ class ExecutionRule(NamedTuple):
     """
 
     action: str
-    rule: Rule
+    rule: Interrupt
     line: int = 0
     ignored: str = ""
 
@@ -131,7 +142,7 @@ def _error(file: str, line: int, message: str) -> PlanError:
     return PlanError([PlanProblem("text", "error", message, "", file, line)])
 
 
-def rule_of(condition: str, recovery: str, file: str = "", line: int = 0) -> Rule:
+def rule_of(condition: str, recovery: str, file: str = "", line: int = 0) -> Interrupt:
     """Read a rule from its two parts.
 
     Raises:
@@ -148,7 +159,7 @@ def rule_of(condition: str, recovery: str, file: str = "", line: int = 0) -> Rul
         text = f"recovery: got {last!r} at its end; expected one of {list(LASTS)}, or GOTO_LABEL."
         raise _error(file, line, text + did_you_mean(last, LASTS))
     parts = [_act(step, file, line) for step in steps if step]
-    return Rule(condition, tuple(parts), f"GOTO_{goto[1]}" if goto else last)
+    return Interrupt(condition, tuple(parts), f"GOTO_{goto[1]}" if goto else last)
 
 
 def _act(step: str, file: str, line: int) -> Action:

@@ -5,7 +5,7 @@ from types import SimpleNamespace as Message
 import pytest
 
 from smachpy_viz.model.progress import (
-    Progress,
+    GoalProgress,
     Written,
     progress_of,
     seconds_left,
@@ -22,7 +22,7 @@ def progress(goal, first, now):
 
 
 def test_without_feedback_there_is_nothing_to_tell():
-    assert progress(None, None, None) == Progress()
+    assert progress(None, None, None) == GoalProgress()
 
 
 def test_the_way_left_of_move_base_is_measured_to_the_target():
@@ -109,7 +109,7 @@ def test_messages_that_raise_are_left_out():
         def __getattr__(self, name):
             raise ValueError(name)
 
-    assert progress(Bad(), Bad(), Bad()) == Progress()
+    assert progress(Bad(), Bad(), Bad()) == GoalProgress()
 
 
 @pytest.mark.parametrize(

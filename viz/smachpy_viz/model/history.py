@@ -21,7 +21,7 @@ _EVENT_TYPES = frozenset(EVENT_TYPES)
 
 
 @dataclass(slots=True)
-class Goal:
+class RunningGoal:
     """A goal that is running.
 
     Attributes:
@@ -117,12 +117,12 @@ class History:
                 if state["visits"] or state["outcomes"]
             }
 
-    def goals(self) -> list[Goal]:
+    def goals(self) -> list[RunningGoal]:
         """Return a copy of the running goals, oldest first."""
         with self._lock:
             return list(self._running_goals())
 
-    def goal(self, goal_id: str) -> Goal | None:
+    def goal(self, goal_id: str) -> RunningGoal | None:
         """Return a copy of a running goal; None if it is not running."""
         return next((goal for goal in self.goals() if goal.goal_id == goal_id), None)
 
@@ -155,7 +155,7 @@ class History:
         """How long the newest finished run took [s]."""
         return self._seconds
 
-    def _running_goals(self) -> Iterator[Goal]:
+    def _running_goals(self) -> Iterator[RunningGoal]:
         """Yield the goals without an end whose state is still in the same visit.
 
         A goal whose state has ended, or was entered again since, is over even if its own end was
@@ -167,7 +167,7 @@ class History:
             visited, since = state["visits"] or state["outcomes"], state["since"]
             outlived = visited if since is None else goal["since"] < since
             if goal["ended"] is None and not outlived:
-                yield Goal(
+                yield RunningGoal(
                     goal["path"],
                     goal["action"],
                     goal_id,

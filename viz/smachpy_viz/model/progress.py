@@ -27,7 +27,7 @@ MIN_SECONDS = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class GoalProgress:
     """The progress of a running goal.
 
     Attributes:
@@ -41,7 +41,7 @@ class Progress:
     text: str = ""
 
 
-def progress_of(goal: Any, feedback: Any, first: Any) -> Progress:
+def progress_of(goal: Any, feedback: Any, first: Any) -> GoalProgress:
     """Return a running goal's progress.
 
     Args:
@@ -50,9 +50,9 @@ def progress_of(goal: Any, feedback: Any, first: Any) -> Progress:
         first: Its first feedback; progress is measured from it.
     """
     if feedback is None:
-        return Progress()
+        return GoalProgress()
     distance = _distance(goal, feedback)
-    return Progress(_fraction(goal, feedback, first, distance), distance, _text(feedback))
+    return GoalProgress(_fraction(goal, feedback, first, distance), distance, _text(feedback))
 
 
 def seconds_left(feedback: Any, fraction: float | None, passed: float) -> float | None:

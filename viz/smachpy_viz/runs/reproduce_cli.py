@@ -15,7 +15,7 @@ from actionlib_core.process.output import printable
 from smachpy.command import UsageError
 from smachpy.command.durable import whole_target
 from smachpy.command.on import (
-    Progress,
+    ProgressLine,
     add_jobs_and_on,
     opened_cluster,
     whole_place,
@@ -143,7 +143,7 @@ def _run(args: argparse.Namespace) -> int:
     verdicts = []
     with opened_cluster(args.on, options.mission, options.allow) as cluster:
         who = workers_text(cluster, args.jobs, len(paths))
-        progress = Progress(f"of {len(paths)} recordings", who)
+        progress = ProgressLine(f"of {len(paths)} recordings", who)
         for verdict in verdicts_of(paths, options, args.jobs, cluster, args.record):
             progress.end()
             verdicts.append(verdict)

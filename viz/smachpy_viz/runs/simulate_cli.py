@@ -16,7 +16,7 @@ from actionlib_core.process.output import printable
 from actionlib_core.process.private_files import make_private_folder
 from smachpy.command import UsageError
 from smachpy.command.durable import whole_target
-from smachpy.command.on import Progress, add_jobs_and_on, opened_cluster, workers_text
+from smachpy.command.on import ProgressLine, add_jobs_and_on, opened_cluster, workers_text
 from smachpy.command.queued import add_allow_packages
 from smachpy.command.run import time_span
 
@@ -254,7 +254,7 @@ class _RunCounter:
         self._waiting: dict[int, Result] = {}
         self._printed = 0
         shown = sys.stderr.isatty() and not as_json
-        self._progress = Progress(f"of {runs} runs", who, shown=shown)
+        self._progress = ProgressLine(f"of {runs} runs", who, shown=shown)
         self.end = self._progress.end
 
     def on_result(self, result: Result) -> None:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Clock, Task
     from smachpy import events as ev
     from smachpy.events.introspection import StateRecord
-    from smachpy_viz.model.history import Goal
+    from smachpy_viz.model.history import RunningGoal
     from smachpy_viz.model.progress import Written
 
 FRAME = 0.1
@@ -254,7 +254,7 @@ class TerminalView:
         line.overflow = "ellipsis"
         return line
 
-    def _goals(self, goals: list[Goal], now: float) -> Table:
+    def _goals(self, goals: list[RunningGoal], now: float) -> Table:
         wide = self._console.width >= NARROW
         table = Table.grid(padding=(0, 2), expand=False)
         for goal in goals:
