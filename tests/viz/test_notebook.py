@@ -78,6 +78,16 @@ def test_after_its_close_it_follows_nothing(machine):
     assert widget.status == "not started"
 
 
+def test_its_close_ends_the_wait_for_the_next_picture(machine):
+    """The thread that draws slept for the whole interval."""
+    widget = viz.MachineWidget(machine, interval=3600.0)
+    machine["HELD"].go_on.set()
+    machine.execute()
+    wait_for(lambda: widget.status != "not started")
+    widget.close()
+    assert widget._executor.join(60.0)
+
+
 def test_a_picture_that_cannot_be_drawn_stops_no_machine(machine, widget, monkeypatch):
     def fails(*_args, **_options):
         raise PictureError("no dot any more")

@@ -109,6 +109,7 @@ class MachineWidget(anywidget.AnyWidget):
         self._interval = interval
         self._history = History()
         self._clock = RealClock()  # `interval` is for people, also if the machine's time is virtual
+        self._closed = self._clock.event()
         self._executor = SerialExecutor(self._clock, "pictures of a notebook")
         self._lock = threading.Lock()
         self._is_due = False  # whether a drawing is submitted that has not begun
@@ -122,6 +123,8 @@ class MachineWidget(anywidget.AnyWidget):
         """
         if self._forget is not None:  # ipywidgets also closes a widget whose __init__ raised
             self._forget()
+        if self._executor is not None:
+            self._closed.set()
         if self._executor is not None:
             self._executor.join(CLOSE_S)
         super().close()
@@ -139,11 +142,13 @@ class MachineWidget(anywidget.AnyWidget):
         """Draw the newest state, then wait: events meanwhile make one further drawing."""
         with self._lock:  # cleared before drawing: an event during it is not in the picture
             self._is_due = False
+        if self._closed.is_set():
+            return
         try:
             self._draw()
         except SmachError as error:  # shown, because nobody calls this thread's function
             self.status = str(error)
-        self._clock.sleep(self._interval)
+        self._closed.wait(self._interval)
 
     def _draw(self) -> None:
         drawn = picture(self._machine, "svg", run=self._history, **self._looks)
