@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Self
 
-START_S = 20.0
-"""Longest wait for the viewer to print its address; then it is ended [s]."""
+START_S = 60.0
+"""Longest wait for the viewer to print its address, on a busy computer; then it is ended [s]."""
 
 
 class ViewerError(SmachError):
