@@ -306,7 +306,7 @@ def log_in(base, token, origin=None):
 def status(base, address, **headers):
     try:
         with urllib.request.urlopen(
-            urllib.request.Request(base + address, headers=headers), timeout=10
+            urllib.request.Request(base + address, headers=headers), timeout=60
         ) as answer:
             return answer.status
     except urllib.error.HTTPError as error:
