@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 from itertools import pairwise
+from unittest.mock import patch
 
 import pytest
 
@@ -12,6 +13,13 @@ from smachpy.events.introspection import RuleRecord, StateRecord, TransitionReco
 from smachpy_viz.pictures import graphviz_process
 
 STANDARD = ("succeeded", "aborted", "preempted")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def patient_drawing():
+    """A busy computer is no failure; a test of the limit sets its own."""
+    with patch.object(graphviz_process, "TIME_LIMIT", 120.0):
+        yield
 
 
 def leaf(label, kind="action", outcomes=STANDARD, **more):

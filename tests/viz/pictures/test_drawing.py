@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 from xml.etree import ElementTree as ET
@@ -255,21 +254,6 @@ def test_the_atlas_has_a_page_per_container_and_links_them(patrol, tmp_path):
 def test_the_atlas_of_a_plain_state_is_its_one_page(build, tmp_path):
     viz.atlas(build.rooted(build.leaf("A")), tmp_path)
     assert [page.name for page in tmp_path.iterdir()] == ["index.svg"]
-
-
-@pytest.mark.slow
-def test_times_to_hold(large, tmp_path):
-    def took(work):
-        """Return the seconds that this process and those it started computed."""
-        began = os.times()
-        work()
-        return sum(os.times()[:4]) - sum(began[:4])
-
-    sixty, five_hundred = large(60), large(500)
-    viz.picture(sixty, "svg")  # imports and font caches
-    busy = 5  # other work may share the caches
-    assert min(took(lambda: viz.picture(sixty, "svg", depth=99)) for _ in range(3)) < 0.5 * busy
-    assert took(lambda: viz.atlas(five_hundred, tmp_path)) < 2 * busy
 
 
 def test_a_real_machine_is_drawn_before_and_after_its_run():

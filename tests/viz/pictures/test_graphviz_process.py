@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -91,7 +90,7 @@ def test_without_any_program_both_remedies_are_named(monkeypatch, tmp_path):
 @pytest.mark.slow
 def test_a_layout_that_never_ends_is_tried_cheaper_and_given_up(monkeypatch, tmp_path):
     program = tmp_path / "dot"
-    program.write_text("#!/bin/sh\nexec sleep 60\n")
+    program.write_text("#!/bin/sh\nexec sleep 600\n")
     program.chmod(0o755)
     commands, start = [], subprocess.Popen
 
@@ -102,10 +101,8 @@ def test_a_layout_that_never_ends_is_tried_cheaper_and_given_up(monkeypatch, tmp
     monkeypatch.setattr(subprocess, "Popen", started)
     monkeypatch.setenv(graphviz_process.DOT_VARIABLE, str(program))
     monkeypatch.setattr(graphviz_process, "TIME_LIMIT", 0.2)
-    began = time.monotonic()
     with pytest.raises(graphviz_process.EngineError, match="twice"):
         graphviz_process.lay_out(lambda run: run([TEXT]))
-    assert time.monotonic() - began < 30
     assert ["nslimit" in " ".join(command) for command in commands] == [False, True]
 
 
