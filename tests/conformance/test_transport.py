@@ -11,6 +11,7 @@ from actionlib_core.transport import Presence, Quality, Reply, Sample
 
 GOAL = "robot_0/move_base/goal"
 LATCH = Quality(latch=True)
+HOUR_S = 3600.0  # what ends only then has not ended at once, on a busy computer either
 
 
 def payloads(items):
@@ -464,11 +465,9 @@ def test_query_for_the_best_reaches_one_complete_queryable(network, complete):
 
 def test_query_that_nobody_answers_is_done_at_once(network):
     a = network.session()
-    start = network.clock.now()
-    _, replies, done = ask(network, a, timeout=60.0)
+    _, replies, done = ask(network, a, timeout=HOUR_S)
     done.wait_for(1)
     assert replies.items == []
-    assert network.clock.now() - start < 20.0
 
 
 def test_error_reply_is_marked(network):
@@ -525,13 +524,11 @@ def test_query_ends_when_the_answering_session_closes(network):
     asked = network.inbox()
     b.queryable("add", asked)
     network.meet(a, b)
-    start = network.clock.now()
-    _, replies, done = ask(network, a, timeout=60.0)
+    _, replies, done = ask(network, a, timeout=HOUR_S)
     asked.wait_for(1)
     b.close()
     done.wait_for(1)
     assert replies.items == []
-    assert network.clock.now() - start < 20.0
 
 
 def test_closed_query_calls_nothing(network):
@@ -815,11 +812,9 @@ def test_close_does_not_wait_for_queries_that_are_open(network):
     asked = network.inbox()
     b.queryable("add", asked)
     network.meet(a, b)
-    _, replies, done = ask(network, a, timeout=60.0)
+    _, replies, done = ask(network, a, timeout=HOUR_S)
     asked.wait_for(1)
-    start = network.clock.now()
     a.close()
-    assert network.clock.now() - start < 20.0
     assert (replies.items, done.items) == ([], [])
 
 

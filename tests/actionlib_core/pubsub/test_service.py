@@ -476,17 +476,16 @@ def test_server_that_leaves_ends_a_call_over_zenoh():
             return True, ""
 
         Service("grip", SetBool, handler, node=server)
-        proxy = ServiceProxy("grip", SetBool, timeout=60, node=caller)
+        proxy = ServiceProxy("grip", SetBool, timeout=3600, node=caller)
+        proxy.wait_for_service(60)
 
         def leave():
             started.wait(60)
             server.close()
 
         task = clock.spawn(leave, name="leave")
-        start = clock.now()
         with pytest.raises(ServiceLostError):
             proxy(True)
-        assert clock.now() - start < 30
         release.set()
         assert task.join(60)
 

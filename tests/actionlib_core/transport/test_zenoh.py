@@ -166,14 +166,10 @@ def test_killed_process_is_seen_at_once(tmp_path):
         with child(START + "sys.stdin.readline()", SMACHPY_CONFIG=str(file)) as process:
             watch.wait(lambda alive: alive)
             done = CLOCK.event()
-            transport.query("add", b"", timeout=60, on_reply=print, on_done=done.set)
+            transport.query("add", b"", timeout=3600.0, on_reply=print, on_done=done.set)
             process.kill()
-            start = CLOCK.now()
-            watch.wait(lambda alive: not alive)
+            watch.wait(lambda alive: not alive)  # not by its link's silence: the lease is longer
             assert done.wait(WAIT_S)
-            assert (
-                CLOCK.now() - start < 50.0
-            )  # not by the silence of its link, which takes the lease
     finally:
         transport.close()
 
@@ -188,9 +184,7 @@ def test_stopped_process_is_lost_after_its_lease_and_found_again(tmp_path):
         with child(START + "sys.stdin.readline()", SMACHPY_CONFIG=str(file)) as process:
             watch.wait(lambda alive: alive)
             process.send_signal(signal.SIGSTOP)
-            start = CLOCK.now()
             watch.wait(lambda alive: not alive)
-            assert 0.5 < CLOCK.now() - start < 8.0
             process.send_signal(signal.SIGCONT)
             # Peers look for each other ever more rarely, at last every 8 s, and one look may be
             # too early: before the other side has noticed that the old link is dead.
@@ -200,7 +194,7 @@ def test_stopped_process_is_lost_after_its_lease_and_found_again(tmp_path):
 
 
 @pytest.mark.slow
-def test_close_does_not_wait_for_a_process_that_does_not_read():
+def test_close_does_not_wait_for_a_process_that_does_not_read(monkeypatch):
     transport = ZenohTransport()
     watch = Watch(transport)
     with child(START + "sys.stdin.readline()") as process:
@@ -220,9 +214,10 @@ def test_close_does_not_wait_for_a_process_that_does_not_read():
 
         task = CLOCK.spawn(flood, name="flood")
         assert stuck.wait(WAIT_S)
-        start = CLOCK.now()
+        monkeypatch.setattr(zenoh_transport, "CLOSE_S", 0.1)
         transport.close()
-        assert CLOCK.now() - start < 9.0  # zenoh's own waits for 10 s
+        # Zenoh's own close waits for 10 s: it has been left behind.
+        assert any(thread.name == "transport-close" for thread in threading.enumerate())
         process.kill()
         assert task.join(WAIT_S)
 
