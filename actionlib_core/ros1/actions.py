@@ -419,7 +419,7 @@ class _ShownServer:
         """Pass on a status list, except the empty lists that an idle server keeps sending."""
         entries = unpack_statuses(payload)
         with self._lock:
-            news = self._goals.on_statuses(entries)
+            news = self._goals.on_statuses(entries, self._clock.now())
         if news:
             with contextlib.suppress(TransportError):  # withdrawn meanwhile
                 self._status.put(payload)

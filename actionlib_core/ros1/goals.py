@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 REMEMBERED = 100_000  # ids, as many as our own servers remember
 RESULT_KEPT_S = 60.0  # results are kept for this time, or until they are acknowledged
+# A server lists a goal as ended just before it sends the result, on another connection: a busy
+# computer may be late with that.
+RESULT_COMES_S = 5.0
 LISTED_S = 1.0  # a server lists a goal that was passed to it within this time
 RESULT_LOST = "the result message itself was lost"
 UNKNOWN = "the server in ROS 1 does not list this goal"
@@ -43,6 +46,9 @@ class GoalsOfServer:
         self._known = Recent(REMEMBERED)
         self._listed: dict[str, StatusEntry] = {}
         self._results: dict[str, tuple[float, bytes]] = {}
+        self._had_result = Recent(REMEMBERED)
+        # Goals that were listed as ended and whose result is not here: id -> when, and the status.
+        self._ended: dict[str, tuple[float, StatusEntry]] = {}
         self._passed: dict[str, float] = {}  # id -> until when the server may not list it yet
         # A client in this process sends each goal both ways; the copies may arrive in any order.
         self._came_directly = Recent(REMEMBERED)  # and not yet over the network
@@ -72,11 +78,15 @@ class GoalsOfServer:
         self._passed.pop(goal_id, None)  # repeated: the newest is the last
         self._passed[goal_id] = now + LISTED_S
 
-    def on_statuses(self, entries: Iterable[StatusEntry]) -> bool:
+    def on_statuses(self, entries: Iterable[StatusEntry], now: float) -> bool:
         """Handle a status list; return whether it or the list before contains a goal."""
         listed = {entry.id: entry for entry in entries}
+        while self._ended and next(iter(self._ended.values()))[0] + RESULT_KEPT_S <= now:
+            del self._ended[next(iter(self._ended))]
         for entry in listed.values():
             self._note_known(entry)
+            if entry.status in TERMINAL and entry.id not in self._had_result:
+                self._ended.setdefault(entry.id, (now, entry))
         news = bool(listed) or bool(self._listed)
         self._listed = listed
         return news
@@ -84,6 +94,8 @@ class GoalsOfServer:
     def on_result(self, entry: StatusEntry, payload: bytes, now: float) -> None:
         """Keep a result; `payload` is the whole message."""
         self._note_known(entry)
+        self._had_result.add(entry.id)
+        self._ended.pop(entry.id, None)
         while self._results and next(iter(self._results.values()))[0] <= now:
             del self._results[next(iter(self._results))]
         self._results[entry.id] = now + RESULT_KEPT_S, payload
@@ -101,6 +113,10 @@ class GoalsOfServer:
     def status(self, goal_id: str, now: float) -> StatusEntry:
         """Return the status of a goal whose result is not here."""
         entry = self._listed.get(goal_id)
+        if goal_id in self._ended:
+            since, entry = self._ended[goal_id]
+            if now < since + RESULT_COMES_S:
+                return entry._replace(status=Status.PENDING)  # until it is sure how it ends
         if entry is None:
             if now < self._passed.get(goal_id, now) and goal_id not in self._known:
                 return StatusEntry(goal_id, 0, Status.PENDING, "")

@@ -118,11 +118,11 @@ def entry(goal_id, status, text=""):
 def test_a_goal_is_passed_until_the_server_speaks_of_it():
     goals = GoalsOfServer()
     assert goals.on_goal("g") is Admission.PASS
-    goals.on_statuses([entry("g", Status.RECALLING)])
+    goals.on_statuses([entry("g", Status.RECALLING)], now=0.0)
     assert goals.on_goal("g") is Admission.PASS
-    goals.on_statuses([entry("g", Status.ACTIVE)])
+    goals.on_statuses([entry("g", Status.ACTIVE)], now=0.0)
     assert goals.on_goal("g") is Admission.DROP
-    goals.on_statuses([])
+    goals.on_statuses([], now=0.0)
     assert goals.on_goal("g") is Admission.DROP  # ended long ago: the server would run it again
     assert goals.on_goal("") is Admission.PASS
 
@@ -154,11 +154,28 @@ def test_a_result_is_sent_again_until_it_is_acknowledged_or_old():
 def test_a_final_status_without_a_result_says_that_the_message_was_lost():
     goals = GoalsOfServer()
     assert goals.status("g", now=0.0).status == Status.LOST
-    goals.on_statuses([entry("g", Status.ACTIVE, "on my way")])
+    goals.on_statuses([entry("g", Status.ACTIVE, "on my way")], now=0.0)
     assert goals.status("g", now=0.0).text == "on my way"
-    goals.on_statuses([entry("g", Status.SUCCEEDED, "there")])
-    assert goals.status("g", now=0.0).status == Status.SUCCEEDED
-    assert "result message itself was lost" in goals.status("g", now=0.0).text
+    for now in (0.0, 4.0):
+        goals.on_statuses([entry("g", Status.SUCCEEDED, "there")], now=now)
+    assert goals.status("g", now=5.0).status == Status.SUCCEEDED
+    assert "result message itself was lost" in goals.status("g", now=5.0).text
+    goals.on_statuses([], now=5.1)  # no longer listed
+    assert goals.status("g", now=6.0).status == Status.SUCCEEDED
+    goals.on_statuses([entry("h", Status.ABORTED)], now=66.0)
+    assert goals.status("g", now=66.0).status == Status.LOST
+
+
+def test_a_result_that_comes_later_than_its_status_is_not_lost():
+    """On a busy computer the client was told that it was lost, and ended without it."""
+    goals = GoalsOfServer()
+    goals.on_statuses([entry("g", Status.SUCCEEDED, "there")], now=0.0)
+    assert goals.status("g", now=4.9).status == Status.PENDING
+    goals.on_result(entry("g", Status.SUCCEEDED), b"result", now=4.9)
+    assert goals.result("g") == b"result"
+    goals.on_acknowledged(["g"])
+    goals.on_statuses([entry("g", Status.SUCCEEDED, "there")], now=5.0)
+    assert goals.status("g", now=5.0).status == Status.SUCCEEDED
 
 
 def test_a_goal_on_its_way_to_the_server_is_not_lost():
@@ -166,22 +183,22 @@ def test_a_goal_on_its_way_to_the_server_is_not_lost():
     goals = GoalsOfServer()
     assert goals.on_goal("g") is Admission.PASS
     goals.on_passed("g", now=0.0)
-    goals.on_statuses([])  # made before the goal arrived
+    goals.on_statuses([], now=0.0)  # made before the goal arrived
     assert goals.status("g", now=0.9).status == Status.PENDING
     assert goals.status("g", now=1.0).status == Status.LOST  # it has not arrived at all
     goals.on_passed("g", now=1.0)
-    goals.on_statuses([entry("g", Status.ACTIVE)])
+    goals.on_statuses([entry("g", Status.ACTIVE)], now=0.0)
     assert goals.status("g", now=1.1).status == Status.ACTIVE
-    goals.on_statuses([])  # ended, and no longer listed
+    goals.on_statuses([], now=0.0)  # ended, and no longer listed
     assert goals.status("g", now=1.2).status == Status.LOST
 
 
 def test_an_idle_servers_status_is_news_once():
     goals = GoalsOfServer()
-    assert not goals.on_statuses([])
-    assert goals.on_statuses([entry("g", Status.ACTIVE)])
-    assert goals.on_statuses([])
-    assert not goals.on_statuses([])
+    assert not goals.on_statuses([], now=0.0)
+    assert goals.on_statuses([entry("g", Status.ACTIVE)], now=0.0)
+    assert goals.on_statuses([], now=0.0)
+    assert not goals.on_statuses([], now=0.0)
 
 
 def test_goals_of_clients_are_sent_again_until_the_server_speaks_of_them():
