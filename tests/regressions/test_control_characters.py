@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import subprocess
 import sys
 
@@ -31,8 +32,18 @@ def mission(how: str = "outcome"):
         sm.add("A" + BAD, smachpy.CBState(work, outcomes=["done" + BAD], output_keys=["x"]))
     return sm
 """
-SMACHPY = "import sys; from smachpy.command import main; sys.exit(main())"
-ACTIONLIB = "import sys; from actionlib_core.cli import main; sys.exit(main())"
+# Executes commands one after another; each ends with its exit code on a line of both outputs.
+PROGRAM = """
+import sys
+from {module} import main
+for words in {commands!r}:
+    try:
+        code = main(words)
+    except SystemExit as ended:
+        code = ended.code
+    for output in (sys.stdout, sys.stderr):
+        print(f"ended with {{code}}", file=output, flush=True)
+"""
 
 
 def bad_characters(text):
@@ -46,44 +57,49 @@ def mission_file(tmp_path):
     return str(path)
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["run", "{}", "--plain"],
-        ["run", "{}", "--json"],
-        ["run", "{}", "--plain", "--", "raise"],
-        ["run", "{}", "--plain", "--debug", "--", "raise"],
-        ["run", "{}", "--plain", "--", "log"],
-        ["run", "{}", "--plain", "--", "too", f"many{BAD}"],
-        ["run", f"nothing{BAD}"],
-        ["run", "{}", f"--nothing{BAD}"],
-        ["run", "{}", "--plain", "--success", BAD],
-        ["check", "{}"],
-        ["list"],
-    ],
-)
-def test_a_command_of_smachpy_writes_none(words, mission_file):
+def execute(module, commands):
+    """Execute commands in a process of their own; what each wrote, and its exit code."""
     done = subprocess.run(
-        [sys.executable, "-c", SMACHPY, *(word.format(mission_file) for word in words)],
+        [sys.executable, "-c", PROGRAM.format(module=module, commands=commands)],
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=280,
     )
-    assert bad_characters(done.stdout) == set()
-    assert bad_characters(done.stderr) == set()
+    assert done.returncode == 0, done.stderr
+    out, err = (re.split(r"ended with (\d+)\n", text)[:-1] for text in (done.stdout, done.stderr))
+    assert out[1::2] == err[1::2]
+    codes = [int(code) for code in out[1::2]]
+    return list(zip(commands, out[::2], err[::2], codes, strict=True))
 
 
-@pytest.mark.parametrize(
-    "words",
-    [["interface", "show", BAD], [BAD], ["topic", "pub", "-1", "a", "std_msgs/String", BAD]],
-)
-def test_a_command_of_actionlib_writes_none(words):
-    done = subprocess.run(
-        [sys.executable, "-c", ACTIONLIB, *words], capture_output=True, text=True, timeout=100
-    )
-    assert done.returncode == 2
-    assert bad_characters(done.stdout) == set()
-    assert bad_characters(done.stderr) == set()
+def test_the_commands_of_smachpy_write_none(mission_file):
+    commands = [
+        ["run", mission_file, "--plain"],
+        ["run", mission_file, "--json"],
+        ["run", mission_file, "--plain", "--", "raise"],
+        ["run", mission_file, "--plain", "--debug", "--", "raise"],
+        ["run", mission_file, "--plain", "--", "log"],
+        ["run", mission_file, "--plain", "--", "too", f"many{BAD}"],
+        ["run", f"nothing{BAD}"],
+        ["run", mission_file, f"--nothing{BAD}"],
+        ["run", mission_file, "--plain", "--success", BAD],
+        ["check", mission_file],
+        ["list"],
+    ]
+    for words, out, err, _ in execute("smachpy.command", commands):
+        assert out or err, words
+        assert bad_characters(out + err) == set(), words
+
+
+def test_the_commands_of_actionlib_write_none():
+    commands = [
+        ["interface", "show", BAD],
+        [BAD],
+        ["topic", "pub", "-1", "a", "std_msgs/String", BAD],
+    ]
+    for words, out, err, code in execute("actionlib_core.cli", commands):
+        assert code == 2, words
+        assert bad_characters(out + err) == set(), words
 
 
 def test_recorded_runs_are_listed_without(mission_file, tmp_path, capsys):

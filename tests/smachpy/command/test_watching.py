@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from smachpy.command import runs_folder
+from smachpy.command import main, runs_folder
 from smachpy.events import recording
 from smachpy.events.recording import read_recording
 
@@ -186,10 +186,11 @@ def test_ctrl_c_while_it_runs_ends_all(run):
 
 
 @pytest.mark.parametrize("wrong", ["-1", "ten", "1d", "nan", "inf", "", "1e3", "5 m"])
-def test_a_time_for_the_page_that_is_none_is_refused(run, wrong):
-    process = run("--view", f"--view-for={wrong}")
-    assert f"got {wrong!r}; expected a time such as" in process.stdout.read()
-    assert process.wait(60) == 2
+def test_a_time_for_the_page_that_is_none_is_refused(wrong, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["run", "nap.py", "--view", f"--view-for={wrong}"])
+    assert ended.value.code == 2
+    assert f"got {wrong!r}; expected a time such as" in capsys.readouterr().err
 
 
 @pytest.mark.slow
