@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core.action._callbacks import CallbackQueue
+from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.clock import wall_time
 from actionlib_core.exceptions import (
     ActionException,
@@ -259,7 +260,8 @@ class StatusPublisher:
 
     def on_change(self) -> None:
         """Send the list, now or soon, as a goal has changed."""
-        # Read without the lock: the list is made after this is reset, so it has this change.
+        # No lock is needed: a list that waits to be sent is made after this is reset, so it has the
+        # change.
         if self._change_waits:
             return
         with self._lock:
@@ -709,8 +711,6 @@ class GoalKeeper:
         Nothing here waits while a link is full: a client that misses the answer asks again.
         """
         if not goal_id:  # as in ROS: a goal of a program that only publishes messages
-            from actionlib_core.action.client import GoalIDGenerator
-
             ids = GoalIDGenerator(f"/{self.node.full_name}", clock=self._clock)
             goal_id, stamp_ns = ids.generate()
         self._check_clock(f"goal {goal_id}", stamp_ns, client)

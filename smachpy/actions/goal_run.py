@@ -23,7 +23,8 @@ from smachpy.events import GoalDone, GoalFeedback, GoalSent
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.action.client import ActionClient, ClientGoalHandle
+    from actionlib_core.action.client import ActionClient
+    from actionlib_core.action.goal_handle import ClientGoalHandle
     from actionlib_core.clock import Timer
     from actionlib_core.goal.states import CommState
     from smachpy.actions.wakeup import Wakeup

@@ -6,7 +6,15 @@ import sys
 
 import pytest
 
-from actionlib_core import ActionClient, Preempted, SimpleActionClient, server
+from actionlib_core import (
+    ActionClient,
+    ClientGoalHandle,
+    GoalIDGenerator,
+    GoalManager,
+    Preempted,
+    SimpleActionClient,
+    server,
+)
 from actionlib_core.action.sent_goal import SentGoal
 from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.actionlib import msg
@@ -15,7 +23,14 @@ from actionlib_core.transport.memory import MemoryNetwork
 
 CLIENT = {
     sys.modules[class_.__module__].__file__
-    for class_ in (ActionClient, SentGoal, SimpleActionClient)
+    for class_ in (
+        ActionClient,
+        ClientGoalHandle,
+        GoalIDGenerator,
+        GoalManager,
+        SentGoal,
+        SimpleActionClient,
+    )
 }
 
 
