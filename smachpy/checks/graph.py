@@ -228,14 +228,14 @@ class _Builder:
                 f"{record.path}: the machine has more than {MAX_NODES} moments; expected fewer. "
                 "Try checking its parts."
             )
-        enter = self._node(record, None)
+        enter = self.graph.add(record, None)
         if not record.is_container:
             outcomes = possible(record, self._subject.facts_of(record))
-            part = _GraphPiece(enter, {o: self._node(record, o) for o in outcomes})
+            part = _GraphPiece(enter, {o: self.graph.add(record, o) for o in outcomes})
             for outcome, node in part.ends.items():
                 self._edge(enter, node, preempt=outcome == PREEMPTED)
             return part
-        part = _GraphPiece(enter, {o: self._node(record, o) for o in record.outcomes})
+        part = _GraphPiece(enter, {o: self.graph.add(record, o) for o in record.outcomes})
         if record.cleanup:
             others, at_ends = self._before_cleanup(record, part)
             self._children(others, at_ends)
@@ -349,9 +349,6 @@ class _Builder:
                 self._edge(node, part.ends[outcome])
         if PREEMPTED in part.ends:
             self._edge(part.enter, part.ends[PREEMPTED], preempt=True, framework=True)
-
-    def _node(self, record: StateRecord, outcome: str | None) -> GraphNode:
-        return self.graph.add(record, outcome)
 
     def _edge(
         self,

@@ -6,7 +6,7 @@ import copy
 import inspect
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core import shutdown
 from smachpy.base import log
@@ -200,9 +200,6 @@ class _NoTransitions(dict[str, Decision]):
 
     def __contains__(self, _key: object) -> bool:
         raise Interruption
-
-
-Following: TypeAlias = Step | End
 
 
 class _WatchedRemapper(Remapper):

@@ -38,7 +38,6 @@ _ODD: Final = re.compile(
 )
 _FREE_INTERVAL: Final = frozenset({"", "[0,inf)", "1"})
 _UNLIMITED: Final = frozenset({"", "0", "-1", "inf", "infinity", "∞", "omega", "unbounded"})
-_COLOURED: Final = re.compile(r"(?:([^,]*),)?\s*([0-9]+)")
 
 
 class Excess(NamedTuple):

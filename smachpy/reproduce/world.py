@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Mapping
 
     from smachpy.events.recording import Recording
 
@@ -465,12 +465,3 @@ def _is_passed_on(events: list[dict[str, Any]], number: int) -> bool:
         ):
             return True
     return False
-
-
-def each_value(world: World) -> Iterator[Any]:
-    """Yield the recorded messages."""
-    for action in world.actions.values():
-        for goal in action.goals:
-            yield goal.value
-            yield from (answer.value for answer in goal.answers)
-    yield from (act.value for act in world.acts if act.what in {"message", "asked"})

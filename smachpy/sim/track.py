@@ -46,6 +46,7 @@ _ROBOTS: Final[tuple[Colour, ...]] = (
     (160, 150, 20),
     (0, 160, 175),
 )
+ROBOT_RADIUS: Final = 0.25  # [m]
 _AT_DOCK: Final = 0.5  # [m] goals closer to the charger than this get no mark
 
 
@@ -71,7 +72,6 @@ def draw_track(
     goals: Sequence[GoalMark],
     *,
     dock: Pose2D | None = None,
-    robot_radius: float = 0.25,
     title: str = "",
 ) -> None:
     """Write the picture, in the format of the file name's extension.
@@ -82,7 +82,6 @@ def draw_track(
         track: The positions of the robot, (x, y) [m] in the map frame, in order.
         goals: The goals, in order; goals at one place are drawn as one, with the last one's result.
         dock: Position of the charger.
-        robot_radius: [m], for the robot at the end of its way.
         title: A line below the picture.
 
     Raises:
@@ -91,10 +90,10 @@ def draw_track(
     """
     canvas = _Canvas(grid)
     if dock is not None:
-        canvas.dock(dock, robot_radius)
+        canvas.dock(dock, ROBOT_RADIUS)
     canvas.track(track)
     if track:
-        canvas.robot(track, robot_radius)
+        canvas.robot(track, ROBOT_RADIUS)
     canvas.goals([goal for goal in goals if dock is None or goal.pose.distance(dock) > _AT_DOCK])
     canvas.finish(title, length=_length(track)).save(path)
 
@@ -106,7 +105,6 @@ def draw_tracks(
     *,
     lost: Collection[str] = (),
     docks: Iterable[Pose2D] = (),
-    robot_radius: float = 0.25,
     title: str = "",
 ) -> None:
     """Draw the ways of several robots, each in its own colour.
@@ -117,7 +115,6 @@ def draw_tracks(
         tracks: By the robot's name: its positions, (x, y) [m] in the map frame, in order.
         lost: Robots that were lost at the end of their track; they get a cross.
         docks: Positions of the chargers.
-        robot_radius: [m], for the robots at the ends of their ways.
         title: A line below the picture.
 
     Raises:
@@ -126,13 +123,13 @@ def draw_tracks(
     """
     canvas = _Canvas(grid)
     for dock in docks:
-        canvas.dock(dock, robot_radius)
+        canvas.dock(dock, ROBOT_RADIUS)
     shown = [(name, way, _ROBOTS[i % len(_ROBOTS)]) for i, (name, way) in enumerate(tracks.items())]
     for _, way, colour in shown:
         canvas.track(way, colour)
     for name, way, colour in shown:
         if way:
-            canvas.end(way[-1], colour, robot_radius, number=_number(name), lost=name in lost)
+            canvas.end(way[-1], colour, ROBOT_RADIUS, number=_number(name), lost=name in lost)
     legend = [(name, colour, _length(way)) for name, way, colour in shown]
     canvas.finish_several(title, legend).save(path)
 

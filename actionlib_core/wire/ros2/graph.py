@@ -194,9 +194,10 @@ class RosNode:
             raise
         return watches
 
-    def list_others(self, timeout: float = LIST_TIMEOUT_S) -> list[Token]:
+    def list_others(self) -> list[Token]:
         """Return the tokens of other sessions, of all domains; blocks as `list`."""
-        found = (parse_token(key) for key in self.transport.list_alive(f"{ROOT}/**", timeout))
+        keys = self.transport.list_alive(f"{ROOT}/**", LIST_TIMEOUT_S)
+        found = (parse_token(key) for key in keys)
         own = self.token.session
         return [token for token in found if token is not None and token.session != own]
 

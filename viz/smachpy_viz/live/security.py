@@ -126,16 +126,6 @@ class Access:
         self._command_token = command_token
         self._read_token = read_token
 
-    @property
-    def takes_commands(self) -> bool:
-        """Whether any command is accepted."""
-        return self._command_token is not None
-
-    @property
-    def asks_readers(self) -> bool:
-        """Whether reading needs a token."""
-        return self._read_token is not None
-
     def check_command(self, request: Request) -> None:
         """Check that a request may command.
 

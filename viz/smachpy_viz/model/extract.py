@@ -50,13 +50,13 @@ def find(record: StateRecord, path: str) -> StateRecord:
     raise UnknownPathError(path, [candidate.path for candidate in record.walk()])
 
 
-def readable_depth(record: StateRecord, most: int = READABLE) -> int:
-    """Return the greatest depth at which at most `most` states are visible, at least 1."""
+def readable_depth(record: StateRecord) -> int:
+    """Return the greatest depth at which at most `READABLE` states are visible, at least 1."""
     level: list[StateRecord] = [record]
     visible = depth = 0
     while level:
         visible += len(level)
-        if visible > most and depth > 1:
+        if visible > READABLE and depth > 1:
             break
         depth += 1
         level = [child for state in level for child in state.children]
