@@ -47,7 +47,7 @@ def set_accepting(on: bool) -> None:
 
 
 def _allowed_name(name: str, kind: str) -> str:
-    """Return a name that the network allows for one that rospy allowed."""
+    """Return the name to use instead of one that rospy accepted and the network refuses."""
     single = re.sub("//+", "/", name)
     single = single.rstrip("/") or single
     made = re.sub(r"(?!^)~|[^\w/~]", "_", single, flags=re.ASCII)

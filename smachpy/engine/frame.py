@@ -57,7 +57,7 @@ class Gate(Protocol):
         """Block before `step` while the machine is paused."""
 
     def release(self, path: str) -> None:
-        """Wake the state at `path`, which may wait at the gate, to see that it is called off."""
+        """Wake the state at `path` if it waits at the gate: it must no longer begin."""
 
     def note_outcome(self, frame: Frame, step: Any, outcome: object) -> None:
         """Pause after `step` if there is a breakpoint on this outcome of it."""

@@ -157,7 +157,7 @@ class RunJournal:
         """Write that it goes on."""
 
     def goes_on(self, frame: Frame) -> bool:  # noqa: ARG002
-        """Return whether the child of `frame` had children that began, or a goal, to resume."""
+        """Return whether the child of `frame` left something to resume: a child or a goal."""
         return True
 
     def decide(self, frame: Frame, userdata: Any) -> Any:

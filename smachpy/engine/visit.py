@@ -118,8 +118,8 @@ def _rows() -> Iterator[Row]:
     yield Row(e.NEXT_ATTEMPT, (p.ASKED, p.OVERDUE), p.RUNNING, (do.CLEAR,))
     yield Row(e.END, tuple(x for x in p if x not in over), p.ENDED, (do.CLEAR,))
 
-    # Late events change nothing here; a request stays with the run, and `after` or the next visit
-    # meets it.
+    # Events that come too late change nothing. A late request to stop is not lost: the run keeps
+    # it, and `after` or the next visit acts on it.
     yield Row(e.ASK, over, None)
     yield Row(e.TIME_OVER, over, None)
     yield Row(e.SERVICE, (p.RUNNING, *over), None)

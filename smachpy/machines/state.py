@@ -445,8 +445,8 @@ def _read_only(state: State) -> InvalidStateError:
     """Return the error for a state, such as a frozen dataclass, that refuses new attributes."""
     name = type(state).__name__
     problem = (
-        "state: got a class whose attributes cannot be set; expected one whose attributes can, as "
-        "a preempt is noted in one. Try the dataclass without frozen=True."
+        "state: got a class whose attributes cannot be set; expected one that allows it, as a "
+        "preempt sets an attribute. Try the dataclass without frozen=True."
     )
     return InvalidStateError(f"{name}: {problem}", [problem])
 
