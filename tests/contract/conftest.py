@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 from typing import TYPE_CHECKING
@@ -120,15 +121,22 @@ class World:
             node.transport.close()
 
 
-@pytest.fixture(params=TRANSPORTS)
-def world(request: pytest.FixtureRequest) -> Iterator[World]:
+@contextlib.contextmanager
+def opened_world(transport: str, kind: type[World] = World) -> Iterator[World]:
+    """Make a world on one of the networks, and close it at the end."""
     seeds = itertools.count(SEED)
-    late = LATE_S if request.param == "faulty" else 0.0
+    late = LATE_S if transport == "faulty" else 0.0
 
     def make_faulty(session: Transport) -> Transport:
         return FaultyTransport(session, SmallFaults(next(seeds)))
 
-    with opened(request.param, SEED, make_faulty) as (clock, open_session):
-        world = World(clock, open_session, late=late)
+    with opened(transport, SEED, make_faulty) as (clock, open_session):
+        world = kind(clock, open_session, late=late)
         yield world
         world.close()
+
+
+@pytest.fixture(params=TRANSPORTS)
+def world(request: pytest.FixtureRequest) -> Iterator[World]:
+    with opened_world(request.param) as world:
+        yield world

@@ -6,7 +6,6 @@ fields, so that goals cross the wire as those of ROS 2 nodes do.
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 import pytest
@@ -15,18 +14,16 @@ from actionlib_core.action.client import TerminalState
 from actionlib_core.config import Config, Ros2
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces._ros2 import ros2_registry
-from actionlib_core.transport.faulty import FaultyTransport
 from actionlib_core.wire.ros2.goal_exchange import TEXT_REFUSED
-from tests.contract.conftest import LATE_S, SEED, SmallFaults, World
+from tests.contract.conftest import World, opened_world
 from tests.contract.test_actions import *  # noqa: F403  each test of the suite, with our `world`
-from tests.transports import TRANSPORTS, opened
+from tests.transports import TRANSPORTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from actionlib_core.action.client import ActionClient, ClientGoalHandle
     from actionlib_core.node import Node
-    from actionlib_core.transport import Transport
 
 NOT_ON_ROS2 = {
     "test_copy_of_a_goal_that_outlives_its_server_does_not_run_at_the_next": (
@@ -111,16 +108,8 @@ bool is_simple_server
 
 @pytest.fixture(params=TRANSPORTS)
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
-    seeds = itertools.count(SEED)
-    late = LATE_S if request.param == "faulty" else 0.0
-
-    def make_faulty(session: Transport) -> Transport:
-        return FaultyTransport(session, SmallFaults(next(seeds)))
-
-    with opened(request.param, SEED, make_faulty) as (clock, open_session):
-        world = Ros2World(clock, open_session, late=late)
+    with opened_world(request.param, Ros2World) as world:
         yield world
-        world.close()
 
 
 for _name in NOT_ON_ROS2:

@@ -4,21 +4,12 @@ import pytest
 
 from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-from actionlib_core.node import Node, use_node
-from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
 from smachpy.exceptions import MissionError
 from smachpy_missions.course.countdown import CountdownServer, countdown, main
 from smachpy_missions.interfaces import CountdownAction, CountdownGoal
-
-
-@pytest.fixture
-def node(clock):
-    network = MemoryNetwork(clock)
-    with Node("test", transport=network.session(), clock=clock) as node, use_node(node):
-        yield node
 
 
 @pytest.fixture

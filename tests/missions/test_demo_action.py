@@ -5,8 +5,6 @@ import pytest
 from actionlib_core.action.client import ActionClient, CommState
 from actionlib_core.action.simple_client import SimpleActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
-from actionlib_core.node import Node, use_node
-from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
@@ -22,13 +20,6 @@ from smachpy_missions.course.demo_action import (
 from smachpy_missions.course.demo_action import client as client_machine
 from smachpy_missions.course.demo_action import server as server_machine
 from smachpy_missions.interfaces import Demo_actionAction, Demo_actionGoal
-
-
-@pytest.fixture
-def node(clock):
-    network = MemoryNetwork(clock)
-    with Node("test", transport=network.session(), clock=clock) as node, use_node(node):
-        yield node
 
 
 @pytest.fixture

@@ -4,9 +4,7 @@ import itertools
 
 import pytest
 
-from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
-from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
 from smachpy.checks import check
@@ -14,13 +12,6 @@ from smachpy.exceptions import MissionError
 from smachpy_missions.course.demo_service import NAME, TOPIC, client, demo_service, server
 from smachpy_missions.interfaces import DemoMsg
 from smachpy_missions.interfaces.srv import DemoSrv
-
-
-@pytest.fixture
-def node(clock):
-    network = MemoryNetwork(clock)
-    with Node("test", transport=network.session(), clock=clock) as node, use_node(node):
-        yield node
 
 
 def test_the_mission_talks_listens_and_calls_ten_times_a_second(clock, node):

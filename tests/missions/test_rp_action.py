@@ -12,7 +12,6 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber
-from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.presence import list_endpoints
 from smachpy import events as ev
@@ -155,13 +154,6 @@ def test_a_goal_that_makes_no_sense_moves_nothing(clock, robot, goal, text):
     assert client.get_state() == GoalStatus.ABORTED
     assert text in client.get_goal_status_text()
     assert robot.robot.body.pose == before
-
-
-@pytest.fixture
-def node(clock):
-    network = MemoryNetwork(clock)
-    with Node("test", transport=network.session(), clock=clock) as node, use_node(node):
-        yield node
 
 
 @pytest.fixture

@@ -18,15 +18,6 @@ from actionlib_core.clock import (
 )
 
 
-@pytest.fixture(params=["real", "virtual"])
-def any_clock(request):
-    if request.param == "real":
-        yield RealClock()
-    else:
-        with VirtualClock() as clock:
-            yield clock
-
-
 def test_clocks_satisfy_the_protocol(any_clock):
     assert isinstance(any_clock, Clock)
 

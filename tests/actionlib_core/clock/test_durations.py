@@ -13,15 +13,6 @@ from actionlib_core.clock import Deadlock, RealClock, VirtualClock
 NAN = float("nan")
 
 
-@pytest.fixture(params=["real", "virtual"])
-def any_clock(request):
-    if request.param == "real":
-        yield RealClock()
-    else:
-        with VirtualClock() as clock:
-            yield clock
-
-
 def fires(clock):
     """Whether a new timer of `clock` still comes."""
     event = clock.event()
