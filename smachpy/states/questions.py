@@ -48,8 +48,8 @@ uint8[] picture
 """,
 )
 
-CALL_S: Final = 3.0
-"""Time for a mission to accept an answer [s]."""
+CALL_S: Final = 10.0
+"""Time for a mission to accept an answer, on a busy computer [s]."""
 
 MAX_AUTHOR_LENGTH: Final = 200
 MAX_QUESTION_LENGTH: Final = 1_000_000

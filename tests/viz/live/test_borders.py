@@ -461,6 +461,31 @@ def test_answer_is_not_given_to_the_question_of_another_machine(world):
         one.close()
 
 
+def test_answer_is_given_though_the_network_and_the_mission_are_slow(world, monkeypatch):
+    """After 1 s the viewer said that nobody asks any more, though the question was open."""
+    taken = []
+
+    def take(request):
+        world.clock.sleep(4.0)
+        taken.append(request.answer)
+        return AnswerQuestion._response_class(accepted=True)
+
+    list_alive = world.desk.transport.list_alive
+
+    def slowly(pattern, timeout):
+        world.clock.sleep(min(3.0, timeout))
+        return list_alive(pattern, timeout) if timeout >= 3.0 else []
+
+    service = Service("/q", AnswerQuestion, take, node=world.evil, alone=False)
+    asks = event("QuestionAsked", 3, service="/q")
+    world.hostile(history(events=[event("Started", 1), event("Entered", 2), asks]))
+    monkeypatch.setattr(world.desk.transport, "list_alive", slowly)
+    answer = {"command": "answer", "path": "/JOB/A", "answer": "yes", "by": "ann"}
+    assert world.viewer.send("hostile", answer)["ok"]
+    assert taken == ["yes"]
+    service.close()
+
+
 def test_picture_of_a_question_is_recognised_by_its_bytes(world):
     png = b"\x89PNG\r\n\x1a\n" + b"0" * 20
     pictures = iter([("image/png", b"<script>"), ("text/html", png), ("image/png", b"")])

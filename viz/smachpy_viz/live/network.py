@@ -77,8 +77,8 @@ MAX_REPLIES = 8
 MAX_NAME_LENGTH = 300
 """Longest name of a machine that is followed [characters]."""
 
-ASK_S = 1.0
-"""Longest wait for the token of a question [s]."""
+ASK_S = 5.0
+"""Longest wait for the token of a question, on a busy computer [s]."""
 
 
 class Network:
