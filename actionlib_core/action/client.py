@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from actionlib_core import border
 from actionlib_core.action._callbacks import CallbackQueue
-from actionlib_core.action.goal_handle import ClientGoalHandle, CommStateMachine
+from actionlib_core.action.client_goal_handle import ClientGoalHandle, CommStateMachine
 from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.action.goal_manager import GoalManager, Owner
 from actionlib_core.action.sent_goal import SentGoal

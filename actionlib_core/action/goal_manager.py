@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     from actionlib_core.action._callbacks import CallbackQueue
-    from actionlib_core.action.goal_handle import ClientGoalHandle
+    from actionlib_core.action.client_goal_handle import ClientGoalHandle
     from actionlib_core.clock import Event, Timer
     from actionlib_core.exceptions import TypeMismatchError
     from actionlib_core.goal.client import Path

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self
 
-    from actionlib_core.action.goal_handle import ClientGoalHandle
+    from actionlib_core.action.client_goal_handle import ClientGoalHandle
     from actionlib_core.goal.states import CommState
 
 R = TypeVar("R")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.action._action_spec import ActionSpec as Spec
-    from actionlib_core.action.goal_handle import ClientGoalHandle
+    from actionlib_core.action.client_goal_handle import ClientGoalHandle
     from actionlib_core.node import Node
     from actionlib_core.time import Duration, Time
 

@@ -6,7 +6,8 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actionlib_core.action.server import TEXT_STOPPED, ActionServer, OnClientLost, OnRestart
+from actionlib_core.action.goal_keeper import TEXT_STOPPED, OnClientLost
+from actionlib_core.action.server import ActionServer, OnRestart
 from actionlib_core.exceptions import ActionException, text_of
 from actionlib_core.goal.server import RESULT_TIMEOUT_S
 from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal

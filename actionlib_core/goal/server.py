@@ -1,7 +1,7 @@
 """The server's rules: the goals of one action server and the reactions to messages.
 
-`ServerGoals` only decides; `GoalKeeper` (`actionlib_core.action.server`) sends, calls the program's
-callbacks and keeps time.
+`ServerGoals` only decides; `GoalKeeper` (`actionlib_core.action.goal_keeper`) sends, calls the
+program's callbacks and keeps time.
 """
 
 from __future__ import annotations

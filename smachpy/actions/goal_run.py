@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib_core.action.client import ActionClient
-    from actionlib_core.action.goal_handle import ClientGoalHandle
+    from actionlib_core.action.client_goal_handle import ClientGoalHandle
     from actionlib_core.clock import Timer
     from actionlib_core.goal.states import CommState
     from smachpy.actions.wakeup import Wakeup

@@ -292,7 +292,7 @@ def test_state_gets_the_feedback_that_waits_at_the_end_of_its_goal(world, caplog
 def test_feedback_that_waits_is_bounded_and_the_drops_are_counted_and_told(
     world, monkeypatch, caplog
 ):
-    monkeypatch.setattr("actionlib_core.action.goal_handle.Backlog", lambda: Backlog(3))
+    monkeypatch.setattr("actionlib_core.action.client_goal_handle.Backlog", lambda: Backlog(3))
     client = world.client()
     seen = []
     client.send_goal(
@@ -309,7 +309,7 @@ def test_feedback_that_waits_is_bounded_and_the_drops_are_counted_and_told(
 
 
 def test_feedback_that_a_loop_leaves_lying_is_counted(world, monkeypatch):
-    monkeypatch.setattr("actionlib_core.action.goal_handle.Backlog", lambda: Backlog(3))
+    monkeypatch.setattr("actionlib_core.action.client_goal_handle.Backlog", lambda: Backlog(3))
     client = world.client(ActionClient)
     sent = client.send(Goal(1))
     assert sent.wait(LONG_S)

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from actionlib_core.action.server import GAP_S, PERIOD_S, GoalKeeper, StatusPublisher
+from actionlib_core.action.goal_keeper import GoalKeeper
+from actionlib_core.action.status_publisher import GAP_S, PERIOD_S, StatusPublisher
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import IllegalTransitionError
 from actionlib_core.goal.server import ServerGoal, ServerGoals

@@ -26,7 +26,7 @@ from smachpy_viz.model.progress import progress_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from actionlib_core.action.goal_handle import ClientGoalHandle
+    from actionlib_core.action.client_goal_handle import ClientGoalHandle
     from actionlib_core.node import Node
     from actionlib_core.transport import Closable, Presence
     from actionlib_core.transport.tokens import Endpoint
