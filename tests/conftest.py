@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
@@ -42,6 +43,7 @@ settings.load_profile("suite")
 
 # Threads that a clock keeps for a few seconds, without work.
 CACHED = {"idle", "clock-timers"}
+HOUR_S = 3600.0
 GRACE_S = 60.0  # a thread that is about to end takes a moment, on a busy computer a long one
 
 
@@ -70,6 +72,19 @@ def no_leaks() -> Iterator[None]:
         next(iter(left)).join(0.005)
     assert not left, f"threads left behind: {sorted(t.name for t in left)}"
     assert not _children() - children, f"processes left behind: {_children() - children}"
+
+
+@pytest.fixture(autouse=True)
+def no_hurry() -> Iterator[None]:
+    """Let explorations end by the number of their runs: a busy computer takes long for a few."""
+    exploration = sys.modules.get("smachpy.testing.exploring.exploration")
+    if exploration is None:
+        yield
+        return
+    defaults = exploration.explore.__kwdefaults__
+    usual, defaults["max_time"] = defaults["max_time"], HOUR_S
+    yield
+    defaults["max_time"] = usual
 
 
 @pytest.fixture

@@ -375,9 +375,11 @@ def _renewing(
     if math.isinf(lease_s):
         yield
         return
-    task = clock.spawn(renew, name=f"lease of {lease.mission}")
-    try:
+    task = None
+    try:  # also around the start: what interrupts that must not leave a thread that renews
+        task = clock.spawn(renew, name=f"lease of {lease.mission}")
         yield
     finally:
         over.set()
-        task.join()
+        if task is not None:
+            task.join()

@@ -27,7 +27,7 @@ from smachpy.actions.goal_run import STOPPED_S
 from smachpy.actions.simple_action_state import MARGIN_S
 from tests.two_nodes import TwoNodes
 
-LONG_S = 20.0
+LONG_S = 60.0
 BLOCKED_S = 1000.0
 HEARD_S = 0.05  # a cancel is heard by the server so soon after the request
 

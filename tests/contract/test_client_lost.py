@@ -7,7 +7,7 @@ import pytest
 from actionlib_core import ActionClient, SimpleActionClient, SimpleActionServer
 from actionlib_core.interfaces.actionlib import msg
 
-LONG_S = 20.0
+LONG_S = 60.0
 BOTH = [True, False]
 
 

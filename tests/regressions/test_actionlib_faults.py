@@ -16,7 +16,7 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
 
-LONG_S = 20.0
+LONG_S = 60.0
 
 
 class Pair:

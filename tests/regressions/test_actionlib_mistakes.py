@@ -30,7 +30,7 @@ from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.time import Duration
 from actionlib_core.transport.memory import MemoryNetwork
 
-LONG_S = 20.0
+LONG_S = 60.0
 
 
 @pytest.fixture

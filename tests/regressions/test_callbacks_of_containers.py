@@ -15,7 +15,7 @@ from smachpy import Concurrence, Iterator, State, StateMachine
 from smachpy.events import Abandoned, CallbackFailed, Entered, Finished, Left, PreemptRequested
 
 GRACE_S = 0.1
-LONG_S = 20.0
+LONG_S = 60.0
 
 
 class Work(State):

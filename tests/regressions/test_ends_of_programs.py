@@ -24,7 +24,7 @@ from actionlib_core.transport.zenoh import ZenohTransport
 
 pytestmark = [pytest.mark.zenoh, pytest.mark.slow]
 
-LONG_S = 60.0
+LONG_S = 120.0
 DRIVES = """
 import smachpy
 from smachpy.states import Pose2D, drive_to

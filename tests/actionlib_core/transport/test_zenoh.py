@@ -150,10 +150,11 @@ sys.stdin.readline()
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # busy processes, one after the other
 def test_program_ends_while_its_threads_go_on_using_the_network():
     for _ in range(3):
         with child(START + BUSY) as process:
-            _, errors = process.communicate("\n", timeout=100)
+            _, errors = process.communicate("\n", timeout=250)
             assert process.returncode == 0, errors
 
 
@@ -482,7 +483,7 @@ print("let go")
 
 def test_zenoh_lets_go_of_a_callback_when_it_has_returned_and_not_before():
     with child(LETS_GO) as process:
-        out, errors = process.communicate(timeout=100)
+        out, errors = process.communicate(timeout=250)
     assert (out, errors) == ("let go\n", "")
 
 
@@ -517,7 +518,7 @@ print("status", client.send_goal_and_wait(TestGoal(2)), flush=True)
 def test_forked_process_is_told_that_it_has_no_network():
     """It waited for ever, for threads that a fork does not copy; its parent goes on."""
     with child(_FORK) as process:
-        output, errors = process.communicate(timeout=100)
+        output, errors = process.communicate(timeout=250)
     told = ["this process was forked"] * 4
     assert output.splitlines() == [*told, "exit code 0", "status 3"], errors
     assert "Traceback" not in errors
@@ -613,11 +614,12 @@ started.wait()
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # busy processes, one after the other
 def test_threads_that_still_send_as_the_interpreter_ends_do_not_abort_the_process():
     """It said 'exception not rethrown': they came back from zenoh after the interpreter's end."""
     for _ in range(5):
         with child(LATE) as process:
-            _, errors = process.communicate(timeout=100)
+            _, errors = process.communicate(timeout=250)
             assert process.returncode == 0, errors
 
 

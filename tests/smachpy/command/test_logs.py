@@ -132,7 +132,7 @@ def test_an_old_script_keeps_what_it_logs_in_the_file(tmp_path):
     words = ["run", "--ros1", "old.py", "--time", "virtual", "--plain", "--log-file", "old.log"]
 
     # A process of its own: the names of ROS 1 and their leniency stay in a process.
-    subprocess.run([sys.executable, "-m", "smachpy", *words], cwd=tmp_path, check=True, timeout=60)
+    subprocess.run([sys.executable, "-m", "smachpy", *words], cwd=tmp_path, check=True, timeout=250)
 
     assert "INFO rosout: Executing state FOO" in (tmp_path / "old.log").read_text()
 

@@ -93,7 +93,7 @@ def run(*words):
         [sys.executable, "-P", "-m", "smachpy.command", *words],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=250,
     )
 
 

@@ -81,7 +81,7 @@ def run(*arguments, **options):
         [*SMACHPY, *arguments],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=250,
         stdin=subprocess.DEVNULL,
         **options,
     )
@@ -253,7 +253,7 @@ def test_two_robots_of_one_name():
     with running(robot) as first:
         wait_for_line(first, "ready")
         # Of its action, or of its service if the network told of the first robot late.
-        second = subprocess.run(robot, capture_output=True, text=True, timeout=60)
+        second = subprocess.run(robot, capture_output=True, text=True, timeout=250)
         assert second.returncode == 2
         check_one_screen(second.stderr, "two servers")
         third = run("run", "patrol", "--start-robot")

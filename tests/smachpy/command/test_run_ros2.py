@@ -43,7 +43,7 @@ def program(word, *argv):
         yield process
     finally:
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
+        process.communicate(timeout=250)
 
 
 def run(*argv, code=0):

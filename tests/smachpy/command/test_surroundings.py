@@ -223,7 +223,7 @@ def test_it_does_so_in_real_time_too(tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=250,
     )
 
     assert done.returncode == 0, done.stderr

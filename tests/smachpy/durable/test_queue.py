@@ -275,7 +275,7 @@ def test_a_runner_killed_at_any_statement_leaves_the_mission_to_one_other(store,
             [sys.executable, "-c", KILLED, store_place, act, str(kill_at)],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=250,
         )
         assert done.returncode == -signal.SIGKILL, done.stderr
         found = None
@@ -365,7 +365,7 @@ def test_a_full_disk_while_pruning_loses_nothing_that_is_kept(tmp_path):
             [sys.executable, "-c", NO_ROOM, str(place), str(room)],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=250,
         )
         assert done.returncode == 0, done.stderr
         told.add(done.stdout.strip())
