@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.command_line.numbers import seconds
 from actionlib_core.names import clean_namespace
 from actionlib_core.process.output import printable, tell
+from smachpy.command.needs import driven_robot, needed_servers
 from smachpy.command.targets import names_file
 from smachpy.durable.store import store_name
 from smachpy.exceptions import MissionError
@@ -234,7 +235,6 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
         MissionError: the mission that has begun has other arguments.
     """
     from actionlib_core.node import get_node
-    from smachpy.command.mission_run import driven_robot, needed_servers
     from smachpy.durable.mission import new_mission
     from smachpy.durable.store import OVER
     from smachpy.events.introspection import describe

@@ -160,7 +160,8 @@ def _add_db(parser: argparse.ArgumentParser) -> None:
 
 def _submit(args: argparse.Namespace) -> int:
     from actionlib_core.config import load_config
-    from smachpy.command.mission_run import build, driven_robot, needed_servers
+    from smachpy.command.mission_run import build
+    from smachpy.command.needs import driven_robot, needed_servers
     from smachpy.command.targets import load_target
     from smachpy.durable.mission import new_mission
     from smachpy.durable.schedule import next_due, read_time

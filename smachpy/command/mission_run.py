@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import posixpath
 import random
 import signal
 import sys
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import shutdown
 from actionlib_core.clock import RealClock, current_clock
-from actionlib_core.names import NameArguments, clean_namespace
+from actionlib_core.names import NameArguments
 from actionlib_core.process.output import printable, tell
 from smachpy.command.arguments import (
     MisfitError,
@@ -27,6 +26,7 @@ from smachpy.command.arguments import (
 from smachpy.command.bag import playing
 from smachpy.command.durable import DurableOptions, journalled
 from smachpy.command.extras import load_view
+from smachpy.command.needs import needed_servers
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import REAL_TIME, Pace, RobotOptions, open_surroundings
 from smachpy.command.targets import raised_text
@@ -39,7 +39,7 @@ from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.userdata.secret import MASK, Secret, holds_secret, is_secret_name, masked
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
     from typing import TextIO
 
@@ -253,30 +253,6 @@ def _fit_userdata(machine: Container, key: str, value: object, *, kept: bool) ->
         raise MissionError(
             f"--input {key}: got {got:.60}; expected {error}, as the mission's own {mine!r}."
         ) from error
-
-
-def needed_servers(record: StateRecord) -> dict[str, str]:
-    """Return the actions that a machine's states call, and their types."""
-    details = [dict(state.details) for state in record.walk() if state.kind == "action"]
-    return {detail["action"]: detail["type"] for detail in details if "action" in detail}
-
-
-def driven_robot(names: Iterable[str], robot: str | None) -> str | None:
-    """Return the robot that a mission drives by the names of its actions, if that is not `robot`.
-
-    Args:
-        names: Full names, without a slash in front: "r1/move_base" drives r1, and so do
-            "r1/arm/grip" and "r1/move_base" together.
-        robot: The robot that it was given, or None.
-
-    Returns:
-        None if the names are those of no robot, of several, or of `robot`.
-    """
-    spaces = [name.rpartition("/")[0] for name in names if "/" in name]
-    common = posixpath.commonpath(spaces) if spaces else ""
-    if robot and f"{common}/".startswith(f"{clean_namespace(robot)}/"):
-        return None
-    return common or None
 
 
 def good_outcomes(record: StateRecord, options: RunOptions) -> set[str]:

@@ -15,10 +15,10 @@ from smachpy.command.mission_run import (
     EXIT_OTHER_OUTCOME,
     EXIT_SUCCESS,
     good_outcomes,
-    needed_servers,
     show_run,
     signal_exit,
 )
+from smachpy.command.needs import needed_servers
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.ros1_options import script_of, tell_stubs
 from smachpy.command.surroundings import is_of_robot, open_surroundings

@@ -36,7 +36,6 @@ from smachpy.engine.preempt import (
 )
 from smachpy.events import Noted
 from smachpy.exceptions import InvalidStateError
-from smachpy.machines.util import has_smach_interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterable, Mapping
@@ -439,6 +438,15 @@ class State:
         data = self._smachpy
         data.options = changed(data.options, options, problems)
         data.outcomes = tuple(dict.fromkeys((*data.outcomes, *data.options.made_outcomes())))
+
+
+def has_smach_interface(obj: object) -> bool:
+    """Return whether `obj` declares outcomes and keys like a state."""
+    return (
+        hasattr(obj, "get_registered_input_keys")
+        and hasattr(obj, "get_registered_output_keys")
+        and hasattr(obj, "get_registered_outcomes")
+    )
 
 
 def _read_only(state: State) -> InvalidStateError:

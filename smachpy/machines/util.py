@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 from smachpy.base.problems import Problems, unique_names
 from smachpy.engine.shutdown_check import is_shutdown, set_shutdown_check
 from smachpy.machines.preempt_handler import set_preempt_handler
+from smachpy.machines.state import has_smach_interface
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,15 +25,6 @@ __all__ = [
 
 P = ParamSpec("P")
 R_co = TypeVar("R_co", covariant=True)
-
-
-def has_smach_interface(obj: object) -> bool:
-    """Return whether `obj` declares outcomes and keys like a state."""
-    return (
-        hasattr(obj, "get_registered_input_keys")
-        and hasattr(obj, "get_registered_output_keys")
-        and hasattr(obj, "get_registered_outcomes")
-    )
 
 
 class CBInterface(Generic[P, R_co]):

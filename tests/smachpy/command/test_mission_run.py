@@ -11,10 +11,9 @@ from smachpy.command.arguments import Text
 from smachpy.command.mission_run import (
     RunOptions,
     build,
-    driven_robot,
     good_outcomes,
-    needed_servers,
 )
+from smachpy.command.needs import driven_robot, needed_servers
 from smachpy.command.targets import Target
 from smachpy.command.track_recorder import TrackRecorder
 from smachpy.exceptions import MissionError

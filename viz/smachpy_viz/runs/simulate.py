@@ -19,7 +19,8 @@ from actionlib_core.process.private_files import open_private
 from smachpy.base.workers import WorkerError, Workers, cores
 from smachpy.command.arguments import Text, parameters_of
 from smachpy.command.extras import advice
-from smachpy.command.mission_run import NO_NAMES, build, needed_servers
+from smachpy.command.mission_run import NO_NAMES, build
+from smachpy.command.needs import needed_servers
 from smachpy.command.surroundings import Pace, RobotOptions, open_surroundings
 from smachpy.command.targets import load_target
 from smachpy.engine.preempt import asking
