@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import re
 import subprocess
 import sys
 import sysconfig
@@ -59,20 +58,27 @@ def code_facts() -> dict[str, Any]:
 
 def own_files() -> dict[str, Path]:
     """Return the program's own modules that are loaded: name -> file, sorted."""
-    apart = [Path(path) for path in {*sysconfig.get_paths().values(), sys.base_prefix, sys.prefix}]
     found = {}
     for name, module in list(sys.modules.items()):
         file = getattr(module, "__file__", None)
         if not isinstance(file, str) or name.partition(".")[0] in _LIBRARY:
             continue
         path = Path(file)
-        if path.suffix == ".py" and path.is_file():
+        if path.suffix == ".py" and not _is_installed(file) and path.is_file():
             path = path.resolve()
-            if not any(path.is_relative_to(one) for one in apart):
-                # A file that is loaded again has a number behind its name.
-                again = re.fullmatch(rf"{re.escape(path.stem)}_[0-9]+", name)
-                found[path.stem if again else name] = path
+            # A file that is loaded again has a number behind its name.
+            first, _, number = name.rpartition("_")
+            again = first == path.stem and number.isascii() and number.isdigit()
+            found[path.stem if again else name] = path
     return dict(sorted(found.items())[:MAX_FILES])
+
+
+@cache  # each recording asks it of all modules
+def _is_installed(file: str) -> bool:
+    """Whether a module's file is one of Python or of an installed package."""
+    path = Path(file).resolve()
+    apart = {*sysconfig.get_paths().values(), sys.base_prefix, sys.prefix}
+    return any(path.is_relative_to(one) for one in apart)
 
 
 def own_constants(files: Mapping[str, Path]) -> dict[str, str]:
@@ -82,8 +88,9 @@ def own_constants(files: Mapping[str, Path]) -> dict[str, str]:
     for module in list(sys.modules.values()):
         name = names.get(str(getattr(module, "__file__", None)))
         for word, value in list(vars(module).items()) if name else ():
-            is_hidden = is_secret_name(word) or is_secret_name(word.removesuffix("S"))
-            if word.isupper() and _is_plain(value) and not is_hidden:
+            if not (word.isupper() and _is_plain(value)):
+                continue
+            if not (is_secret_name(word) or is_secret_name(word.removesuffix("S"))):
                 text = repr(value)
                 if len(text) <= MAX_CONSTANT_LENGTH and not holds_secret(text):
                     found[f"{name}.{word}"] = text
