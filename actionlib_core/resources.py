@@ -8,10 +8,12 @@ each clock, as the runs on different virtual clocks have nothing to do with each
 
 from __future__ import annotations
 
+import contextlib
 import threading
+from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
-from weakref import WeakKeyDictionary
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 from actionlib_core.clock import RealClock
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 
 Policy: TypeAlias = Literal["wait", "preempt", "refuse"]
 """What a claim does while another one holds the resource."""
+
+POLICIES: tuple[Policy, ...] = get_args(Policy)
 
 
 @dataclass(slots=True, eq=False)
@@ -150,6 +154,55 @@ class CircleError(Exception):
             f"got a wait for {claim.resource} that closes a circle: {', '.join(waits)}; expected "
             "that all take their resources in the same order."
         )
+
+
+_around: ContextVar[tuple[object, ...]] = ContextVar("around", default=())
+
+
+@contextlib.contextmanager
+def inside(claim: Claim) -> Iterator[None]:
+    """Let claims and goals of this block be made inside of a claim that holds its resource."""
+    token = _around.set(claim.around)
+    try:
+        yield
+    finally:
+        _around.reset(token)
+
+
+def around_here() -> tuple[object, ...]:
+    """Return what is around the code that calls this, the innermost first."""
+    return _around.get()
+
+
+class _Sender:
+    """What was around the sender of a goal."""
+
+    __slots__ = ("__weakref__", "around")
+
+    def __init__(self, around: tuple[object, ...]) -> None:
+        self.around = around
+
+
+_senders: WeakValueDictionary[str, _Sender] = WeakValueDictionary()
+
+
+def note_sender(goal_id: str) -> object:
+    """Note what is around the sender of a goal, for as long as the returned object is kept.
+
+    A server in the same process works inside of that: it does not wait for a resource that its
+    client holds.
+    """
+    around = _around.get()
+    if not around:
+        return None
+    sender = _senders[goal_id] = _Sender(around)
+    return sender
+
+
+def around_sender(goal_id: str) -> tuple[object, ...]:
+    """Return what was around the sender of a goal; () if it is not of this process."""
+    sender = _senders.get(goal_id)
+    return () if sender is None else sender.around
 
 
 _of_real = Resources()

@@ -25,6 +25,7 @@ from actionlib_core.inputs.arguments import (
 )
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import get_node
+from actionlib_core.resources import note_sender
 from actionlib_core.time import Time
 from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ports import make_client_port
@@ -365,7 +366,9 @@ class ActionClient(Generic[A_co]):
         if border.listeners:
             border.tell("goal", self.node, self.ns, self.types.action._type, goal_id, goal)
         body = self.manager.port.pack_goal(goal)
-        return ClientGoalHandle(self._owner, life, body, cancel_if_lost=cancel_on_client_lost)
+        handle = ClientGoalHandle(self._owner, life, body, cancel_if_lost=cancel_on_client_lost)
+        handle.sender = note_sender(life.id)
+        return handle
 
     def find_goal(self, goal_id: str, ack_timeout: float | None = None) -> ClientGoalHandle:
         """Return a handle for a goal sent earlier, for which `manager.begin` queries the server.

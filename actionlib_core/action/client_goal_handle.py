@@ -49,6 +49,7 @@ class ClientGoalHandle:
         last_call: The callback that reports the goal's end has started.
         asking: A query about the goal is pending.
         look_at: When the manager's timer looks at the goal [s, clock].
+        sender: What `resources.note_sender` returned for the goal.
 
     Threads: every method may be called from any thread and any callback.
     """
@@ -68,6 +69,7 @@ class ClientGoalHandle:
     last_call: bool = False
     asking: bool = False
     look_at: float = math.inf
+    sender: object = None
     # Made by the first thread that waits: most goals need neither of them.
     _ended: Event | None = None
     _settled: Event | None = None

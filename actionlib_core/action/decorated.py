@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from actionlib_core.action.server import OnClientLost, ServerGoalHandle
     from actionlib_core.goal.single import Policy
     from actionlib_core.node import Node
+    from actionlib_core.resources import Policy as ResourcePolicy
 
 G = TypeVar("G")
 R = TypeVar("R")
@@ -150,7 +151,7 @@ class _DecoratedServer(SimpleActionServer):
         super()._tell_preempt()
         self._cancel_task()
 
-    def _run(self, goal: Any, context: GoalContext[Any]) -> Any:
+    def _call(self, goal: Any, context: GoalContext[Any]) -> Any:
         """Call the function; one that is `async` runs in a loop of its own.
 
         Raises:
@@ -188,7 +189,7 @@ class _DecoratedServer(SimpleActionServer):
     def _execute(self, handle: ServerGoalHandle) -> None:
         context: GoalContext[Any] = GoalContext(self, handle)
         try:
-            result = self._run(handle.get_goal(), context)
+            result = self._call(handle.get_goal(), context)
         except Reject as end:
             accepted = handle.record.status in {Status.ACTIVE, Status.PREEMPTING}
             self._end("raise Reject", "abort" if accepted else "reject", end.result, end.text)
@@ -292,6 +293,7 @@ def server(
     *,
     policy: Policy = "preempt",
     on_client_lost: OnClientLost = "continue",
+    resource: str | tuple[str, ResourcePolicy] | None = None,
 ) -> _Decorator[G, R, F]:
     """Turn a function `execute(goal, ctx) -> result` into an action server.
 
@@ -309,11 +311,13 @@ def server(
         ActionSpec: The action class (XAction).
         policy: The effect of a new goal while one runs; see `SimpleActionServer`.
         on_client_lost: What happens to the goal of a client that died; see `SimpleActionServer`.
+        resource: What a goal needs for itself while it runs; see `SimpleActionServer`.
 
     Returns:
         A decorator, which returns a `GoalServer`; `start` it.
     """
-    return _Decorator(name, ActionSpec, {"policy": policy, "on_client_lost": on_client_lost})
+    options = {"policy": policy, "on_client_lost": on_client_lost, "resource": resource}
+    return _Decorator(name, ActionSpec, options)
 
 
 class _Decorator(Generic[G, R, F]):

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.action.goal_keeper import TEXT_STOPPED, OnClientLost
 from actionlib_core.action.server import ActionServer, OnRestart
-from actionlib_core.exceptions import ActionException, text_of
+from actionlib_core.exceptions import ActionException, InvalidNameError, text_of
 from actionlib_core.goal.server import RESULT_TIMEOUT_S
 from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
 from actionlib_core.goal.states import TERMINAL, Status
 from actionlib_core.inputs.arguments import check_delay, check_function
+from actionlib_core.names import check_name
+from actionlib_core.resources import POLICIES, Claim, around_sender, inside, resources_on
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Event, Task
     from actionlib_core.goal.single import Decision
     from actionlib_core.node import Node
+    from actionlib_core.resources import Policy as ResourcePolicy
     from actionlib_core.time import Duration
 
 G = TypeVar("G")
@@ -67,13 +70,18 @@ class SimpleActionServer:
             `ActionServer`.
         on_restart: With `durable`, what happens to a goal that ran when the process was killed:
             "abort" ends it ABORTED, with the reason; "resume" runs it again (see `is_resumed`).
+        resource: What a goal needs for itself while it runs, such as the base of the robot: a name,
+            or a tuple of name and policy. While another server or state of this process holds it,
+            the goal waits, not yet accepted ("wait"), the holder is asked to stop ("preempt"), or
+            the goal is rejected ("refuse"). See docs/resources.md.
 
     Attributes:
         action_server: The `ActionServer` beneath.
         execute_callback: `execute_cb`.
 
     Raises:
-        ActionException: `ActionSpec` is not an action class.
+        ActionException: `ActionSpec` is not an action class, or `resource` is wrong or without an
+            `execute_cb`.
         ActionlibError: a callback is not a function, or `result_timeout` is not a duration.
         InvalidNameError: the name breaks the ROS rules.
         ServerConflictError: the name has a server already (from `start`).
@@ -98,9 +106,11 @@ class SimpleActionServer:
         result_timeout: float | Duration = RESULT_TIMEOUT_S,
         durable: str | Path | None = None,
         on_restart: OnRestart = "abort",
+        resource: str | tuple[str, ResourcePolicy] | None = None,
     ) -> None:
         check_function(f"action {name!r}", "execute_cb", execute_cb)
         self.execute_callback = execute_cb
+        needed = _resource(f"action {name!r}", resource, execute_cb)
         self.goal_callback: Callable[[], object] | None = None
         self.preempt_callback: Callable[[], object] | None = None
         # The lock guards these. Reading one attribute of `_policy` is atomic and needs no lock.
@@ -139,6 +149,9 @@ class SimpleActionServer:
         )
         self._come: Event = self._clock.event(f"a goal for {self._name}")
         self._preempted: Event = self._clock.event()
+        node = self.action_server.node
+        self._resource = needed and (node.resolve(needed[0], "resource"), needed[1])
+        self._claim: Claim | None = None  # of the current goal
         self._forget: Callable[[], None] | None = None
         if auto_start:
             self.start()
@@ -435,6 +448,8 @@ class SimpleActionServer:
     def _tell_preempt(self) -> None:
         """Wake the code of the running goal, which is asked to stop. Must not block."""
         self._preempted.set()
+        if self._claim is not None:
+            self._claim.wake.set()
 
     def _carry_out(self, decision: Decision[ServerGoalHandle], text: str) -> None:
         for older in decision.recall:
@@ -499,10 +514,67 @@ class SimpleActionServer:
         return False
 
     def _run_next(self) -> None:
-        """Run the next goal, if there is one, and make sure that it ends."""
+        """Run the next goal, if there is one, when it has its resource."""
         handle = self._take_next()
         if handle is None:
             return
+        if self._resource is None:
+            self._run(handle)
+            return
+        claim = self._claim_of(handle, *self._resource)
+        held = resources_on(self._clock)
+        try:
+            if self._take(handle, claim):
+                with inside(claim):
+                    self._run(handle)
+        finally:
+            self._claim = None
+            held.release(claim)
+
+    def _claim_of(self, handle: ServerGoalHandle, name: str, policy: ResourcePolicy) -> Claim:
+        who = f"goal {handle.record.id} of action '{self._name}'"
+
+        def stop(taker: Claim) -> None:
+            log.info("%s is asked to stop: %s takes %s", who, taker.who(), name)
+            self.internal_preempt_callback(handle)
+
+        around = (handle, *around_sender(handle.record.id))
+        return Claim(
+            name, policy, around, lambda: who, stop, self._clock.event(f"{name}, for {who}")
+        )
+
+    def _take(self, handle: ServerGoalHandle, claim: Claim) -> bool:
+        """Take the resource for a goal; return whether it has it. Otherwise the goal has ended.
+
+        Blocks: until the resource is free, or the goal is asked to stop.
+        """
+        self._claim = claim
+        held = resources_on(self._clock)
+        holder = held.claim(claim)
+        if holder is None:
+            return True
+        by = holder.who()
+        if claim.policy == "refuse":
+            self._turn_away(handle, "reject", f"{by} holds {claim.resource}")
+            return False
+        log.info("%s waits for %s, held by %s", claim.who(), claim.resource, by)
+        # The client learns that the goal has come, as its acceptance will take some time.
+        self._keeper.status.on_arrival()
+        if claim.policy == "preempt":
+            holder.stop(claim)
+        if not self._policy.preempt_requested:
+            claim.wake.wait()
+        if self._stopping:
+            self._keeper.give_up(handle, TEXT_STOPPED)
+        elif self._policy.preempt_requested:
+            text = f"{TEXT_CANCELLED_WAITING}: {by} held {claim.resource}"
+            self._turn_away(handle, "cancel", text)
+        else:
+            return True
+        return False
+
+    def _run(self, handle: ServerGoalHandle) -> None:
+        """Run a goal, and make sure that it ends."""
         # As in ROS: accepted before the call. (`@server` accepts later.)
         if self._accepts:
             self._keeper.step(handle, "accept", "set_accepted()", text=TEXT_ACCEPTED)
@@ -539,3 +611,29 @@ class SimpleActionServer:
             )
         log.error("action '%s': exception in execute callback%s", self._name, hint, exc_info=error)
         return f"Exception in execute callback: {text_of(error)}{hint}"
+
+
+def _resource(where: str, given: object, execute_cb: object) -> tuple[str, ResourcePolicy] | None:
+    """Return the name and the policy of a resource that the program gave.
+
+    Raises:
+        ActionException: they are wrong, or nothing runs goals that could hold it.
+    """
+    if given is None:
+        return None
+    name, policy = given if isinstance(given, tuple) and len(given) == 2 else (given, "wait")  # noqa: PLR2004
+    if not isinstance(name, str) or policy not in POLICIES:
+        raise ActionException(
+            f"{where}: resource: got {given!r}; expected a name, or (name, policy) with one of "
+            f"{list(POLICIES)}."
+        )
+    try:
+        check_name(name, "resource")
+    except InvalidNameError as error:
+        raise ActionException(f"{where}: {error}") from error
+    if execute_cb is None:
+        raise ActionException(
+            f"{where}: resource: got {name!r} without execute_cb; expected one, which holds the "
+            "resource while it runs."
+        )
+    return name, policy

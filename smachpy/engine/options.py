@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.names import check_name
+from actionlib_core.resources import POLICIES
 from smachpy.base.problems import Problems, as_number, plain, unknown_name
 
 if TYPE_CHECKING:
@@ -71,7 +72,6 @@ class Retry:
         return f"{self.attempts} attempts, {self.backoff:g} s apart, on {on}"
 
 
-POLICIES = ("wait", "preempt", "refuse")  # of `actionlib_core.resources.Policy`
 REFUSED = "refused"
 
 

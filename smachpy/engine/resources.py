@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.node import known_node
-from actionlib_core.resources import CircleError, Claim, resources_on
+from actionlib_core.resources import CircleError, Claim, around_here, inside, resources_on
 from smachpy.base import log
 from smachpy.base.context import current_frame
 from smachpy.engine.interrupt import Interruption
@@ -35,7 +35,10 @@ def holding(
         all_of = resources_on(frame.run.clock)
         try:
             outcome = _take(frame, state, all_of, claim)
-            return execute(userdata) if outcome is None else outcome
+            if outcome is not None:
+                return outcome
+            with inside(claim):
+                return execute(userdata)
         finally:
             _release(frame, all_of, claim)
 
@@ -45,11 +48,13 @@ def holding(
 def _claim(frame: Frame, resource: Resource) -> Claim:
     node = known_node()
     name = resource.name.lstrip("/") if node is None else node.resolve(resource.name, "resource")
-    path, visits = frame.here(), []
+    visits: list[object] = []
+    path = frame.here()
     above: Frame | None = frame
     while above is not None:
         visits += [above.visit] if above.visit is not None else []
         above = above.parent
+    visits += around_here()
 
     def who() -> str:
         return f"{path} (its thread was left behind)" if frame.dead else path

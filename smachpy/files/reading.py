@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Limits, Section
 from actionlib_core.inputs.suggest import did_you_mean
 from actionlib_core.inputs.yaml_text import YamlTextError, load_with_marks
+from actionlib_core.resources import POLICIES
 from smachpy.base.problems import unknown_name
-from smachpy.engine.options import POLICIES
 from smachpy.exceptions import MissionError, SmachError, error_text
 from smachpy.files.reference import (
     Naming,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, get_args
 
-from smachpy.engine.options import POLICIES
+from actionlib_core.resources import POLICIES
 from smachpy.files.reading import KINDS, OPTIONS, TYPES
 from smachpy.machines.state_machine import Reenter
 
