@@ -329,8 +329,10 @@ class Frame:
             if subscribers is None or subscribers.epoch is not EPOCH.value:
                 subscribers = self.find_subscribers()
         listeners = subscribers.all
+        asked = 0
         try:
             for listener in listeners:
+                asked += 1
                 try:
                     listener(event)
                 except Exception as error:  # noqa: BLE001  the user's: reported in the log
@@ -339,8 +341,7 @@ class Frame:
                     log.log_exception(f"{where} raised {error_text(error)} on {on}", error)
         except Interruption:
             if not self.dead:
-                rest = listeners[listeners.index(listener) + 1 :]
-                self.publish(event, subscribers._replace(all=rest))
+                self.publish(event, subscribers._replace(all=listeners[asked:]))
             raise
 
     def find_subscribers(self) -> Subscribers:
