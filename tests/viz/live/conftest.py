@@ -12,9 +12,12 @@ import time
 import urllib.request
 from dataclasses import asdict
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
+from actionlib_core.config import DOMAIN_VARIABLE
+from actionlib_core.wire.private_network import _free_domain
 from smachpy import CBState, StateMachine
 from smachpy.events.introspection import describe
 
@@ -26,6 +29,21 @@ FLAGS = [
     "--disable-dev-shm-usage",
     "--disable-background-networking",
 ]
+# A busy computer is no failure: a command waits for its answer, a notice stays until the next one.
+PATIENT = """
+AbortController.prototype.abort = () => {};
+Object.defineProperty(window, "smachpy", { configurable: true, set(smachpy) {
+    Object.defineProperty(window, "smachpy", { value: smachpy });
+    smachpy.store.view.notify = function (text, kind = "info") { this.notice.value = { text, kind }; };
+} });
+"""
+BEAT_S = 60.0  # what the pages of `served` expect
+SLOW_ROBOT = """
+robot: {max_speed: 0.05}
+battery: {capacity: 100}
+start: {x: 9.8, y: 7.1, yaw: 1.5708}
+dock: {x: 9.8, y: 7.1, yaw: 1.5708}
+"""
 
 
 class Child:
@@ -52,6 +70,10 @@ class Child:
             self.process.wait()
         self.process.stdout.close()
 
+    def tell(self, line):
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
+
     def kill(self):
         self.process.kill()
         self.process.wait()
@@ -64,8 +86,11 @@ def start_robot(*arguments):
     return child
 
 
-def start_simulation():
-    child = Child("-m", "smachpy", "robot", "--child")
+def start_simulation(folder):
+    """A robot so slow that no drive ends before the test does."""
+    config = folder / "robot.yaml"
+    config.write_text(SLOW_ROBOT, encoding="utf-8")
+    child = Child("-m", "smachpy", "robot", "--child", "--config", str(config))
     assert "ready" in child.said
     return child
 
@@ -97,6 +122,7 @@ class Served:
 
         self.machines = Machines()
         self.commands = []
+        self.beat = BEAT_S
         self._server = self._thread = None
         self.began = time.time_ns()
 
@@ -124,10 +150,12 @@ class Served:
         return made
 
     def start(self, **viewer):
-        from smachpy_viz.live.app import Viewer
+        from smachpy_viz.live import app
         from smachpy_viz.live.server import PageServer
 
-        self._server = PageServer(Viewer(self.machines, send=self._send, **viewer), "127.0.0.1", 0)
+        with patch.object(app, "BEAT_S", self.beat):
+            viewer = app.Viewer(self.machines, send=self._send, **viewer)
+        self._server = PageServer(viewer, "127.0.0.1", 0)
         self._thread = threading.Thread(target=self._server.serve_here)
         self._thread.start()
         self.address = self._server.address
@@ -153,17 +181,19 @@ def served():
 @pytest.fixture(scope="session")
 def domain():
     """A network of this test session's own, which the child processes inherit."""
-    old = os.environ.get("SMACHPY_DOMAIN")
-    os.environ["SMACHPY_DOMAIN"] = str(1 + (os.getpid() * 7 + 13) % 9999)
-    yield
-    if old is None:
-        del os.environ["SMACHPY_DOMAIN"]
-    else:
-        os.environ["SMACHPY_DOMAIN"] = old
+    with _free_domain() as own, patch.dict(os.environ, {DOMAIN_VARIABLE: str(own)}):
+        yield
 
 
 @pytest.fixture
-def start(domain):
+def alone(domain):
+    """A network of this test's own."""
+    with _free_domain() as own, patch.dict(os.environ, {DOMAIN_VARIABLE: str(own)}):
+        yield
+
+
+@pytest.fixture
+def start(domain, tmp_path):
     """`start.robot(...)` and `start.view(...)`; what is left is ended after the test."""
 
     class Start:
@@ -175,7 +205,7 @@ def start(domain):
             return self.children[-1]
 
         def simulation(self):
-            self.children.append(start_simulation())
+            self.children.append(start_simulation(tmp_path))
             return self.children[-1]
 
         def program(self, code):
@@ -213,11 +243,19 @@ def errand(domain):
 
 
 @pytest.fixture(scope="module")
-def simulation(domain):
+def simulation(domain, tmp_path_factory):
     """The simulated robot with its actions."""
-    child = start_simulation()
+    child = start_simulation(tmp_path_factory.mktemp("robot"))
     yield child
     child.end()
+
+
+@pytest.fixture(scope="module")
+def commanding(simulation):
+    """A viewer that may command, for tests that send no goals."""
+    view = View("--control")
+    yield view
+    view.end()
 
 
 @pytest.fixture(scope="module")  # its event loop would be in the way of other modules' tests
@@ -237,9 +275,11 @@ def look(chromium):
     """`look(address)` opens a page and waits until it has drawn; errors in it fail the test."""
     contexts, errors = [], []
 
-    def look(address, *, drawn=True, **options):
+    def look(address, *, drawn=True, patient=True, **options):
         context = chromium.new_context(viewport={"width": 1400, "height": 900}, **options)
-        context.set_default_timeout(60_000)
+        context.set_default_timeout(120_000)
+        if patient:
+            context.add_init_script(PATIENT)
         contexts.append(context)
         page = context.new_page()
         page.foreign = []
@@ -271,7 +311,8 @@ def look(chromium):
 @pytest.fixture(scope="module")
 def first_page(chromium, delivery):
     context = chromium.new_context(viewport={"width": 1400, "height": 900})
-    context.set_default_timeout(60_000)
+    context.set_default_timeout(120_000)
+    context.add_init_script(PATIENT)
     page = context.new_page()
     page.foreign = []
     page.errors = []

@@ -104,7 +104,7 @@ def test_a_night_is_folded_until_it_is_unfolded(served, look):
         StateMachine.add("B", CBState(lambda _: "done", outcomes=["done"]))
     served.add("one", sm=sm, events=[*events, ("Finished", "/JOB", {"outcome": "done", "at": at})])
     page = look(served.start())
-    bars = """() => { const { bars, scale } = smachpy.page.timeline;
+    bars = """() => { smachpy.page.timeline.draw(); const { bars, scale } = smachpy.page.timeline;
         const failed = bars.hits.filter(({ span }) => span.outcome === 'aborted');
         return [failed.length, Math.min(...failed.map((b) => b.right - b.left)), scale.folds.length]; }"""
     assert page.evaluate(bars) == [failures, 3, 1]

@@ -72,7 +72,7 @@ def office(served):
     return served
 
 
-AT = """([x, y]) => { const b = document.querySelector('.map-view canvas').getBoundingClientRect();
+AT = """([x, y]) => { smachpy.page.map.draw(); const b = document.querySelector('.map-view canvas').getBoundingClientRect();
   const [px, py] = smachpy.page.map.at({ x, y }); return [b.left + px, b.top + py]; }"""
 
 

@@ -25,8 +25,8 @@ def operated(served):
     return served
 
 
-def open_page(look, served, name="one"):
-    page = look(f"{served.address}?machine={name}#token=t")
+def open_page(look, served, name="one", **options):
+    page = look(f"{served.address}?machine={name}#token=t", **options)
     page.wait_for_selector("#pause")
     return page
 
@@ -39,6 +39,7 @@ def select(page, path):
 def withdrawn(page):
     page.wait_for_selector(".confirm", state="detached")
     wait_for(page, "document.querySelector('.notice')?.textContent.includes('was closed')")
+    page.evaluate("() => { smachpy.store.view.notice.value = null; }")
 
 
 def test_a_question_names_its_target_and_what_ends(operated, look):
@@ -47,7 +48,7 @@ def test_a_question_names_its_target_and_what_ends(operated, look):
     said = page.text_content(".confirm")
     for part in ("Preempt JOB on carrier?", "A (", "carrier/move_base \u2192 kitchen"):
         assert part in said
-    assert page.evaluate("() => document.activeElement.textContent") == "No"
+    wait_for(page, "document.activeElement.textContent === 'No'")
     page.keyboard.press("Escape")
     page.wait_for_selector(".confirm", state="detached")
     assert operated.commands == []
@@ -146,16 +147,24 @@ def test_no_commands_where_no_machine_is_shown(operated, look):
 
 def test_a_command_without_an_answer_turns_its_button_red(served, look):
     answer = threading.Event()
-    served._send = lambda _name, _command: answer.wait(30) and {"ok": True, "text": ""}
+    served._send = lambda _name, _command: answer.wait(300) and {"ok": True, "text": ""}
     served.add("one", events=RUNS, control=FREE)
     served.start(token="t")
-    page = open_page(look, served)
-    page.click("#pause")
-    page.wait_for_selector("#pause.sent")
-    page.wait_for_selector("#pause.failed")
-    assert "no answer in 3 s" in page.get_attribute("#pause", "title")
-    assert "no answer in 3 s" in page.text_content(".notice.error")
-    answer.set()
+    page = open_page(look, served, patient=False)
+    # What is to happen after seconds, happens when the test wants it.
+    page.evaluate(
+        """() => { window.later = []; const real = setTimeout;
+        window.setTimeout = (f, ms, ...more) => ms < 3000 ? real(f, ms, ...more) : later.push(f); }"""
+    )
+    try:
+        page.click("#pause")
+        page.wait_for_selector("#pause.sent")
+        page.evaluate("() => later.shift()()")
+        page.wait_for_selector("#pause.failed")
+        assert "no answer in 3 s" in page.get_attribute("#pause", "title")
+        assert "no answer in 3 s" in page.text_content(".notice.error")
+    finally:
+        answer.set()
 
 
 def test_without_its_server_a_page_says_why_its_buttons_do_nothing(operated, look):

@@ -68,7 +68,7 @@ def test_it_closes_with_escape_and_gives_the_focus_back(page):
     )  # no key reached the page
     page.keyboard.press("Escape")
     page.wait_for_selector(".palette", state="detached")
-    assert page.evaluate("() => document.activeElement.id") == "preempt"
+    wait_for(page, "document.activeElement.id === 'preempt'")
 
 
 def test_shortcuts_of_single_keys_can_be_switched_off(page):

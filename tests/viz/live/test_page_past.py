@@ -14,6 +14,7 @@ LATER = [
     ("Left", "/JOB/A", {"outcome": "ok", "at": 33.04}),
     ("Entered", "/JOB/B", {"at": 33.04}),
 ]
+HOUR_NS = 3600 * 10**9  # of a run that far ahead, the present stands at its last event
 CONTROL = {"paused": False, "breakpoints": []}
 
 
@@ -219,6 +220,7 @@ def goal(n, path, at, **more):
 
 
 def test_goals_that_have_ended_are_a_line_each(served, look):
+    served.began += HOUR_NS
     ended = [event for n in range(5) for event in goal(n, "/JOB/A", 2 + n)]
     served.add("one", events=[*BEGUN, *ended])
     page = look(served.start())
@@ -243,6 +245,7 @@ def test_goals_that_have_ended_are_a_line_each(served, look):
 def test_only_a_preempt_worth_reading_has_a_section(served, look, source, until, shown):
     asked = ("PreemptRequested", "/JOB/A", {"source": source, "by": "/JOB/B", "why": "", "at": 3.0})
     left = ("Left", "/JOB/A", {"outcome": "preempted", "at": until})
+    served.began += HOUR_NS
     served.add("one", events=[*BEGUN, asked, left])
     page = look(served.start())
     page.wait_for_selector(".log li")

@@ -59,7 +59,7 @@ def text_of(page, path):
 
 def wait_for(page, path, wanted):
     """Wait until a badge says something; the page is woken by events alone."""
-    page.wait_for_selector(f'g[data-path="{path}"] .badge >> text="{wanted}"', timeout=60_000)
+    page.wait_for_selector(f'g[data-path="{path}"] .badge >> text="{wanted}"')
 
 
 def test_tokens_move_and_guards_say_what_they_wait_for(plan, start, look):

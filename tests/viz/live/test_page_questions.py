@@ -8,7 +8,7 @@ import urllib.request
 
 import pytest
 
-from tests.browser import wait_for
+from tests.browser import start_clock, stop_clock, wait_for
 
 ASKED = {
     "text": "Delivery to lab: may I hand it over?",
@@ -35,17 +35,6 @@ def post(view, command, token):
         return error.code, json.loads(error.read())
 
 
-def stop_clock(page):
-    """An answered question is shown for three seconds of the page, however long the test takes to look."""
-    page.evaluate(
-        "() => { const now = smachpy.store.data.liveMs(); smachpy.store.data.liveMs = () => now; }"
-    )
-
-
-def start_clock(page):
-    page.evaluate("() => { delete smachpy.store.data.liveMs; }")
-
-
 @pytest.fixture
 def no_leaks():
     """Processes of this module's fixtures outlive single tests."""
@@ -60,12 +49,12 @@ def test_a_question_is_answered_on_one_page_and_closes_on_all(errand, look):
     for page in (one, two):
         page.wait_for_selector(OPEN)
         assert "may I hand it over?" in page.text_content(f"{OPEN} h3")
-        assert page.title().startswith("(1) ERRAND")
+        wait_for(page, "document.title.startsWith('(1) ERRAND')")
         assert page.text_content("[data-testid=status]") == "asks you"
         buttons = page.locator(f"{OPEN} .answer")
         assert buttons.all_text_contents() == ["No, come back", "Yes, hand over"]
         wait_for(page, "document.querySelector('.question-picture').naturalWidth === 1")
-    assert one.evaluate("() => document.activeElement.tagName") == "H3"
+    wait_for(one, "document.activeElement.tagName === 'H3'")
     for page in (one, two):
         stop_clock(page)
     one.click(f"{OPEN} .answer.primary")
