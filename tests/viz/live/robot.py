@@ -1,9 +1,10 @@
 """A mission in a process of its own, for tests and measurements of the viewer.
 
     python robot.py [--name NAME] [--states N] [--rate HZ] [--runs N] [--control] [--hostile]
-                    [--stubborn SECONDS] [--ask SECONDS]
+                    [--hold] [--ask SECONDS]
 
-Prints "ready" when it can be found; ends when its standard input ends.
+Prints "ready" when it can be found; ends when its standard input ends. With `--hold` it goes on in
+TRANSPORT, and when it is preempted there, until a line on its standard input lets a state go.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ import sys
 import threading
 
 from actionlib_core.node import Node, use_node
-from smachpy import CBState, Concurrence, IntrospectionServer, State, StateMachine
+from smachpy import CBState, Concurrence, IntrospectionServer, State, StateMachine, set_options
 from smachpy.states.ask_operator import AskOperator
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
+GRACE_S = 600.0
 OUTCOMES = ["succeeded", "aborted", "preempted"]
 WORDS = ["TURN", "LIFT", "GRASP", "SCAN", "MOVE", "DOCK", "ALIGN", "READ", "PLACE", "CHECK"]
 
@@ -41,30 +43,20 @@ class Work(State):
         return "aborted" if self.random.random() < self.share else "succeeded"
 
 
-class Stubborn(State):
-    """Takes its time to stop."""
+class Held(State):
+    """Goes on until it is preempted, and then cleans up, or does not notice, until it is let go."""
 
-    def __init__(self, seconds):
+    def __init__(self, *, notices):
         super().__init__(outcomes=OUTCOMES)
-        self.seconds = seconds
+        self.notices = notices
+        self.let_go = threading.Event()
+        set_options(self, preempt_timeout=GRACE_S)
 
     def execute(self, userdata):
-        self.sleep(60.0)
-        threading.Event().wait(self.seconds)
-        return "preempted"
-
-
-class Tidy(State):
-    """Takes its preempt up at once, and then cleans up for a while."""
-
-    def __init__(self, seconds):
-        super().__init__(outcomes=OUTCOMES)
-        self.seconds = seconds
-
-    def execute(self, userdata):
-        self.sleep(60.0)
-        self.service_preempt()
-        threading.Event().wait(self.seconds)
+        self.sleep(3600.0)
+        if self.notices:
+            self.service_preempt()
+        self.let_go.wait()
         return "preempted"
 
 
@@ -85,8 +77,8 @@ def small(pace, args):
         outcome_map={"succeeded": {"NAVIGATE": "succeeded", "WATCH": "succeeded"}},
     )
     with transport:
-        Concurrence.add("NAVIGATE", Tidy(args.stubborn / 2) if args.stubborn else Work(pace))
-        Concurrence.add("WATCH", Stubborn(args.stubborn) if args.stubborn else Work(pace))
+        Concurrence.add("NAVIGATE", Held(notices=True) if args.hold else Work(pace))
+        Concurrence.add("WATCH", Held(notices=False) if args.hold else Work(pace))
     with sm:
         StateMachine.add("INIT", Work(pace), {"succeeded": "PICK"})
         StateMachine.add("PICK", pick, {"succeeded": "TRANSPORT"})
@@ -207,7 +199,7 @@ def main():
     parser.add_argument("--states", type=int, default=0)
     parser.add_argument("--rate", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=4)
-    parser.add_argument("--stubborn", type=float, default=0.0)
+    parser.add_argument("--hold", action="store_true")
     parser.add_argument("--ask", type=float, default=0.0)
     parser.add_argument("--control", action="store_true")
     parser.add_argument("--hostile", action="store_true")
@@ -226,8 +218,12 @@ def main():
         print("ready", flush=True)
 
         def end():
-            sys.stdin.read()
+            held = machine["TRANSPORT"].get_children() if args.hold else {}
+            for line in sys.stdin:
+                held[line.strip()].let_go.set()
             machine.request_preempt()
+            for state in held.values():
+                state.let_go.set()
 
         threading.Thread(target=end, daemon=True).start()
         print(machine.execute(), flush=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 from tests.browser import wait_for
@@ -23,8 +21,8 @@ def no_leaks():
 def action_page(simulation, start, look):
     """`action_page()` is the page of the robot's `move_base`, with the token."""
 
-    def open_page(*arguments, token=True):
-        view = start.view(*arguments)
+    def open_page(*arguments, view=None, token=True):
+        view = view or start.view(*arguments)
         address = view.address if token else view.base
         page = look(
             address.replace("/#", "/?actions#") if token else f"{address}?actions", drawn=False
@@ -75,8 +73,8 @@ def test_a_goal_to_its_end(action_page):
     assert text in page.text_content(".sent")
 
 
-def test_bad_values_are_named_at_their_fields_and_are_not_sent(action_page):
-    page = action_page("--control")
+def test_bad_values_are_named_at_their_fields_and_are_not_sent(commanding, action_page):
+    page = action_page(view=commanding)
     fill(page, "north", "2.0")
     page.fill('[id="$.target_pose.header.seq"]', "-1")
     page.click("#send-goal")
@@ -89,12 +87,12 @@ def test_bad_values_are_named_at_their_fields_and_are_not_sent(action_page):
         "expected uint32 (0 to 4294967295), got -1"
     )
     # The first bad field has the focus, and nothing has been sent.
-    assert page.evaluate("() => document.activeElement.id") == "$.target_pose.header.seq"
+    wait_for(page, "document.activeElement.id === '$.target_pose.header.seq'")
     assert page.evaluate("() => smachpy.store.data.actions.value.goals.length") == 0
 
 
-def test_form_and_yaml_are_two_views_of_one_goal(action_page):
-    page = action_page("--control")
+def test_form_and_yaml_are_two_views_of_one_goal(commanding, action_page):
+    page = action_page(view=commanding)
     fill(page, "1.25", "-2")
     page.click("[role=tab]:text-is('YAML')")
     page.wait_for_selector("textarea")
@@ -125,8 +123,8 @@ def test_a_viewer_that_only_looks_shows_the_form_and_says_why_nothing_goes(actio
     assert page.evaluate(ask, {}) == 403
 
 
-def test_with_control_but_without_the_token_nothing_goes_either(action_page):
-    page = action_page("--control", token=False)
+def test_with_control_but_without_the_token_nothing_goes_either(commanding, action_page):
+    page = action_page(view=commanding, token=False)
     assert "has no token" in page.text_content("#why")
     assert page.is_disabled("#send-goal")
     ask = """(headers) => fetch('/api/action', {method: 'POST', headers,
@@ -137,8 +135,7 @@ def test_with_control_but_without_the_token_nothing_goes_either(action_page):
     assert "token" in text
 
 
-def test_a_server_that_dies_is_told_at_its_goal_and_at_its_form(start, look, monkeypatch):
-    monkeypatch.setenv("SMACHPY_DOMAIN", str(os.getpid() % 9999))  # no other robot
+def test_a_server_that_dies_is_told_at_its_goal_and_at_its_form(alone, start, look):
     robot = start.simulation()
     view = start.view("--control")
     page = look(view.address.replace("/#", "/?actions#"), drawn=False)
@@ -154,18 +151,19 @@ def test_a_server_that_dies_is_told_at_its_goal_and_at_its_form(start, look, mon
     assert page.is_disabled("#send-goal")
     assert page.input_value(X) == "3.5"
     start.simulation()
-    wait_for(page, "!document.getElementById('send-goal').disabled", timeout=60.0)
+    wait_for(page, "!document.getElementById('send-goal').disabled")
     assert page.input_value(X) == "3.5"
 
 
-def test_with_the_keyboard_alone_and_with_names_for_all(action_page):
-    page = action_page("--control")
+def test_with_the_keyboard_alone_and_with_names_for_all(commanding, action_page):
+    page = action_page(view=commanding)
     page.keyboard.press("Escape")
     page.keyboard.press("Escape")
     wait_for(page, "!document.querySelector('.actions-page')")
     page.keyboard.press("a")
     page.wait_for_selector(".actions-page")
-    assert page.evaluate("() => document.activeElement.id") == "actions-title"
+    wait_for(page, "document.activeElement.id === 'actions-title'")
+    wait_for(page, "document.querySelectorAll('.action').length === 2")
     unnamed = page.evaluate("""() => [...document.querySelectorAll(
         '.actions-page button, .actions-page input, .actions-page select, .actions-page textarea')]
         .filter((e) => !(e.getAttribute('aria-label') || e.labels?.length || e.textContent.trim()))
@@ -177,7 +175,7 @@ def test_with_the_keyboard_alone_and_with_names_for_all(action_page):
     page.focus("[role=tab][aria-selected=true]")
     page.keyboard.press("ArrowRight")
     page.wait_for_selector("textarea")
-    assert page.evaluate("() => document.activeElement.textContent") == "YAML"
+    wait_for(page, "document.activeElement.textContent === 'YAML'")
     # Keys of the diagram mean nothing here.
     k = page.evaluate("() => smachpy.page.view.k")
     page.keyboard.press("+")
@@ -202,9 +200,8 @@ sys.stdin.read()
 """
 
 
-def test_a_goal_of_a_killed_program_is_shown_and_cancelled(start, look, monkeypatch):
+def test_a_goal_of_a_killed_program_is_shown_and_cancelled(alone, start, look):
     """Nobody else can stop that robot."""
-    monkeypatch.setenv("SMACHPY_DOMAIN", str(1 + (os.getpid() * 3) % 9998))  # no other robot
     start.simulation()
     page = look(start.view("--control").address.replace("/#", "/?actions#"), drawn=False)
     page.click(".action:has(b:text-is('/move_base'))")

@@ -446,8 +446,8 @@ def test_a_command_that_is_ended_leaves_no_process_and_no_file_behind(tmp_path, 
     with pipe.open() as ends:
         worker = int(ends.readline())
         command.send_signal(number)
-        assert command.wait(60) == code
-        ended, _, _ = select.select([ends], [], [], 30)  # its end closes the pipe
+        assert command.wait(120) == code
+        ended, _, _ = select.select([ends], [], [], 120)  # its end closes the pipe
         if not ended:
             os.kill(worker, signal.SIGKILL)
     assert ended, f"process {worker} runs on"
