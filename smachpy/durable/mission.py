@@ -158,16 +158,27 @@ def run_durable(
         else:
             store = journal
         name = mission or machine.name or "SM_ROOT"
-        row = store.find(name)
-        if row is not None and row.status in OVER:
-            store.forget(name)
-            row = None
-        if row is None:
-            store.create(new_mission(machine, mission=name))
+        started = _start(machine, store, name)
+        if started is None:
+            row = store.find(name)
+            if row is not None and row.status in OVER:
+                store.forget(name)
+                started = _start(machine, store, name)
         with kept_mission(
-            machine, store, name, outage=outage, max_outage=max_outage, migrate=migrate
+            machine,
+            store,
+            name,
+            outage=outage,
+            max_outage=max_outage,
+            migrate=migrate,
+            started=started,
         ):
             return machine.execute()
+
+
+def _start(machine: Container, store: Store, name: str) -> tuple[MissionRow, Lease] | None:
+    """Begin a new mission; return None if the store has one of this name."""
+    return store.start(new_mission(machine, mission=name), this_runner(), seconds=LEASE_S)
 
 
 @contextlib.contextmanager
@@ -181,6 +192,7 @@ def kept_mission(
     migrate: Any = None,
     lease_s: float = LEASE_S,
     reserved: Lease | None = None,
+    started: tuple[MissionRow, Lease] | None = None,
     on_fenced: Callable[[FencedError], object] | None = None,
     on_suspended: Callable[[str], object] | None = None,
 ) -> Iterator[Recorder]:
@@ -189,19 +201,22 @@ def kept_mission(
     The other arguments and the errors are those of `run_durable`. A runner that does not renew its
     lease for `lease_s` [s] loses the mission; if that is infinite, the lease is never renewed and
     requests to cancel are not noticed. `reserved` is the lease of a runner that reserved it for
-    this process. If another runner has taken the mission over, `on_fenced` is called, in any
-    thread, before the machine is preempted: the goals belong to that runner now, and must not be
-    cancelled here.
+    this process; `started` is what `Store.start` returned, with a lease of `lease_s`. If another
+    runner has taken the mission over, `on_fenced` is called, in any thread, before the machine is
+    preempted: the goals belong to that runner now, and must not be cancelled here.
 
     If a signal suspends the mission, `on_suspended` is called with its name, in any thread, after
     the lease was released. It must return soon: then the process ends.
     """
-    row = store.mission(mission)
-    lease = store.claim(mission, this_runner(), seconds=lease_s, reserved=reserved)
+    if started is not None:
+        row, lease = started
+    else:
+        row = store.mission(mission)
+        lease = store.claim(mission, this_runner(), seconds=lease_s, reserved=reserved)
     status, note = QUEUED if row.status == QUEUED else INTERRUPTED, ""
     try:
         # Read only now that the lease is held: before, another runner could still write entries.
-        position = read_position(store, mission)
+        position = read_position(store, mission) if started is None else Position()
         resumed = bool(position.visits)
         time = SteadyTime(current_clock())
         gone_ns = 0
@@ -242,8 +257,7 @@ def kept_mission(
         if recorder.broken is not None:
             raise recorder.broken  # noqa: TRY301
     except Exception as error:
-        reason = str(error).split("\n", 1)[0]
-        note = f"{lease.runner}: {reason:.{MAX_NOTE_LENGTH}}"
+        note = note_of(lease.runner, error)
         raise
     finally:
         _release(store, lease, status, note)
@@ -261,13 +275,18 @@ def _suspend(
         top.ending.exit_by(by)
 
 
+def note_of(runner: str, error: Exception) -> str:
+    """Return the note of a mission that a process gives back because of an error."""
+    reason = str(error).split("\n", 1)[0]
+    return f"{runner}: {reason:.{MAX_NOTE_LENGTH}}"
+
+
 def _release(store: Store, lease: Lease, status: str, note: str = "") -> None:
-    """Give the lease back, and set the status and note unless the mission is over."""
+    """Give the lease back, and set the status and note, which the store does not if it is over."""
     # Fails if the lease is lost or the store is unreachable. The recorder has raised that already;
     # here it would hide the exception of the block, and the next process finds this one gone.
     with contextlib.suppress(MissionError):
-        now = store.mission(lease.mission).status
-        store.release(lease, now if now in OVER else status, note="" if now in OVER else note)
+        store.release(lease, status, note=note)
 
 
 def _is_durable(top: Any) -> bool:

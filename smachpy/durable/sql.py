@@ -288,10 +288,38 @@ class SqlStore(ABC):
             now = self._now(cursor)
             first_try.append(now)
             self._insert(cursor, row, now)
+            self._wake(cursor)
             return now
 
         now = self._transact(work)
         return self._stamped(row, now)
+
+    def start(
+        self, row: MissionRow, runner: str, *, seconds: float
+    ) -> tuple[MissionRow, Lease] | None:
+        check_lease_seconds(seconds)
+        host_and_pid(runner)
+        self._verify_once()
+        first_try: list[float] = []
+
+        def work(cursor: Cursor, again: bool) -> float | None:
+            now = self._now(cursor)
+            self._insert(cursor, row, now, " ON CONFLICT (id) DO NOTHING RETURNING id")
+            if cursor.fetchone() is None:
+                found = again and self._one(
+                    cursor,
+                    "SELECT created FROM smachpy_missions WHERE id = ? AND owner = ? AND mark = ?",
+                    *(row.id, runner, self._mark),
+                )
+                # Made by the first try, but its answer was lost.
+                return float(found[0]) if found and found[0] in first_try else None
+            first_try.append(now)
+            self._take_shared(cursor, row.id, row.held_robot, row.group, now)
+            self._hold(cursor, row.id, runner, 1, now, seconds)
+            return now
+
+        now = self._transact(work)
+        return None if now is None else (self._stamped(row, now), Lease(row.id, 1, runner))
 
     def missions(
         self,
@@ -584,18 +612,24 @@ class SqlStore(ABC):
             elif not (mine and status != RUNNING):  # this process may have reserved it itself
                 self._refuse_held(id, held, now)
             self._take_shared(cursor, id, robot, group, now)
-            self._do(
-                cursor,
-                "UPDATE smachpy_missions SET status = 'running', owner = ?, mark = ?, "
-                "lease_end = ?, lease_clock = ?, fence = ?, note = '', "
-                "version = CASE WHEN version < ? THEN ? ELSE version END WHERE id = ?",
-                *(runner, self._mark, now + seconds, self._steady(seconds), fence + 1),
-                *(FORMAT, FORMAT, id),
-            )
+            self._hold(cursor, id, runner, fence + 1, now, seconds)
             silent = max(0.0, self._since(changed, beat_clock, now))
             return Lease(id, fence + 1, runner, beat_ns, silent)
 
         return self._transact(work)
+
+    def _hold(
+        self, cursor: Cursor, id_: str, runner: str, fence: int, now: float, seconds: float
+    ) -> None:
+        """Let a mission be run by a process, for `seconds` [s] from `now`."""
+        self._do(
+            cursor,
+            "UPDATE smachpy_missions SET status = 'running', owner = ?, mark = ?, "
+            "lease_end = ?, lease_clock = ?, fence = ?, note = '', "
+            "version = CASE WHEN version < ? THEN ? ELSE version END WHERE id = ?",
+            *(runner, self._mark, now + seconds, self._steady(seconds), fence),
+            *(FORMAT, FORMAT, id_),
+        )
 
     def renew(self, lease: Lease, *, seconds: float, beat_ns: int | None = None) -> bool:
         check_lease_seconds(seconds)
@@ -609,7 +643,7 @@ class SqlStore(ABC):
                 *(now + seconds, self._steady(seconds), lease.mission),
             )
             if beat_ns is not None:
-                self._note_beat(cursor, lease.mission, beat_ns, now)
+                self._note_beat(cursor, lease.mission, beat_ns)
             return cancel
 
         return self._transact(work)
@@ -644,7 +678,9 @@ class SqlStore(ABC):
                     ((mission, digest, data) for digest, data in blobs.items()),
                 )
             # Numbers without gaps, and a checksum each: `read` notices lost and damaged entries.
-            if entries:
+            if snapshot is not None:  # it has the new entries, too
+                self._compact(cursor, mission, last + len(entries), snapshot, kept)
+            elif entries:
                 rows = (
                     (mission, n, lease.fence, zlib.crc32(data), data)
                     for n, data in enumerate(entries, last + 1)
@@ -655,27 +691,25 @@ class SqlStore(ABC):
                     "VALUES (?, ?, ?, ?, ?)",
                     rows,
                 )
-                last += len(entries)
-            if snapshot is not None:
-                self._compact(cursor, mission, last, snapshot, kept)
             if beat_ns is not None:
-                self._note_beat(cursor, mission, beat_ns, self._now(cursor))
+                self._note_beat(cursor, mission, beat_ns)
             if status is not None or outcome is not None:
                 self._do(
                     cursor,
                     "UPDATE smachpy_missions SET status = COALESCE(?, status), "
-                    "outcome = COALESCE(?, outcome), changed = ? WHERE id = ?",
-                    *(status, outcome, self._now(cursor), mission),
+                    f"outcome = COALESCE(?, outcome), changed = {self._now_text()} WHERE id = ?",
+                    *(status, outcome, mission),
                 )
-            return last
+            return last + len(entries)
 
         self._written[lease] = self._transact(work)
 
-    def _note_beat(self, cursor: Cursor, mission: str, beat_ns: int, now: float) -> None:
+    def _note_beat(self, cursor: Cursor, mission: str, beat_ns: int) -> None:
         self._do(
             cursor,
-            "UPDATE smachpy_missions SET changed = ?, beat_clock = ?, beat_ns = ? WHERE id = ?",
-            *(now, self._steady(), beat_ns, mission),
+            f"UPDATE smachpy_missions SET changed = {self._now_text()}, beat_clock = ?, "
+            "beat_ns = ? WHERE id = ?",
+            *(self._steady(), beat_ns, mission),
         )
 
     def read(self, id: str) -> tuple[bytes | None, list[bytes]]:  # noqa: A002
@@ -694,9 +728,7 @@ class SqlStore(ABC):
             )
             return snapshot, cursor.fetchall()
 
-        if not self._verified:
-            self._transact(lambda cursor, _: self._verify(cursor), reads=True)
-            self._verified = True
+        self._verify_once()
         snapshot, rows = self._transact(work, reads=True)
         kinds = (int, int, bytes)
         expected = 0
@@ -723,18 +755,22 @@ class SqlStore(ABC):
     def release(self, lease: Lease, status: str | None, *, note: str = "") -> None:
 
         def work(cursor: Cursor, again: bool) -> None:
-            try:
-                self._fenced(cursor, lease)
-            except FencedError as error:
-                if again and error.runner is None:  # released by the first try
-                    return
-                raise
-            self._do(
+            # One statement: no claim can come between check and write.
+            released = self._one(
                 cursor,
-                "UPDATE smachpy_missions SET status = COALESCE(?, status), owner = NULL, "
-                "mark = NULL, lease_end = NULL, note = ? WHERE id = ?",
-                *(status, note, lease.mission),
+                "UPDATE smachpy_missions SET owner = NULL, mark = NULL, lease_end = NULL, "
+                f"status = CASE WHEN {_OPEN} THEN COALESCE(?, status) ELSE status END, "
+                f"note = CASE WHEN {_OPEN} THEN ? ELSE '' END "
+                "WHERE id = ? AND fence = ? AND owner = ? RETURNING id",
+                *(status, note, lease.mission, lease.fence, lease.runner),
             )
+            if released is None:
+                try:
+                    self._fenced(cursor, lease)
+                except FencedError as error:
+                    if again and error.runner is None:  # released by the first try
+                        return
+                    raise
             self._wake(cursor)
 
         self._transact(work)
@@ -818,6 +854,7 @@ class SqlStore(ABC):
                 return False
             now = self._now(cursor)
             self._insert(cursor, row, now)
+            self._wake(cursor)
             self._do(
                 cursor,
                 "UPDATE smachpy_missions SET due = ?, changed = ? WHERE id = ?",
@@ -849,6 +886,11 @@ class SqlStore(ABC):
         del on_news
         return None
 
+    def _verify_once(self) -> None:
+        if not self._verified:
+            self._transact(lambda cursor, _: self._verify(cursor), reads=True)
+            self._verified = True
+
     @abstractmethod
     def _verify(self, cursor: Cursor) -> None:
         """Check that the database file is not damaged, if the database does not check it itself."""
@@ -866,7 +908,11 @@ class SqlStore(ABC):
             raise StoreError(self.where, problem, reason="failed") from error
 
     def _do_many(self, cursor: Cursor, sql: str, rows: Iterable[Sequence[Any]]) -> None:
-        cursor.executemany(sql.replace("?", self.dialect.placeholder), rows)
+        rows = list(rows)
+        if len(rows) == 1:  # psycopg's `executemany` costs more
+            self._do(cursor, sql, *rows[0])
+        else:
+            cursor.executemany(sql.replace("?", self.dialect.placeholder), rows)
 
     def _one(self, cursor: Cursor, sql: str, *values: object) -> Any:
         self._do(cursor, sql, *values)
@@ -888,7 +934,7 @@ class SqlStore(ABC):
             changed=now,
         )
 
-    def _insert(self, cursor: Cursor, row: MissionRow, now: float) -> None:
+    def _insert(self, cursor: Cursor, row: MissionRow, now: float, end: str = "") -> None:
         row = self._stamped(row, now)
         values = {name: getattr(row, name) for name in _FIELDS}
         values.update(argv=json.dumps(list(row.argv)), cancel=int(row.cancel))
@@ -898,10 +944,9 @@ class SqlStore(ABC):
         self._do(
             cursor,
             f"INSERT INTO smachpy_missions ({_COLUMNS}, waits, ready, fence) "
-            f"VALUES ({_places(values)}, ?, ?, 0)",
+            f"VALUES ({_places(values)}, ?, ?, 0){end}",
             *(*values.values(), int(waits), ready),
         )
-        self._wake(cursor)
 
     def _one_mission(self, cursor: Cursor, id_: str, columns: str) -> Any:
         names, lock, how = columns.partition(" FOR ")

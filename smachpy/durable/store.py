@@ -182,6 +182,25 @@ class Store(Protocol):
         """
         ...
 
+    def start(
+        self, row: MissionRow, runner: str, *, seconds: float
+    ) -> tuple[MissionRow, Lease] | None:
+        """Add a mission and take a lease of it, as `create` and `claim` do, in one transaction.
+
+        Args:
+            row: The mission; neither a schedule nor one that is due later.
+            runner: This process, `this_runner()`.
+            seconds: The duration of the lease without `renew` [s].
+
+        Returns:
+            The row, as it was before it was claimed, and the lease; None if the id exists.
+
+        Raises:
+            MissionInUseError: a living runner holds a mission that uses its robot or is of its
+                group; nothing is added.
+        """
+        ...
+
     def missions(
         self,
         *,
@@ -339,8 +358,8 @@ class Store(Protocol):
 
         Args:
             lease: The lease.
-            status: The new status of the mission; None: unchanged.
-            note: Why it is given back, for `MissionRow.note`.
+            status: The new status of the mission; None, or if it is over: unchanged.
+            note: Why it is given back, for `MissionRow.note`; none if the mission is over.
 
         Raises:
             FencedError: another runner has taken the mission over.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from smachpy.durable.store import RUNNING, Lease, MissionRow
+from smachpy.durable.store import OVER, RUNNING, Lease, MissionRow
 
 
 class Kill(BaseException):
@@ -37,6 +37,14 @@ class KillingStore:
     def create(self, row: MissionRow) -> None:
         self.rows[row.id] = row
         self.entries[row.id] = []
+
+    def start(
+        self, row: MissionRow, runner: str, *, seconds: float
+    ) -> tuple[MissionRow, Lease] | None:
+        if row.id in self.rows:
+            return None
+        self.create(row)
+        return row, self.claim(row.id, runner, seconds=seconds, reserved=None)
 
     def find(self, id: str) -> MissionRow | None:
         return self.rows.get(id)
@@ -79,7 +87,8 @@ class KillingStore:
         return self.blobs[digest]
 
     def release(self, lease: Lease, status: str, *, note: str = "") -> None:
-        self._set(lease.mission, status=status)
+        if self.rows[lease.mission].status not in OVER:
+            self._set(lease.mission, status=status)
 
     def forget(self, id: str) -> None:
         del self.rows[id], self.entries[id]

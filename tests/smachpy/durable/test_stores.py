@@ -204,6 +204,47 @@ def test_a_mission_that_is_given_back_can_be_taken_again(store):
     assert store.read("m1") == (None, [b"a", b"b"])
 
 
+def test_a_mission_begins_in_one_step_unless_its_id_is_taken(store):
+    row, lease = store.start(ROW, this_runner(), seconds=LONG_S)
+    assert (row.status, row.owner, lease.fence) == ("queued", None, 1)
+    begun = store.mission("m1")
+    assert (begun.status, begun.owner) == ("running", this_runner())
+    assert begun.created == row.created > ROW.created
+    store.append(lease, [b"a"])
+    assert store.start(ROW, this_runner(), seconds=LONG_S) is None
+    assert store.mission("m1").status == "running"
+    assert store.read("m1") == (None, [b"a"])
+
+
+def test_a_mission_whose_robot_is_in_use_does_not_begin_and_is_not_added(store, store_place):
+    store.create(replace(ROW, robot="r1"))
+    with Holder(store_place), pytest.raises(MissionInUseError):
+        store.start(replace(ROW, id="m2", robot="r1"), this_runner(), seconds=LONG_S)
+    assert store.find("m2") is None
+
+
+def test_a_mission_that_is_over_stays_so_when_it_is_given_back(store):
+    _, lease = store.start(ROW, this_runner(), seconds=LONG_S)
+    store.append(lease, [b"a"], status="ended", outcome="done")
+    store.release(lease, "interrupted", note="why")
+    row = store.mission("m1")
+    assert (row.status, row.outcome, row.owner, row.note) == ("ended", "done", None, "")
+
+
+def test_a_mission_begins_once_although_the_answer_was_lost(store, monkeypatch):
+    transact = store._transact
+
+    def twice(work, **options):
+        transact(work, **options)
+        return transact(lambda cursor, _: work(cursor, True), **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(store, "_transact", twice)
+        row, lease = store.start(ROW, this_runner(), seconds=LONG_S)
+    assert (row.created, lease.fence) == (store.mission("m1").created, 1)
+    store.append(lease, [b"a"])
+
+
 def test_a_schedule_is_not_run_itself(store):
     store.create(replace(ROW, every="* * * * *", due=1.0))
     with pytest.raises(MissionError, match="schedule"):
