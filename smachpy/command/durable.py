@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.command_line.numbers import seconds
-from actionlib_core.names import clean_namespace
+from actionlib_core.names import check_name, clean_namespace
 from actionlib_core.process.output import printable, tell
 from smachpy.command.needs import driven_robot, needed_servers
 from smachpy.command.targets import names_file
@@ -145,6 +145,15 @@ def durable_options(args: argparse.Namespace) -> DurableOptions | None:
         migrate=dict(args.migrate),
         reserved=args.reserved,
     )
+
+
+def robot_name(given: str) -> str:
+    """Check the name of a robot and return it; "r1/" is "r1".
+
+    Raises:
+        InvalidNameError: it is no name.
+    """
+    return check_name(given.rstrip("/") or given, "robot name")
 
 
 def whole_target(text: str) -> str:

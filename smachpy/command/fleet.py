@@ -18,7 +18,7 @@ from actionlib_core.command_line.numbers import between, seconds
 from actionlib_core.names import check_name, resolve_name
 from actionlib_core.process.output import printable, tell
 from smachpy.command import EXIT_ERROR
-from smachpy.command.durable import JOURNAL, LEASE_S, whole_target, words_of
+from smachpy.command.durable import JOURNAL, LEASE_S, robot_name, whole_target, words_of
 from smachpy.command.pruning import add_keep, age, is_kept
 from smachpy.command.queued import Allowed, add_allow, add_allow_packages, run_words
 from smachpy.command.run import add_input, add_require_evidence, read_inputs
@@ -168,7 +168,7 @@ def _submit(args: argparse.Namespace) -> int:
     from smachpy.durable.store import open_store
     from smachpy.events.introspection import describe
 
-    robot = check_name(args.robot, "robot name") if args.robot else None
+    robot = robot_name(args.robot) if args.robot else None
     group = None if args.group is None else check_name(args.group, "group name")
     now = RealClock().time_ns() / 1e9
     due = None if args.at is None else read_time(args.at, now)
@@ -205,7 +205,7 @@ def _submit(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    robots = [check_name(name, "robot name") for name in args.robot]
+    robots = [robot_name(name) for name in args.robot]
     with shutdown.handle_signals() as ending:
         store = _open_in_time(args, ending)
         if store is None:

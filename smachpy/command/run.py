@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from actionlib_core.command_line.numbers import seconds
 from actionlib_core.command_line.ros2_options import add_ros2_options, ros2_of_options
-from actionlib_core.names import check_name
 from actionlib_core.process.output import printable
 from smachpy.command.arguments import Text, parameters_of, read_words, usage, wants_help
 from smachpy.command.durable import add_options as add_durable_options
-from smachpy.command.durable import durable_options
+from smachpy.command.durable import durable_options, robot_name
 from smachpy.command.logs import add_log_options, logging_as
 from smachpy.command.queued import add_allow_packages
 from smachpy.command.robot import add_robot_options
@@ -341,7 +340,7 @@ def _options(
         pace=args.time,
         robot=_robot(args, world),
         names=args.names,
-        namespace=check_name(args.robot, "robot name") if args.robot else "",
+        namespace=robot_name(args.robot) if args.robot else "",
         out=args.out,
         bag=args.bag,
         plain=args.plain,

@@ -383,6 +383,14 @@ def test_what_a_mission_calls_good_decides_whether_it_is_kept(tmp_path: Path) ->
     store.close()
 
 
+def test_a_robot_has_one_name_however_it_is_submitted() -> None:
+    for number, robot in enumerate(("r1", "/r1", "r1/", "/r1/")):
+        words = ["submit", "errand.py", "--db", "q.db", f"--mission=m{number}", "--robot", robot]
+        assert main(words) == 0
+    with contextlib.closing(open_store("q.db")) as store:
+        assert {row.robot for row in store.missions()} == {"r1"}
+
+
 @pytest.mark.parametrize("text", ["", "30", "d", "-1d", "nan", "1e9d", "30 d"])
 def test_what_is_no_age_is_refused(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
