@@ -457,6 +457,7 @@ class Runner:
             leave=[
                 *self._given_up,
                 *(mission for mission, rest in self._rests.items() if rest.until > now),
+                *self._processes,  # given back by a process that has not ended yet
             ],
             leave_targets=list(self._refused),
             leave_shapes=[shape for shape, rest in self._shape_rests.items() if rest.until > now],

@@ -26,12 +26,13 @@ from smachpy.command.targets import (
     mission_names,
     names_file,
 )
+from smachpy.exceptions import MissionError
 from smachpy.machines.container import Container
 from smachpy.machines.mission_info import is_mission
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from smachpy.command.targets import Target
     from smachpy.durable.store import MissionRow
@@ -190,6 +191,28 @@ def take_row(args: argparse.Namespace) -> None:
         raise TargetError(row.target, problem)
     args.target, args.robot = row.target, row.robot or ""
     args.input, args.words = arguments_of(row)
+
+
+@contextlib.contextmanager
+def given_back(args: argparse.Namespace) -> Iterator[None]:
+    """Note in a row why its mission did not begin, if a runner reserved it for this process."""
+    from smachpy.durable.mission import note_of
+    from smachpy.durable.processes import this_runner
+    from smachpy.durable.store import Lease, open_store
+
+    try:
+        yield
+    except Exception as error:
+        if args.reserved is not None:
+            runner, fence = args.reserved
+            # Refused if the mission has begun: the end of its journal has a note then.
+            with (
+                contextlib.suppress(MissionError),
+                contextlib.closing(open_store(args.durable, create=False)) as store,
+            ):
+                lease = Lease(args.mission, fence, runner)
+                store.release(lease, None, note=note_of(this_runner(), error))
+        raise
 
 
 def run_words(

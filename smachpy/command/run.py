@@ -232,17 +232,18 @@ def _list(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     events = sys.stdout if args.json else None
-    if args.queued:
-        from smachpy.command.queued import take_row
-
-        take_row(args)
-    if args.ros2:
-        refuse_simulation(args, "--ros2")
-    if args.autonomy:
-        from smachpy.states.confirming import set_autonomy
-
-        set_autonomy(args.autonomy)
     with contextlib.ExitStack() as stack:
+        if args.queued:
+            from smachpy.command.queued import given_back, take_row
+
+            stack.enter_context(given_back(args))
+            take_row(args)
+        if args.ros2:
+            refuse_simulation(args, "--ros2")
+        if args.autonomy:
+            from smachpy.states.confirming import set_autonomy
+
+            set_autonomy(args.autonomy)
         stack.enter_context(ros2_of_options(args))
         if args.json:  # standard output is for events only: a mission's prints go to standard error
             stack.enter_context(contextlib.redirect_stdout(sys.stderr))

@@ -391,6 +391,16 @@ def test_a_robot_has_one_name_however_it_is_submitted() -> None:
         assert {row.robot for row in store.missions()} == {"r1"}
 
 
+def test_a_mission_is_not_begun_again_before_its_process_has_ended() -> None:
+    """It may have given it back already."""
+    assert main(["submit", "errand.py", "--db", "q.db", "--mission", "m1"]) == 0
+    with contextlib.closing(open_store("q.db")) as store:
+        runner = Runner(store, "q.db", robots=[], at_once=2, lease_s=15.0)
+        runner._processes["m1"] = None
+        assert not runner._take()
+        assert store.mission("m1").owner is None
+
+
 @pytest.mark.parametrize("text", ["", "30", "d", "-1d", "nan", "1e9d", "30 d"])
 def test_what_is_no_age_is_refused(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:

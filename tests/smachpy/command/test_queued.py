@@ -18,6 +18,7 @@ from smachpy.command.durable import whole_target
 from smachpy.command.queued import Allowed, arguments_of, check_is_mission
 from smachpy.command.targets import TargetError, load_target
 from smachpy.durable.mission import new_mission
+from smachpy.durable.processes import this_runner
 from smachpy.durable.store import for_child, open_store, store_name
 
 MISSION = """
@@ -238,6 +239,26 @@ def test_options_of_the_command_are_refused(folder, argv, capsys):
     assert main(["missions", "resume", "m1", "--durable", "q.db", "--plain", "--allow", "."]) == 2
     assert "expected only arguments of the mission" in capsys.readouterr().err
     assert left() == set()
+
+
+def test_a_row_says_why_its_reserved_mission_did_not_begin(folder, capsys):
+    queued(f"{folder}/errand.py:gone")
+    words = ["run", "x", "--queued", "--durable=q.db", "--mission=m1", "--plain"]
+    with contextlib.closing(open_store("q.db")) as store:
+        _, lease = store.reserve(this_runner(), seconds=3600)
+        reserved = f"--reserved={lease.runner}:{lease.fence}"
+        assert main([*words, reserved]) == 2
+        row = store.mission("m1")
+        assert (row.status, row.owner) == ("queued", None)
+        assert row.note.startswith(this_runner())
+        assert "Try --allow" in row.note
+        _, lease = store.reserve(this_runner(), seconds=3600)
+        reserved = f"--reserved={lease.runner}:{lease.fence}"
+        assert main([*words, reserved, f"--allow={folder}"]) == 2
+        assert "gone" in store.mission("m1").note
+    capsys.readouterr()
+    assert main(["missions", "list", "--durable=q.db"]) == 0
+    assert "gone" in capsys.readouterr().out
 
 
 def test_ids_and_robots_that_look_like_options_are_values(folder):
