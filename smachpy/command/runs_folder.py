@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from actionlib_core.clock import RealClock
 from actionlib_core.process.private_files import make_private_folder
 from smachpy.base import log
 from smachpy.events.recording import delete_recording, run_of
@@ -62,7 +63,9 @@ def new_file(mission: str, stamp_ns: int, run: str = "") -> Path | None:
         known = next((path for path in ours if run and run_of(path) == run), None)
         if known is not None:
             return known
-        ours.sort(key=lambda path: path.stat().st_mtime)
+        now = RealClock().time_ns() / 1e9
+        # What has a time to come is older than the rest: the clock has been put back since.
+        ours.sort(key=lambda path: ((time := path.stat().st_mtime) <= now, time))
         for path in ours[: max(0, len(ours) - MAX_KEPT_RECORDINGS + 1)]:
             delete_recording(path)
         if not os.access(folder, os.W_OK):

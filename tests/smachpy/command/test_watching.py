@@ -221,6 +221,22 @@ def test_the_folder_of_runs_keeps_the_newest_and_what_is_not_its_own(tmp_path, m
     assert f"nap-20260101-000000-{runs_folder.MAX_KEPT_RECORDINGS + 2}.jsonl" in left
 
 
+def test_a_clock_that_was_put_back_lets_the_newest_recordings_stay(tmp_path, monkeypatch):
+    monkeypatch.setenv(runs_folder.VARIABLE, str(tmp_path))
+    future = 4e9
+    for number in range(runs_folder.MAX_KEPT_RECORDINGS):
+        path = tmp_path / f"nap-20960101-000000-{number}.jsonl"
+        path.write_text("")
+        os.utime(path, (future + number, future + number))
+    newest = tmp_path / "nap-20260101-000000-1.jsonl"
+    newest.write_text("")
+    assert runs_folder.new_file("nap", 1_700_000_000_000_000_000) is not None
+    left = {path.name for path in tmp_path.glob("*.jsonl")}
+    assert newest.name in left
+    assert "nap-20960101-000000-1.jsonl" not in left
+    assert "nap-20960101-000000-2.jsonl" in left
+
+
 def test_the_folder_of_runs_goes_by_the_environment():
     assert runs_folder.runs_folder({"XDG_STATE_HOME": "/s"}) == Path("/s/smachpy/runs")
     assert runs_folder.runs_folder({"SMACHPY_RUNS": "/r", "XDG_STATE_HOME": "/s"}) == Path("/r")
