@@ -37,7 +37,7 @@ from typing import (
 
 from actionlib_core.config import LARGEST_SECRET
 from actionlib_core.inputs.checked_file import read_limited
-from actionlib_core.inputs.suggest import nearest
+from actionlib_core.inputs.suggest import did_you_mean, nearest
 from actionlib_core.inputs.yaml_text import YamlTextError, load_yaml
 from actionlib_core.names import is_rule
 from smachpy.exceptions import MissionError
@@ -456,6 +456,7 @@ class _WordBinder:
         self.problems: list[str] = []
         self._parameters = parameters
         self._given = {name: value for name, value in given.items() if name in parameters}
+        self._others = [name for name in given if name not in parameters]  # keys of the userdata
 
     def read(self, words: list[str]) -> None:
         places: list[str] = []
@@ -480,7 +481,11 @@ class _WordBinder:
             p.name for p in self._parameters.values() if p.required and p.name not in self.values
         ]
         if missing and not self.problems:
-            self.problems.append(f"missing: {', '.join(missing)}; expected a value for each.")
+            hints = [(one, did_you_mean(one, missing)) for one in self._others]
+            slips = "".join(f" Got --input {one}.{hint}" for one, hint in hints if hint)
+            self.problems.append(
+                f"missing: {', '.join(missing)}; expected a value for each.{slips}"
+            )
 
     def _take_option(self, word: str, words: list[str]) -> None:
         name, equals, value = word.lstrip("-").partition("=")

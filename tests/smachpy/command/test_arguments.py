@@ -146,6 +146,15 @@ def test_what_is_missing_or_too_many(words, text):
     assert text in problem(gotopose, *words)
 
 
+def test_a_misspelt_input_is_named_beside_the_missing_argument():
+    with pytest.raises(MissionError) as caught:
+        read_words(target(gotopose), ["a", "1"], {"yy": Text("2"), "speed": Text("3")})
+    first = str(caught.value).splitlines()[0]
+    assert first.endswith(
+        "missing: y; expected a value for each. Got --input yy. Did you mean 'y'?"
+    )
+
+
 def test_a_finished_machine_takes_no_words():
     sm = smachpy.StateMachine(outcomes=["done"])
     with pytest.raises(MissionError, match="got 1 more than it takes: 'a'; expected 0"):
