@@ -18,7 +18,6 @@ from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces._sources import BUNDLED
 from smachpy.base.problems import unknown_name
 from smachpy.command.arguments import Text, parameters_of, read_words
-from smachpy.command.durable import whole_target
 from smachpy.command.targets import MISSION_FILES, PLANS, load_target, names_file
 from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
@@ -102,7 +101,7 @@ def write_test(
         allow: As for `reproduce`.
         expect: The outcome that the mission ought to have had, one of its outcomes: the test fails
             until it is mended.
-        folder: Where the test will be: it names the recording, if it needs it, relative to itself.
+        folder: Where the test will be: it names files relative to itself.
 
     Raises:
         ReproductionError: the recording does not say enough, or `expect` is no outcome.
@@ -140,7 +139,8 @@ def write_test(
     short = _shortened(chosen, trial)
     run = trial.run_of(short)
     assert run is not None
-    text = _text(recording, short, run, trial.counts, mission=mission, allow=allow, expect=expect)
+    call = _call(recording, mission, allow, Path(folder))
+    text = _text(recording, short, run, trial.counts, call=call, expect=expect)
     return Written(text, trial.runs, tuple(script.gaps))
 
 
@@ -315,12 +315,11 @@ def _text(
     run: Run,
     counts: dict[str, tuple[int, int]],
     *,
-    mission: str,
-    allow: Iterable[str | Path],
+    call: tuple[str, list[str]],
     expect: str,
 ) -> str:
     ends = script.used()
-    call, imports = _call(recording, mission, allow)
+    made_by, imports = call
     made = datetime.fromtimestamp(recording.made_ns / 1e9, UTC)
     name = re.sub(r"[^a-z0-9]+", "_", run.record.label.lower()).strip("_")
     outcome = expect or run.outcome or "ends"
@@ -339,7 +338,7 @@ def _text(
         if expect and end.fixture == "action_server":
             lines.append(f"    {end.word}.default_result()  # what a mended mission may ask for")
     lines += [_wrapped(line.text()) for line in script.lines if line.word == "mission"]
-    lines.append(f"    run = mission({call})")
+    lines.append(f"    run = mission({made_by})")
     if expect:
         lines.append(f"    run.assert_outcome({source(expect)})")
         return "\n".join(lines) + "\n"
@@ -407,9 +406,9 @@ def _path_lines(names: list[str]) -> list[str]:
 
 def _import_lines(ends: Iterable[End], imports: list[str]) -> list[str]:
     wanted = [f"from {module} import {name}" for name, module in kinds(list(ends)).items()]
-    plain = [line for line in imports if line.startswith("import ")]
+    plain = [line for line in imports if line in {"import sys", _PATH}]
     first = [line for line in imports if line.startswith("sys.")]
-    own = [line for line in imports if line.startswith("from ")]
+    own = [line for line in imports if line not in {*plain, *first}]
     if any(not (BUNDLED / end.type.partition("/")[0]).is_dir() for end in ends):
         return [*plain, *first, *own, "", *sorted(wanted)]  # the mission defines types of messages
     if first:
@@ -422,10 +421,12 @@ def _import_lines(ends: Iterable[End], imports: list[str]) -> list[str]:
             "",
             *[f"{line}  # noqa: E402" for line in own],
         ]
-    return [*plain, *sorted([*wanted, *own])]
+    return [*plain, *([""] if plain else []), *sorted([*wanted, *own])]
 
 
-def _call(recording: Recording, mission: str, allow: Iterable[str | Path]) -> tuple[str, list[str]]:
+def _call(
+    recording: Recording, mission: str, allow: Iterable[str | Path], folder: Path
+) -> tuple[str, list[str]]:
     """Return the expression that makes the machine, and the imports for it."""
     assert recording.origin is not None
     then = recording.origin["mission"]
@@ -433,14 +434,13 @@ def _call(recording: Recording, mission: str, allow: Iterable[str | Path]) -> tu
     target = load_target(text, imports=False)
     arguments = _arguments(then, target) if not mission or mission == then.get("target") else ""
     if text.endswith(PLANS):
-        return f"load_plan({source(whole_target(text))})", [
-            "from smachpy.pnp.files import load_plan"
-        ]
+        imported = "from smachpy.pnp.files import load_plan"
+        return f"load_plan({_here(text, folder)})", [_PATH, imported]
     if text.endswith(MISSION_FILES):
         packages = [one for one in map(str, allow) if one.replace(".", "_").isidentifier()]
         allowed = [f"allow={source(packages)}"] if packages else []
-        words = [source(whole_target(text)), *allowed, *([arguments] if arguments else [])]
-        return f"load({', '.join(words)})", ["from smachpy import load"]
+        words = [_here(text, folder), *allowed, *([arguments] if arguments else [])]
+        return f"load({', '.join(words)})", [_PATH, "from smachpy import load"]
     thing = target.thing
     is_machine = isinstance(thing, Container)
     module = getattr(thing, "__module__", "")
@@ -449,7 +449,7 @@ def _call(recording: Recording, mission: str, allow: Iterable[str | Path]) -> tu
     if place.endswith(".py") or "/" in place:
         path = Path(place).resolve()
         module, name = path.stem, attribute or _name_in(thing, name)
-        imports = ["import sys", f"sys.path.insert(0, {source(str(path.parent))})"]
+        imports = ["import sys", _PATH, f"sys.path.insert(0, str({_here(path.parent, folder)}))"]
     else:
         imports = []
         name = name or attribute
@@ -513,6 +513,15 @@ def test_{name}_as_recorded():
 '''
     why = "what the world did cannot be written as a script: the test reads the recording"
     return Written(text, runs, (why,), needs_recording=True)
+
+
+_PATH: Final = "from pathlib import Path"
+
+
+def _here(place: str | Path, folder: Path) -> str:
+    """Return the expression by which the test in `folder` finds a file or folder."""
+    place = _relative(place, folder)
+    return "Path(__file__).parent" + ("" if place == source(".") else f" / {place}")
 
 
 def _relative(place: str | Path, folder: Path) -> str:

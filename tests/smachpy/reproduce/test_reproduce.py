@@ -611,6 +611,7 @@ def test_the_written_test_reads_like_a_person_s_and_fails_after_a_change(night, 
     test = written(path, fresh)
     path.unlink()  # it needs no recording
     assert test.read_text().endswith(EXPECTED_TEST)
+    assert str(tmp_path) not in test.read_text()  # it may be moved with its mission
     assert pytest_in(fresh)[0] == 0
     for old, new, at, *_ in MUTATIONS:
         file.write_text(MISSION.replace(old, new))
@@ -644,7 +645,9 @@ def test_a_mission_file_is_reproduced_and_its_test_is_written(tmp_path, monkeypa
     allowed = ["--allow", str(tmp_path)]
     assert main(["runs", "reproduce", "run.jsonl", *allowed]) == 0
     assert main(["runs", "reproduce", "run.jsonl", *allowed, "-o", "test_it.py"]) == 0
-    assert f'load("{tmp_path}/rounds.yaml", seconds=2.0)' in Path("test_it.py").read_text()
+    text = Path("test_it.py").read_text()
+    assert 'load(Path(__file__).parent / "rounds.yaml", seconds=2.0)' in text
+    compile(text, "test_it.py", "exec")
 
 
 def test_an_existing_file_is_not_overwritten(night, tmp_path, capsys):
