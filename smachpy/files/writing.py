@@ -65,6 +65,13 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
     data = {"name": name, **shown, **writer.container(machine, f"/{name}")}
     if writer.problems:
         raise NotWrittenError(writer.problems)
+    if "parameters" in data:
+        # Where the file has the value now, the parameter would have no effect.
+        rest = repr({key: value for key, value in data.items() if key != "parameters"})
+        kept = {one: data["parameters"][one] for one in data["parameters"] if f"${{{one}}}" in rest}
+        data = {key: kept if key == "parameters" else data[key] for key in data}
+        if not kept:
+            del data["parameters"]
     yaml = YAML()
     yaml.width = 120
     old: Any = None if path is None else _there(Path(path), yaml)

@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from smachpy.command import main
-from smachpy.files import load
+from smachpy.files import MissionFileError, load
 from tests.smachpy.files.test_reading import GOOD
 
 
@@ -113,6 +113,20 @@ def test_a_file_with_a_required_parameter_is_checked_drawn_and_exported(folder, 
         assert main([words[0], "rounds.yaml", *words[1:], "--input", "seconds=3"]) == 0
     assert main(["check", "rounds.yaml", "--input", "seconds=long"]) == 2
     assert "--input seconds: got 'long'" in capsys.readouterr().err
+
+
+def test_export_keeps_the_parameters_that_the_file_still_names(folder):
+    (folder / "rounds.yaml").write_text(
+        "outcomes: [done, preempted]\nuserdata: {rounds: '${rounds}'}\n"
+        "parameters: {rounds: {type: whole}, pause: {type: number, default: 1.0}}\n"
+        "states: {A: {state: wait, with: {seconds: '${pause}'}}}\n"
+    )
+    assert main(["export", "rounds.yaml", "-o", "other.yaml", "--input", "rounds=3"]) == 0
+    machine = load(folder / "other.yaml", pause=5.0)  # without rounds, which has its value
+    assert machine.userdata.rounds == 3
+    assert "pause" in (folder / "other.yaml").read_text()
+    with pytest.raises(MissionFileError, match="rounds"):
+        load(folder / "other.yaml", rounds=4)
 
 
 def test_states_are_listed_and_shown(capsys):
