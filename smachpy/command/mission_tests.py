@@ -13,15 +13,28 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from smachpy.machines.container import Container
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add `--allow`."""
-    parser.getgroup("smachpy").addoption(
+    """Add `--allow` and `--input`."""
+    from smachpy.command.run import read_input
+
+    group = parser.getgroup("smachpy")
+    group.addoption(
         "--allow",
         action="append",
         default=[],
         metavar="PACKAGE",
         help="let a mission file name code of this package, as for smachpy run (repeatable)",
+    )
+    group.addoption(
+        "--input",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        type=read_input,
+        help="a parameter of a mission file, as for smachpy run (repeatable)",
     )
 
 
@@ -42,6 +55,17 @@ class MissionFile(pytest.File):
 
 
 class _Item(pytest.Item):
+    def build(self, *, to_run: bool = True) -> Container:
+        """Return the machine; False to look at it only, so that no package need be allowed."""
+        from smachpy.command.mission_run import build
+        from smachpy.command.run import read_inputs
+        from smachpy.command.targets import load_target
+
+        allow = self.config.getoption("allow") if to_run else None
+        target = load_target(str(self.path), imports=False, allow=allow)
+        inputs = read_inputs(self.config.getoption("input"))
+        return build(target, inputs, to_run=False) if inputs else target.build()
+
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException]) -> str:  # type: ignore[override]
         """Return what is wrong, without a traceback of ours."""
         if isinstance(excinfo.value, (AssertionError, SmachError)):
@@ -59,9 +83,8 @@ class Checked(_Item):
     def runtest(self) -> None:
         """Load and check it."""
         from smachpy.checks import check
-        from smachpy.files import load
 
-        check(load(self.path, allow=self.config.getoption("allow"))).assert_ok()
+        check(self.build()).assert_ok()
 
 
 class Explored(_Item):
@@ -70,8 +93,7 @@ class Explored(_Item):
     def runtest(self) -> None:
         """Explore it."""
         from smachpy.command.explore import reckoning_states
-        from smachpy.files import load
         from smachpy.testing.exploring.exploration import explore
 
-        keep = reckoning_states(load(self.path, to_run=False))
-        explore(lambda: load(self.path, to_run=False), keep=keep).assert_ok()
+        keep = reckoning_states(self.build(to_run=False))
+        explore(lambda: self.build(to_run=False), keep=keep).assert_ok()

@@ -460,7 +460,7 @@ def add_input(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        type=_read_input,
+        type=read_input,
         help="an argument of the mission's function by name, or a userdata key",
     )
 
@@ -486,7 +486,7 @@ def read_inputs(pairs: Sequence[tuple[str, Text]]) -> dict[str, Text]:
     return inputs
 
 
-def _read_input(text: str) -> tuple[str, Text]:
+def read_input(text: str) -> tuple[str, Text]:
     """Read KEY=VALUE."""
     key, equals, value = text.partition("=")
     if not (key and equals):

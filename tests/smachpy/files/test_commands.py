@@ -202,6 +202,21 @@ def test_explore_finds_what_breaks_a_mission_without_its_code(folder, capsys):
 
 
 @pytest.mark.slow
+def test_test_takes_the_parameters_of_a_file(folder):
+    (folder / "rounds.yaml").write_text(
+        "outcomes: [done, preempted]\nparameters: {pause: {type: number}}\n"
+        "states: {A: {state: wait, with: {seconds: '${pause}'}}}\n"
+    )
+    words = [sys.executable, "-m", "smachpy", "test", "-q", "-p", "no:cacheprovider"]
+    run = partial(subprocess.run, cwd=folder, capture_output=True, text=True)
+    assert "Try --input pause=VALUE" in run([*words, "rounds.yaml"]).stdout
+    found = run([*words, "rounds.yaml", "--input", "pause=2"])
+    assert found.returncode == 0, found.stdout
+    found = run([*words, "rounds.yaml", "--input", "pause=2", "--input", "pose=2"])
+    assert "--input pose: mission 'rounds' has no such input" in found.stdout
+
+
+@pytest.mark.slow
 def test_test_checks_and_explores_a_file(folder):
     (folder / "steps.py").write_text("raise SystemExit\ngo = None\n")
     (folder / "rounds.yaml").write_text(ROUNDS)
