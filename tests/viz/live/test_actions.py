@@ -297,6 +297,26 @@ def test_actions_of_a_ros2_robot(clock):
         session.close()
 
 
+def test_a_goal_is_cancelled_though_its_server_takes_seconds_to_answer(world, monkeypatch):
+    """It was asked for its goals first, and given up after 1 s; the robot drove on."""
+    server = counting(world)
+    world.actions.send("count", "{goal: 50}")
+    world.clock.sleep(1.0)
+    (goal,) = world.actions.server_goals("count")
+    query = world.viewer.transport.query
+
+    def slowly(*asked, timeout, on_done, **more):
+        world.clock.sleep(min(2.0, timeout))
+        if timeout < 2.0:
+            return on_done()
+        return query(*asked, timeout=timeout, on_done=on_done, **more)
+
+    monkeypatch.setattr(world.viewer.transport, "query", slowly)
+    world.actions.cancel_any("count", goal["id"])
+    world.clock.sleep(3.0)
+    assert not server.is_active()
+
+
 def test_a_goal_of_a_client_that_is_gone_can_be_cancelled(world):
     """Its own program can no longer do it, and the robot drives on."""
     server = counting(world)

@@ -411,7 +411,7 @@ def test_two_machines_of_one_name_are_two_machines(start, look):
     # The one goes, the other stays; a new one takes the place of the one that has gone.
     first.kill()
     wait_for(page, "smachpy.store.status.runStatus.value.word === 'stale'")
-    assert other.evaluate("() => smachpy.store.status.runStatus.value.word") == "running"
+    wait_for(other, "smachpy.store.status.runStatus.value.word === 'running'")
     start.robot("--name", "twin", "--rate", 4)
     wait_for(page, "smachpy.store.status.runStatus.value.word === 'running'")
     assert page.evaluate(f"() => {twins}.length") == 2

@@ -303,7 +303,10 @@ class Actions:
     def cancel_any(self, name: str, goal_id: str) -> None:
         """Request the cancellation of a goal of an action's server, whoever sent it.
 
-        Raises, blocks: as `server_goals`; there is no such goal.
+        Raises:
+            GoalRefusedError, GoalsError: as `server_goals`; or there is no such goal.
+
+        Blocks: 11 s at most.
         """
         cancel(self._nodes.get(name, self._node), self._server(name), goal_id)
 

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 ASK_S: Final = 1.0
 """Longest wait for the answer of a server, and for the tokens of its clients [s]."""
 
+CANCEL_S: Final = 5.0
+"""The same before and after a cancel, on a busy robot: it must be stopped all the same [s]."""
+
 MAX_LISTED_GOALS: Final = 100
 """Goals of a server that are listed, the newest ones."""
 
@@ -42,12 +45,7 @@ def goals_of(node: Node, end: Endpoint) -> list[dict[str, Any]]:
 
     Blocks: 2 s at most.
     """
-    if end.type.count("/") > 1:
-        raise GoalsError(
-            f"action /{end.name}: its server speaks ROS 2's protocol, which tells no goals here. "
-            f"Try: actionlib goal list /{end.name}"
-        )
-    entries = [one for one in _statuses(node, end) if one.status not in TERMINAL and one.stamp_ns]
+    entries = _running(node, end, ASK_S)
     entries.sort(key=lambda one: one.stamp_ns, reverse=True)
     clients = {client.node for client in _clients(node, end)}
     listed = []
@@ -73,22 +71,33 @@ def cancel(node: Node, end: Endpoint, goal_id: str) -> None:
     Raises:
         GoalsError: there is no such goal, or as `goals_of`.
 
-    Blocks: 3 s at most.
+    Blocks: 11 s at most.
     """
-    running = [goal["id"] for goal in goals_of(node, end)]
+    running = [one.id for one in _running(node, end, CANCEL_S)]
     if goal_id not in running:  # the server would remember the cancel for a goal to come
         raise GoalsError(f"goal {goal_id!r}: not running any more; running are {running}.")
     publisher = node.transport.publisher(action_keys(end.name).cancel, encoding_of(GoalID), GOAL)
     try:
         publisher.put(pack_goal_id(goal_id, 0))
-        _statuses(node, end)  # the answer shows that the cancel before it has arrived
+        _running(node, end, CANCEL_S)  # the answer shows that the cancel before it has arrived
     except ActionlibError as error:
         raise GoalsError(str(error)) from error
     finally:
         publisher.close()
 
 
-def _statuses(node: Node, end: Endpoint) -> list[Any]:
+def _running(node: Node, end: Endpoint, seconds: float) -> list[Any]:
+    """Return the statuses of the running goals."""
+    if end.type.count("/") > 1:
+        raise GoalsError(
+            f"action /{end.name}: its server speaks ROS 2's protocol, which tells no goals here. "
+            f"Try: actionlib goal list /{end.name}"
+        )
+    statuses = _statuses(node, end, seconds)
+    return [one for one in statuses if one.status not in TERMINAL and one.stamp_ns]
+
+
+def _statuses(node: Node, end: Endpoint, seconds: float) -> list[Any]:
     replies: list[Reply] = []
     done = node.clock.event()
     try:
@@ -96,11 +105,11 @@ def _statuses(node: Node, end: Endpoint) -> list[Any]:
             action_keys(end.name).result,
             pack_goal_id("", 0),
             encoding=encoding_of(GoalID),
-            timeout=ASK_S,
+            timeout=seconds,
             on_reply=replies.append,
             on_done=done.set,
         )
-        done.wait(ASK_S + 0.5)
+        done.wait(seconds + 0.5)
     except ActionlibError as error:
         raise GoalsError(str(error)) from error
     for reply in replies:
@@ -109,7 +118,7 @@ def _statuses(node: Node, end: Endpoint) -> list[Any]:
                 return list(unpack_statuses(reply.payload))
         except ValueError:
             continue
-    raise GoalsError(f"action /{end.name}: got no answer in {ASK_S:g} s; expected its goals.")
+    raise GoalsError(f"action /{end.name}: got no answer in {seconds:g} s; expected its goals.")
 
 
 def _clients(node: Node, end: Endpoint) -> list[Endpoint]:
