@@ -27,7 +27,8 @@ from smachpy.machines.mission_info import is_mission, mission, mission_info
 from smachpy.machines.state import set_options
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+    from importlib.metadata import EntryPoint
     from types import CodeType, ModuleType
 
 GROUP = "smachpy.missions"
@@ -147,9 +148,10 @@ def list_missions() -> dict[str, str]:
     """
     lines = {}
     no_robot = importlib.util.find_spec("scipy") is None
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+    points = entry_points(group=GROUP)  # it reads a file of each installed package
+    for point in sorted(points, key=lambda point: point.name):
         try:
-            mission = _load_mission(point.name)
+            mission = _load_mission(point.name, points)
             lines[point.name] = mission.summary
             if no_robot and _drives(mission.thing):
                 lines[point.name] += " Its simulated robot: pip install 'smachpy[sim]'"
@@ -242,7 +244,7 @@ def load_target(text: str, *, imports: bool = True, allow: Sequence[str] | None 
     if attribute:
         return _from_module(text, _import_module(text, place), attribute, attribute)
     if place in mission_names():
-        return _load_mission(place)
+        return _load_mission(place, entry_points(group=GROUP))
     if "." in place and _is_module(place):
         return _from_module(text, _import_module(text, place), "", place.rpartition(".")[2])
     raise TargetError(text, f"no such mission; {_suggest(place, mission_names())}")
@@ -300,8 +302,8 @@ def mission_names() -> list[str]:
     return sorted(point.name for point in entry_points(group=GROUP))
 
 
-def _load_mission(name: str) -> Target:
-    points = {point.value: point for point in entry_points(group=GROUP) if point.name == name}
+def _load_mission(name: str, installed: Iterable[EntryPoint]) -> Target:
+    points = {point.value: point for point in installed if point.name == name}
     if len(points) > 1:
         raise TargetError(
             name,

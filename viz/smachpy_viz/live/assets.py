@@ -7,7 +7,7 @@ import gzip
 import hashlib
 import json
 from dataclasses import asdict
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,7 +149,7 @@ def standalone(run: dict[str, Any], title: str) -> str:
     parts = [
         f'<meta http-equiv="Content-Security-Policy" content="{_FILE_POLICY.format(digest)}">',
         f"<style>{style}</style>",
-        *(_packed(name, (WEB / f"{name}-worker.js").read_bytes()) for name in WORKERS),
+        *(_packed_worker(name, (WEB / f"{name}-worker.js").read_bytes()) for name in WORKERS),
         _packed("run", json.dumps(run).encode()),
         f'<script type="module">{code}</script>',
     ]
@@ -170,3 +170,6 @@ def _packed(name: str, content: bytes) -> str:
     """A block of data in a page: gzip as base64, which cannot contain `</script>`."""
     data = base64.b64encode(gzip.compress(content, mtime=0)).decode()  # the same bytes each time
     return f'<script type="application/octet-stream" id="{name}-data">{data}</script>'
+
+
+_packed_worker = lru_cache(maxsize=len(WORKERS))(_packed)  # the same in each file
