@@ -29,9 +29,11 @@ from tests.free_port import free_port
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-# Pages that drive the robot for long. `.ci/installed` tries README.md and the tutorial with the wheel.
+# Pages that start many processes or drive the robot for long. `.ci/installed` tries README.md and the tutorial with the wheel.
 SLOW = {
     "README.md",
+    "tutorial.md",
+    "lessons.md",
     "demo_action.md",
     "demo_service.md",
     "rp_action.md",
