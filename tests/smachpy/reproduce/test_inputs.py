@@ -15,7 +15,7 @@ from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from smachpy import CBState, MonitorState, ServiceState, SimpleActionState, StateMachine
-from smachpy.events.inputs import LARGE, WAITING, Inputs
+from smachpy.events.inputs import LARGE, Inputs
 from smachpy.events.recording import Recorder, RecordingError, read_recording
 
 GOAL = MoveBaseGoal.from_dict({"target_pose": {"header": {"frame_id": "map"}}})
@@ -189,16 +189,17 @@ def test_older_recordings_have_no_inputs(mission, tmp_path):
     assert recording.inputs == []
 
 
-def test_what_does_not_fit_is_counted(virtual_clock):
+def test_what_does_not_fit_is_counted(virtual_clock, monkeypatch):
+    monkeypatch.setattr("smachpy.events.inputs.WAITING", 100)  # in place of 100,000
     inputs = Inputs("seen", virtual_clock, "", lambda: None)
     try:
         crossing = border.Crossing("message", "t", "std_msgs/String", "1", 0.0, "n", String("x"))
-        for _ in range(WAITING + 3):
+        for _ in range(103):
             inputs._note(crossing)
-        found = inputs.take(WAITING + 10)
+        found = inputs.take(110)
     finally:
         inputs.close()
-    assert len(found) == WAITING + 1
+    assert len(found) == 101
     assert (found[-1]["what"], found[-1]["key"]) == ("lost", "3")
 
 
