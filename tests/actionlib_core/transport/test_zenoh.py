@@ -323,12 +323,14 @@ class Cable:
 @pytest.mark.slow
 @pytest.mark.parametrize("longer_than_lease", [False, True])
 def test_cut_cable(longer_than_lease):
-    lease = 1.0 if longer_than_lease else 10.0
     port = free_port()
-    common = {"discovery": "off", "lease": lease}
+    # Only the link with the cable is short of patience: a busy computer cuts none of the others.
+    lease = 2.0 if longer_than_lease else 100.0
+    common = {"discovery": "off", "lease": 100.0}
     router = ZenohTransport(Config(mode="router", listen=(f"tcp/127.0.0.1:{port}",), **common))
     cable = Cable(port)
-    near = ZenohTransport(Config(mode="client", connect=(f"tcp/127.0.0.1:{cable.port}",), **common))
+    connect = (f"tcp/127.0.0.1:{cable.port}",)
+    near = ZenohTransport(Config(mode="client", connect=connect, discovery="off", lease=lease))
     far = ZenohTransport(Config(mode="client", connect=(f"tcp/127.0.0.1:{port}",), **common))
     try:
         watch = Watch(far)

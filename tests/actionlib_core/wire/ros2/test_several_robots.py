@@ -17,6 +17,7 @@ from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import ros2
 from actionlib_core.interfaces.ros2.test_msgs.action import Fibonacci
 from actionlib_core.node import Node
+from actionlib_core.transport import _refusal
 from actionlib_core.transport.zenoh import ZenohTransport
 from actionlib_core.wire.ros2.network import ros_network
 from tests.actionlib_core.transport.test_security import write_certificate
@@ -103,7 +104,10 @@ def test_robots_with_the_same_names_behind_routers_of_their_own(left, tmp_path: 
     assert call().result.names == ["use_sim_time"]
 
 
-def test_a_router_whose_certificate_nobody_has_signed_is_refused(left, tmp_path: Path):
+def test_a_router_whose_certificate_nobody_has_signed_is_refused(
+    left, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(_refusal, "PROBE_S", LONG_S)
     for name in ("ca", "stranger"):
         write_certificate(tmp_path, name)
     own = Tls(
