@@ -292,7 +292,7 @@ def test_a_runner_killed_at_any_statement_leaves_the_mission_to_one_other(store,
         store.release(lease, "queued")
         if done.stdout:
             break
-    assert kill_at > 2
+    assert kill_at > 1  # it was killed at least once
     assert len(store.read("a")[1]) == kill_at
 
 
