@@ -278,7 +278,7 @@ def test_while_the_page_opens_the_layout_follows_the_shape_that_is_left(served, 
     )  # it opens as long as the test takes
     page.set_viewport_size({"width": 1000, "height": 900})
     wait_for_shape = """() => { const { view, layouts: { layout, running } } = smachpy.page;
-      return !running && layout.suits(view.width / view.height); }"""
+      return !running && layout.suits(view.aspect); }"""
     page.wait_for_function(wait_for_shape)
     page.set_viewport_size({"width": 1400, "height": 560})
     page.wait_for_function(wait_for_shape)
@@ -362,3 +362,30 @@ def test_an_outline_is_offered_where_names_are_small(served, look):
     wait_for(page, "smachpy.store.view.opened.value.size === 1")
     wait_for(page, "!smachpy.store.view.namesAreSmall.value")
     outline.wait_for(state="detached")
+
+
+TITLES = """() => [...document.querySelectorAll('.diagram g.box')].map((box) => {
+    const [frame, title] = ['.frame', '.title'].map((part) => box.querySelector(part).getBoundingClientRect());
+    return [title.top + 0.2 * title.height - frame.top, frame.right - title.right]; // from the capitals
+})"""
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (390, 844), (844, 390)])
+def test_titles_are_inside_of_their_containers(served, look, size):
+    served.add("recovery", sm=recovery())
+    page = look(served.start())
+    page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+    all_levels(page)
+    titles = page.evaluate(TITLES)
+    assert titles
+    assert min(above for above, _ in titles) >= 1
+    assert min(right for _, right in titles) >= 0
+
+
+def test_in_a_low_window_the_machine_has_the_most_room(served, look):
+    events = [("Started", "/RECOVERY"), ("Entered", "/RECOVERY/DRIVE")]
+    served.add("recovery", sm=recovery(), events=events)
+    page = look(served.start())
+    page.set_viewport_size({"width": 900, "height": 600})
+    below = "document.querySelector('.dock.bottom').clientHeight"
+    wait_for(page, f"smachpy.page.view.height > {below} && {below} > 100")

@@ -4526,7 +4526,7 @@ var Picture = class {
     const entry = layout.entry && layout.entry.y < 8 ? layout.entry.x : -1;
     const isCrossed = entry > 4 && entry < 30 + name && entry + 26 + name < box.w;
     const left = isCrossed ? x3 + entry - 2 : x3;
-    const title = el("text", { x: left + 24, y: y5 + 16.5, class: "title" }, node.shown);
+    const title = el("text", { x: left + 24, y: y5 + 13.5, class: "title" }, node.shown);
     const room = x3 + box.w - left - 42;
     title.style.setProperty("--longest", `${Math.max(11, 11 * room / name).toFixed(1)}px`);
     if (layout.head) {
@@ -5190,15 +5190,16 @@ var Elk = class {
 
 // src/drawing/shapes.ts
 var GRID_FROM = 4;
-var FOLD_FROM = 7;
+var FOLD_FROM = { closed: 5, open: 7 };
 var BUNDLE_FROM = 6;
-var FOLD_COST = 1.05;
+var FOLD_COST = 1.1;
 var nameOf = ({ dir, columns, folded }) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
 function shapesOf(node, inner, aspect) {
   const shapes = DIRECTIONS.map((dir) => ({ dir }));
   const { children } = node;
   if (node.kind !== "concurrence") {
-    if (children.length >= FOLD_FROM) shapes.push(...DIRECTIONS.map((dir) => ({ dir, folded: true })));
+    if (children.length >= (inner.size ? FOLD_FROM.open : FOLD_FROM.closed))
+      shapes.push(...DIRECTIONS.map((dir) => ({ dir, folded: true })));
     return shapes;
   }
   if (children.length < GRID_FROM) return shapes;
@@ -5632,7 +5633,7 @@ var OVERVIEW_FROM = 150;
 var TANGLED = { links: 100, perState: 6 };
 var INNER_ASPECTS = [1, 0.5, 2];
 var TRIED_UNTIL = 80;
-var ASPECTS = { least: 0.6, most: 2.4 };
+var ASPECTS = { least: 0.6, most: 5 };
 var SAME_ASPECT = 0.15;
 var within2 = (aspect) => Math.max(ASPECTS.least, Math.min(ASPECTS.most, aspect));
 var Layout = class {
@@ -5644,7 +5645,7 @@ var Layout = class {
   tried = /* @__PURE__ */ new Map();
   // names of the shapes of a container, by the open containers in it
   aspect = 1.6;
-  // width of the view divided by its height
+  // of the room in the view: its width divided by its height
   inner = 1;
   // factor on it, for inner containers
   constructor(worker) {
@@ -5871,7 +5872,7 @@ var LayoutController = class {
     const model = store.data.model.value;
     if (!model || !this.layout) return;
     const begun = performance.now();
-    if (this.#after.frame) this.layout.choose(this.view.width / this.view.height);
+    if (this.#after.frame) this.layout.choose(this.view.aspect);
     const progress = (done, all) => {
       if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
@@ -5951,7 +5952,7 @@ var LayoutController = class {
   /** Whether the page is just opening and the aspect of its view has changed much since the layout. */
   isOtherShape() {
     const isOpening = performance.now() - this.openedAt < OPENING_MS;
-    return isOpening && this.layout !== null && !this.layout.suits(this.view.width / this.view.height);
+    return isOpening && this.layout !== null && !this.layout.suits(this.view.aspect);
   }
   // -- the open containers ----------------------------------------------------------------------
   /** Open or close a container, unless it is the root. */
@@ -6171,6 +6172,7 @@ var Labels = class {
 var LEAST_SCALE = 0.04;
 var MOST_SCALE = 4;
 var HEAD4 = 18;
+var MARGIN = 16;
 var Viewport = class {
   svg;
   world;
@@ -6205,13 +6207,17 @@ var Viewport = class {
   get height() {
     return this.svg.clientHeight || 1;
   }
+  /** Width divided by height of the room for a machine: in a low view the margins take much of it. */
+  get aspect() {
+    return Math.max(1, this.width - 2 * MARGIN) / Math.max(1, this.height - HEAD4 - 2 * MARGIN);
+  }
   set(x3, y5, k4) {
     Object.assign(this, { x: x3, y: y5, k: k4 });
     this.world.setAttribute("transform", `translate(${x3} ${y5}) scale(${k4})`);
     this.onChange();
   }
   /** Show all of a box. */
-  frame(box, { margin = 16, most = 1.6, animate = true } = {}) {
+  frame(box, { margin = MARGIN, most = 1.6, animate = true } = {}) {
     const room = this.height - HEAD4;
     const k4 = Math.min(most, (this.width - 2 * margin) / box.w, (room - 2 * margin) / box.h);
     const x3 = (this.width - box.w * k4) / 2 - box.x * k4;
@@ -6224,7 +6230,7 @@ var Viewport = class {
     return Math.abs(x3 - this.x) + Math.abs(y5 - this.y) < 1 && Math.abs(k4 - this.k) < 1e-3;
   }
   /** The scale at which a box fills the view. */
-  scaleFor(box, margin = 16) {
+  scaleFor(box, margin = MARGIN) {
     return Math.min((this.width - 2 * margin) / box.w, (this.height - 2 * margin) / box.h);
   }
   animateTo(x3, y5, k4, time2 = 380) {
@@ -6323,7 +6329,7 @@ function grab(element, {
 }
 
 // src/drawing/map.ts
-var MARGIN = 10;
+var MARGIN2 = 10;
 var ROBOT_M = 8;
 var REACH = 9;
 var SCAN_MS = 1500;
@@ -6386,7 +6392,7 @@ var MapView = class {
     const robot = this.followed === null ? null : scene.robots.get(this.followed);
     const pose = robot && scene.poseAt(robot, now);
     const whole2 = box ? {
-      k: Math.min((width - 2 * MARGIN) / box.w, (height - 2 * MARGIN) / box.h),
+      k: Math.min((width - 2 * MARGIN2) / box.w, (height - 2 * MARGIN2) / box.h),
       x: box.x + box.w / 2,
       y: box.y + box.h / 2
     } : { k: 20, x: 0, y: 0 };
@@ -7708,7 +7714,9 @@ var Timeline = class {
   #grid(axis, width, height) {
     const { from, to } = axis;
     const g5 = this.context;
-    const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
+    const first = store.data.run.first();
+    if (first === null) return;
+    const begun = ms(store.playback.shown().started) ?? first;
     const step = 1e3 * (STEPS_S.find((s4) => s4 * 1e3 * axis.rate > 74) ?? 86400 * Math.ceil(74 / axis.rate / 864e5));
     g5.fillStyle = this.#colours.of("muted");
     g5.strokeStyle = this.#colours.of("hair");
@@ -9542,6 +9550,10 @@ var PARTS = [
 
 // src/core/fleet.ts
 var nameOfRow = (row) => row.robots.length === 1 ? row.robots[0] : row.name ?? row.machine;
+function countText({ rows, skip, total: total2 }) {
+  const which = rows.length < total2 ? `${skip + 1} to ${skip + rows.length} of ` : "";
+  return `${which}${total2.toLocaleString("en")} live ${total2 === 1 ? "run" : "runs"}`;
+}
 function lanesOf2(rows, now) {
   const begins = rows.flatMap((row) => row.began === null ? [] : [row.began / 1e9]);
   const first = Math.min(...begins, now / 1e3);
@@ -9625,13 +9637,12 @@ async function openRun(id) {
 
 // src/panels/fleet.tsx
 var REFRESH_MS2 = 1e3;
-var MOST_ROWS3 = 32;
 var GAP2 = 8;
 var CARD2 = { width: 200 + GAP2, height: 88 + GAP2 };
 var FleetPage = () => store.view.pageShown.value === "fleet" ? /* @__PURE__ */ a4(OpenFleet, {}) : null;
 function OpenFleet() {
   const [skip, setSkip] = d2(0);
-  const [found, setFound] = d2({ rows: [], skip: 0, total: 0 });
+  const [found, setFound] = d2(null);
   const heading = T2(null);
   const box = T2(null);
   A2(() => heading.current?.focus(), []);
@@ -9648,12 +9659,11 @@ function OpenFleet() {
       clearInterval(timer);
     };
   }, [skip]);
-  const { rows, total: total2 } = found;
-  const last = Math.min(found.skip + MOST_ROWS3, total2);
+  const { rows, total: total2, skip: before } = found ?? { rows: [], total: 0, skip: 0 };
   const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf2(rows, now);
   const columns = Math.max(1, Math.floor(((box.current?.clientWidth ?? 0) + GAP2) / CARD2.width));
-  const line = Math.floor(found.skip / columns);
+  const line = Math.floor(before / columns);
   const onScroll = (e4) => {
     const above = Math.floor(e4.target.scrollTop / CARD2.height) - 1;
     setSkip(Math.max(0, above * columns));
@@ -9661,13 +9671,11 @@ function OpenFleet() {
   return /* @__PURE__ */ a4("section", { class: "fleet", "aria-labelledby": "fleet-title", children: [
     /* @__PURE__ */ a4("header", { children: [
       /* @__PURE__ */ a4("h2", { id: "fleet-title", tabindex: -1, ref: heading, children: "Fleet" }),
-      /* @__PURE__ */ a4("span", { class: "hint", children: [
-        total2 > MOST_ROWS3 ? `${found.skip + 1} to ${last} of ${total2.toLocaleString("en")}` : rows.length,
-        " live runs"
-      ] }),
+      /* @__PURE__ */ a4("span", { class: "hint", children: found ? countText(found) : "reading the runs…" }),
       /* @__PURE__ */ a4("span", { class: "spread" }),
       /* @__PURE__ */ a4("button", { onClick: () => showPage("runs"), children: "Close" })
     ] }),
+    found && !total2 && /* @__PURE__ */ a4("p", { class: "empty-list", children: "No mission runs now. Each one that begins gets a card here." }),
     /* @__PURE__ */ a4("div", { class: "fleet-top", children: [
       /* @__PURE__ */ a4("div", { class: "cards", ref: box, onScroll, children: /* @__PURE__ */ a4("div", { style: { height: `${Math.ceil(total2 / columns) * CARD2.height}px` }, children: /* @__PURE__ */ a4("div", { class: "in-view", style: { transform: `translateY(${line * CARD2.height}px)`, "--columns": columns }, children: rows.map((row) => /* @__PURE__ */ a4("button", { onClick: () => openRun(row.id), children: [
         /* @__PURE__ */ a4("b", { children: shorten(nameOfRow(row), 26) }),
@@ -9984,7 +9992,7 @@ function Strip2({ row, seconds }) {
 }
 
 // src/panels/home.tsx
-var MOST_ROWS4 = 40;
+var MOST_ROWS3 = 40;
 var MOST_NAMES2 = 8;
 var REFRESH_MS3 = 5e3;
 var HomePage = () => store.view.pageShown.value === "runs" ? /* @__PURE__ */ a4(OpenHome, {}) : null;
@@ -9994,7 +10002,7 @@ var openSimulations = () => {
 var ALL = { show: "all", machine: null, robot: null, text: "" };
 function OpenHome() {
   const [filter, setFilter] = d2(ALL);
-  const [most, setMost] = d2(MOST_ROWS4);
+  const [most, setMost] = d2(MOST_ROWS3);
   const heading = T2(null);
   const { machines } = store.data;
   A2(() => heading.current?.focus(), []);
@@ -10012,7 +10020,7 @@ function OpenHome() {
   const rows = chosen(runs2, filter, pins2);
   const change3 = (some) => {
     setFilter({ ...filter, ...some });
-    setMost(MOST_ROWS4);
+    setMost(MOST_ROWS3);
   };
   const failed = rows.filter((row) => standing(row) === "failure").length;
   const failedText = failed ? `, ${failed} failed` : "";
@@ -10496,6 +10504,7 @@ function ShareButtons({ page: page2 }) {
     done === null ? /* @__PURE__ */ a4(
       "button",
       {
+        class: "film",
         title: "GIF of the selected stretch, or of the 20 s before the instant shown",
         onClick: () => saveFilm(page2),
         children: "GIF"
@@ -10603,7 +10612,7 @@ function Numbers() {
 // src/panels/preempts.tsx
 var RECENT_MS2 = 3e4;
 var ORDINARY_MS = 1e3;
-var MOST_ROWS5 = 24;
+var MOST_ROWS4 = 24;
 var isOrdinary = ({ from, to, rows }) => to !== null && to - from < ORDINARY_MS && rows.every((row) => row.asked?.source === "concurrence" && row.abandoned === null);
 function Preempts({ page: page2, data, now }) {
   const found = store.data.run.preemptAt(now);
@@ -10612,7 +10621,7 @@ function Preempts({ page: page2, data, now }) {
   if (isOrdinary(found)) return null;
   const askers = [...new Set(found.rows.map((row) => askerText(row.asked) ?? "not recorded"))];
   const depth = (row) => row.path.split("/").length;
-  const rows = [...found.rows].sort((a5, b3) => depth(a5) - depth(b3) || a5.preempt - b3.preempt).slice(0, MOST_ROWS5);
+  const rows = [...found.rows].sort((a5, b3) => depth(a5) - depth(b3) || a5.preempt - b3.preempt).slice(0, MOST_ROWS4);
   const left = found.rows.length - rows.length;
   return /* @__PURE__ */ a4(Section, { title: "Preempt", children: /* @__PURE__ */ a4("div", { class: "preempt", children: [
     /* @__PURE__ */ a4("dl", { class: "facts", children: [
@@ -17191,7 +17200,7 @@ function TopBar({ page: page2 }) {
     ),
     /* @__PURE__ */ a4(RunsButton, {}),
     /* @__PURE__ */ a4(Chooser, {}),
-    /* @__PURE__ */ a4("span", { class: `status ${status.kind}`, role: "status", "data-testid": "status", children: status.word }),
+    /* @__PURE__ */ a4("span", { class: `status ${status.kind}`, role: "status", title: status.word, "data-testid": "status", children: status.word }),
     canAskWhy() && /* @__PURE__ */ a4(
       "button",
       {
@@ -17356,7 +17365,7 @@ var Found = ({ node, chosen: chosen2, onPick }) => /* @__PURE__ */ a4("li", { ro
 
 // src/panels/tree.tsx
 var ROW2 = 24;
-var MARGIN2 = 6;
+var MARGIN3 = 6;
 var SPARE = 4;
 var MOST_INDENT = 12;
 var GLYPHS = {
@@ -17397,9 +17406,9 @@ function Tree({ page: page2 }) {
   };
   const choose2 = (row) => {
     const to = Math.max(0, Math.min(row, rows.length - 1));
-    const y5 = to * ROW2 + MARGIN2;
+    const y5 = to * ROW2 + MARGIN3;
     setChosen(rows[to].path);
-    if (box.current) box.current.scrollTop = Math.max(y5 + ROW2 - height, Math.min(box.current.scrollTop, y5 - MARGIN2));
+    if (box.current) box.current.scrollTop = Math.max(y5 + ROW2 - height, Math.min(box.current.scrollTop, y5 - MARGIN3));
   };
   const onKeyDown = (e4) => {
     if (e4.ctrlKey || e4.metaKey || e4.altKey) return;

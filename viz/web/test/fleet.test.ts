@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
+import { countText, lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
 import type { FleetRow } from "#core/types.ts";
 import { fixture } from "./fixtures.ts";
 
@@ -16,6 +16,13 @@ const row = (name: string, began: number, facts: object = {}): FleetRow =>
     events: [],
     ...facts,
   }) as unknown as FleetRow;
+
+test("the fleet says how many runs there are, and which of them are shown", () => {
+  const rows = Array.from({ length: 32 }, (_, i) => row(String(i), 100));
+  assert.equal(countText({ rows, skip: 0, total: 1000 }), "1 to 32 of 1,000 live runs");
+  assert.equal(countText({ rows: [], skip: 0, total: 0 }), "0 live runs");
+  assert.equal(countText({ rows: [row("a", 100)], skip: 0, total: 1 }), "1 live run");
+});
 
 test("lanes share an axis, and what runs ends now", () => {
   const { seconds, lanes } = lanesOf([row("a", 100), row("b", 103)], 110_000);

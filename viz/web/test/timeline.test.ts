@@ -57,6 +57,14 @@ test("the axis tells instants since the begin, and the instant shown has a flag"
   assert.ok(drawn().paper.texts.includes("00:02.5"));
 });
 
+test("the axis of a machine that has not begun tells no instants", () => {
+  store.startRun(null, []);
+  assert.deepEqual(
+    drawn().paper.texts.filter((text) => /\d/.test(text)),
+    [],
+  );
+});
+
 test("notes stand where they were made", () => {
   store.notes.add([{ at: (store.data.run.first() ?? 0) + 1000, text: "hit a chair" }]);
   assert.ok(drawn().paper.texts.includes("hit a chair"));

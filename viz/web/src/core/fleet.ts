@@ -1,10 +1,16 @@
 // Several live runs together: their lanes on one axis of time, and one scene for the common map.
 
 import { Scene } from "#core/scene.ts";
-import type { FleetRow, RunRow } from "#core/types.ts";
+import type { FleetRow, FleetRuns, RunRow } from "#core/types.ts";
 
 /** The name of a run among others of its machine. */
 export const nameOfRow = (row: RunRow) => (row.robots.length === 1 ? row.robots[0] : (row.name ?? row.machine));
+
+/** How many runs there are, and which of them the viewer has sent. */
+export function countText({ rows, skip, total }: FleetRuns) {
+  const which = rows.length < total ? `${skip + 1} to ${skip + rows.length} of ` : "";
+  return `${which}${total.toLocaleString("en")} live ${total === 1 ? "run" : "runs"}`;
+}
 
 /**
  * The states of each run as bars, on an axis that begins with the first run [s after that].

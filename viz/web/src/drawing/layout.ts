@@ -16,7 +16,7 @@ const OVERVIEW_FROM = 150; // visible states from which they are drawn as tiles
 const TANGLED = { links: 100, perState: 6 }; // arrows of a container from which states are drawn as tiles
 const INNER_ASPECTS = [1, 0.5, 2]; // of inner containers that are tried, relative to that of the view
 const TRIED_UNTIL = 80; // visible states up to which all of them are tried
-const ASPECTS = { least: 0.6, most: 2.4 };
+const ASPECTS = { least: 0.6, most: 5 };
 const SAME_ASPECT = 0.15; // difference of logarithms below which two aspects count as equal
 const within = (aspect: number) => Math.max(ASPECTS.least, Math.min(ASPECTS.most, aspect));
 export class Layout {
@@ -25,7 +25,7 @@ export class Layout {
   cache: Map<string, ContainerLayout> = new Map();
   chosen: Map<string, string> = new Map(); // shapes of the containers shown, kept so that the picture stays stable
   tried: Map<string, string[]> = new Map(); // names of the shapes of a container, by the open containers in it
-  aspect = 1.6; // width of the view divided by its height
+  aspect = 1.6; // of the room in the view: its width divided by its height
   inner = 1; // factor on it, for inner containers
 
   constructor(worker: Worker) {

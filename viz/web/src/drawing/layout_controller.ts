@@ -86,7 +86,7 @@ export class LayoutController {
     const model = store.data.model.value;
     if (!model || !this.layout) return;
     const begun = performance.now();
-    if (this.#after.frame) this.layout.choose(this.view.width / this.view.height);
+    if (this.#after.frame) this.layout.choose(this.view.aspect);
     const progress = (done: number, all: number) => {
       if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
@@ -175,7 +175,7 @@ export class LayoutController {
   /** Whether the page is just opening and the aspect of its view has changed much since the layout. */
   isOtherShape() {
     const isOpening = performance.now() - this.openedAt < OPENING_MS;
-    return isOpening && this.layout !== null && !this.layout.suits(this.view.width / this.view.height);
+    return isOpening && this.layout !== null && !this.layout.suits(this.view.aspect);
   }
 
   // -- the open containers ----------------------------------------------------------------------

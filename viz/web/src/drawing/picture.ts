@@ -61,7 +61,7 @@ export class Picture {
     const entry = layout.entry && layout.entry.y < 8 ? layout.entry.x : -1; // where a line enters at the top
     const isCrossed = entry > 4 && entry < 30 + name && entry + 26 + name < box.w;
     const left = isCrossed ? x + entry - 2 : x;
-    const title = el("text", { x: left + 24, y: y + 16.5, class: "title" }, node.shown);
+    const title = el("text", { x: left + 24, y: y + 13.5, class: "title" }, node.shown);
     // Zoomed out, titles are larger than the rest; but they stay inside of their container.
     const room = x + box.w - left - 42; // without the icon and the mark of its outcome
     title.style.setProperty("--longest", `${Math.max(11, (11 * room) / name).toFixed(1)}px`);

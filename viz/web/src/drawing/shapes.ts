@@ -4,9 +4,9 @@ import type { Link, StateNode } from "#core/types.ts";
 import { type ContainerLayout, DIRECTIONS, LEAF_H, leafWidth, SEP, type Shape } from "#drawing/placed.ts";
 
 const GRID_FROM = 4; // children of a concurrence from which a grid is tried
-const FOLD_FROM = 7; // children of another container from which folding is tried
+const FOLD_FROM = { closed: 5, open: 7 }; // the same of another container for folding, all closed or one open
 const BUNDLE_FROM = 6; // states that lead to one outcome, from which they have no arrows of their own
-const FOLD_COST = 1.05; // factor on the cost of a folded shape, because its lines are longer
+const FOLD_COST = 1.1; // factor on the cost of a folded shape, because its lines are longer
 
 export const nameOf = ({ dir, columns, folded }: Shape) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
 
@@ -18,7 +18,8 @@ export function shapesOf(node: StateNode, inner: Map<string, ContainerLayout>, a
   const shapes: Shape[] = DIRECTIONS.map((dir) => ({ dir }));
   const { children } = node;
   if (node.kind !== "concurrence") {
-    if (children.length >= FOLD_FROM) shapes.push(...DIRECTIONS.map((dir) => ({ dir, folded: true })));
+    if (children.length >= (inner.size ? FOLD_FROM.open : FOLD_FROM.closed))
+      shapes.push(...DIRECTIONS.map((dir) => ({ dir, folded: true })));
     return shapes;
   }
   if (children.length < GRID_FROM) return shapes;

@@ -151,7 +151,9 @@ export class Timeline {
   #grid(axis: Axis, width: number, height: number) {
     const { from, to } = axis;
     const g = this.context;
-    const begun = ms(store.playback.shown().started) ?? store.data.run.first() ?? from;
+    const first = store.data.run.first();
+    if (first === null) return; // there are no instants before the first event
+    const begun = ms(store.playback.shown().started) ?? first;
     const step =
       1000 * (STEPS_S.find((s) => s * 1000 * axis.rate > 74) ?? 86_400 * Math.ceil(74 / axis.rate / 86_400_000));
     g.fillStyle = this.#colours.of("muted");

@@ -5,6 +5,7 @@ import type { Box, Point } from "#core/types.ts";
 const LEAST_SCALE = 0.04;
 const MOST_SCALE = 4;
 const HEAD = 18; // height that a banner covers [px]
+const MARGIN = 16; // around all of the machine [px]
 
 /** translation [px] and scale */
 export type View = { x: number; y: number; k: number };
@@ -45,6 +46,11 @@ export class Viewport {
     return this.svg.clientHeight || 1;
   }
 
+  /** Width divided by height of the room for a machine: in a low view the margins take much of it. */
+  get aspect() {
+    return Math.max(1, this.width - 2 * MARGIN) / Math.max(1, this.height - HEAD - 2 * MARGIN);
+  }
+
   set(x: number, y: number, k: number) {
     Object.assign(this, { x, y, k });
     this.world.setAttribute("transform", `translate(${x} ${y}) scale(${k})`);
@@ -54,7 +60,7 @@ export class Viewport {
   /** Show all of a box. */
   frame(
     box: Box,
-    { margin = 16, most = 1.6, animate = true }: { margin?: number; most?: number; animate?: boolean } = {},
+    { margin = MARGIN, most = 1.6, animate = true }: { margin?: number; most?: number; animate?: boolean } = {},
   ): View {
     const room = this.height - HEAD;
     const k = Math.min(most, (this.width - 2 * margin) / box.w, (room - 2 * margin) / box.h);
@@ -70,7 +76,7 @@ export class Viewport {
   }
 
   /** The scale at which a box fills the view. */
-  scaleFor(box: Box, margin = 16) {
+  scaleFor(box: Box, margin = MARGIN) {
     return Math.min((this.width - 2 * margin) / box.w, (this.height - 2 * margin) / box.h);
   }
 

@@ -1,7 +1,7 @@
 // Several live runs together: a card and a lane for each, and a common map.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
+import { countText, lanesOf, nameOfRow, sceneOf } from "#core/fleet.ts";
 import { showPage } from "#core/pages.ts";
 import { askFleet, openRun } from "#core/run_requests.ts";
 import type { Scene } from "#core/scene.ts";
@@ -12,7 +12,6 @@ import { MapView } from "#drawing/map.ts";
 import { isDark } from "#drawing/theme.ts";
 
 const REFRESH_MS = 1000;
-const MOST_ROWS = 32; // as the viewer sends them
 const GAP = 8;
 const CARD = { width: 200 + GAP, height: 88 + GAP }; // [px]; see `.cards button`
 
@@ -20,7 +19,7 @@ export const FleetPage = () => (store.view.pageShown.value === "fleet" ? <OpenFl
 
 function OpenFleet() {
   const [skip, setSkip] = useState(0);
-  const [found, setFound] = useState<FleetRuns>({ rows: [], skip: 0, total: 0 });
+  const [found, setFound] = useState<FleetRuns | null>(null); // null: not answered yet
   const heading = useRef<HTMLHeadingElement | null>(null);
   const box = useRef<HTMLDivElement | null>(null);
   useEffect(() => heading.current?.focus(), []);
@@ -37,12 +36,11 @@ function OpenFleet() {
       clearInterval(timer);
     };
   }, [skip]);
-  const { rows, total } = found;
-  const last = Math.min(found.skip + MOST_ROWS, total);
+  const { rows, total, skip: before } = found ?? { rows: [], total: 0, skip: 0 };
   const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf(rows, now);
   const columns = Math.max(1, Math.floor(((box.current?.clientWidth ?? 0) + GAP) / CARD.width));
-  const line = Math.floor(found.skip / columns);
+  const line = Math.floor(before / columns);
   // A line before those in view is there, too, so that none is empty while the next answer comes.
   const onScroll = (e: Event) => {
     const above = Math.floor((e.target as HTMLElement).scrollTop / CARD.height) - 1;
@@ -54,12 +52,11 @@ function OpenFleet() {
         <h2 id="fleet-title" tabindex={-1} ref={heading}>
           Fleet
         </h2>
-        <span class="hint">
-          {total > MOST_ROWS ? `${found.skip + 1} to ${last} of ${total.toLocaleString("en")}` : rows.length} live runs
-        </span>
+        <span class="hint">{found ? countText(found) : "reading the runs\u2026"}</span>
         <span class="spread" />
         <button onClick={() => showPage("runs")}>Close</button>
       </header>
+      {found && !total && <p class="empty-list">No mission runs now. Each one that begins gets a card here.</p>}
       <div class="fleet-top">
         <div class="cards" ref={box} onScroll={onScroll}>
           <div style={{ height: `${Math.ceil(total / columns) * CARD.height}px` }}>

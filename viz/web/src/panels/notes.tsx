@@ -27,6 +27,7 @@ export function ShareButtons({ page }: { page: Page }) {
     <span class="share">
       {done === null ? (
         <button
+          class="film"
           title="GIF of the selected stretch, or of the 20 s before the instant shown"
           onClick={() => saveFilm(page)}
         >

@@ -48,7 +48,7 @@ export function TopBar({ page }: { page: Page }) {
       </button>
       <RunsButton />
       <Chooser />
-      <span class={`status ${status.kind}`} role="status" data-testid="status">
+      <span class={`status ${status.kind}`} role="status" title={status.word} data-testid="status">
         {status.word}
       </span>
       {canAskWhy() && (
