@@ -58,6 +58,7 @@ RULES: dict[str, CheckRule] = {
         CheckRule(
             "ambiguous-map", "warning", "two rules of an outcome map hold with equal conditions"
         ),
+        CheckRule("not-kept", "note", "a part of a file of another tool is lost"),
         CheckRule(
             "preempt-outcome", "warning", "a preempt leaves a container by the wrong outcome"
         ),

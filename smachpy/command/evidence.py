@@ -24,7 +24,7 @@ from actionlib_core.inputs.checked_data import checked
 from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.inputs.json_text import load_json
 from actionlib_core.process.output import printable
-from smachpy.command.targets import DATA, TargetError, names_file
+from smachpy.command.targets import DATA, TargetError, is_data, names_file
 from smachpy.events import Left, Noted, Recovered, Started
 from smachpy.exceptions import SmachError
 
@@ -147,7 +147,7 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
         TargetError: its module has no file, or it has more than `MAX_FILES`.
     """
     place = text.partition(":")[0]
-    if place.endswith(DATA):
+    if is_data(place):
         folder = Path(place).resolve().parent
         found = [path for path in sorted(folder.rglob("*")) if path.suffix in {*DATA, ".py"}]
         files = {str(path.relative_to(folder)): path for path in found}
@@ -164,7 +164,7 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
             "mission in a folder of its own.",
         )
     hashes = {name: _hash(path) for name, path in sorted(files.items())}
-    name = Path(place).name if place.endswith(DATA) else target.source.partition(":")[2]
+    name = Path(place).name if is_data(place) else target.source.partition(":")[2]
     return {"target": text, "name": name, "hash": _whole({**hashes, ":": name}), "files": hashes}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
 
 from actionlib_core.process.output import printable
@@ -57,10 +58,13 @@ def run(args: argparse.Namespace) -> int:
 def _write_file(args: argparse.Namespace) -> int:
     """Write a mission file."""
     from smachpy.files import NotWrittenError, write
+    from smachpy.files.others import not_kept
     from smachpy.machines.state_machine import StateMachine
 
     target, output = args.target, args.output
     machine = built_to_look(load_target(target, imports=False), args)
+    for line in not_kept(machine):
+        print(printable(line), file=sys.stderr)
     if type(machine) is not StateMachine:
         got = type(machine).__name__
         raise UsageError(f"smachpy export: got a {got}; expected a state machine for a file.")

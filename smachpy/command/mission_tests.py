@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from smachpy.command.targets import MISSION_FILES
+from smachpy.command.targets import MISSION_FILES, OTHER_TOOLS
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
@@ -40,7 +40,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Take the mission files that are named on the command line."""
-    if file_path.suffix not in MISSION_FILES or not parent.session.isinitpath(file_path):
+    is_mission = file_path.suffix in {*MISSION_FILES, *OTHER_TOOLS}
+    if not is_mission or not parent.session.isinitpath(file_path):
         return None
     return MissionFile.from_parent(parent, path=file_path)
 

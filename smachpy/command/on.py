@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 OWN: Final = ("actionlib_core", "smachpy", "smachpy_viz", "smachpy_missions")
 PERIOD_S: Final = 0.1
-CODE: Final = frozenset({".py", ".yaml", ".yml", ".plan", ".pnml"})
+CODE: Final = frozenset({".py", ".yaml", ".yml", ".plan", ".pnml", ".xml", ".scxml"})
 
 
 def add_jobs_and_on(parser: argparse.ArgumentParser) -> None:

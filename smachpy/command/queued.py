@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.command.arguments import Text
 from smachpy.command.targets import (
-    DATA,
     DEFAULT_NAMES,
     GROUP,
     TargetError,
+    is_data,
     mission_names,
     names_file,
 )
@@ -130,7 +130,7 @@ def check_is_mission(target: Target, by: str = "row") -> None:
     if (
         isinstance(thing, Container)
         or is_mission(thing)
-        or source.endswith(DATA)  # `load_target` takes each such name for a file
+        or is_data(source)  # `load_target` takes each such name for a file
         or source in {point.value for point in entry_points(group=GROUP)}
     ):
         return

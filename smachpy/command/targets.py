@@ -35,7 +35,8 @@ GROUP = "smachpy.missions"
 DEFAULT_NAMES = ("mission", "machine", "sm")
 PLANS = (".pnml", ".plan", ".pddlout")
 MISSION_FILES = (".yaml", ".yml")
-DATA = (*PLANS, *MISSION_FILES)
+OTHER_TOOLS = (".xml", ".scxml")
+DATA = (*PLANS, *MISSION_FILES, *OTHER_TOOLS)
 """Ends of names of files that are data: no code of the file itself is executed."""
 # A script that calls `sys.exit()` would end the command, with 0 as if the mission had succeeded.
 _FAILURES = (Exception, SystemExit)
@@ -44,6 +45,15 @@ _FAILURES = (Exception, SystemExit)
 def names_file(place: str) -> bool:
     """Return whether a target, without its `:attribute`, names a file rather than a module."""
     return place.endswith((".py", *DATA)) or "/" in place
+
+
+def is_data(place: str) -> bool:
+    """Return whether a target is a file that is never executed: data, or a behaviour of FlexBE."""
+    if not place.endswith(".py"):
+        return place.endswith(DATA)
+    from smachpy.foreign import is_behavior
+
+    return is_behavior(Path(place))
 
 
 class TargetError(SmachError):
@@ -188,7 +198,10 @@ def list_files(folder: Path) -> dict[str, str]:
         ) from error
     for path in files:
         if path.suffix in MISSION_FILES:
-            lines |= {str(path): line for line in _mission_line(path)}
+            lines |= {str(path): line for line in _mission_line(path, _STATES)}
+            continue
+        if path.suffix in OTHER_TOOLS:
+            lines |= {str(path): line for line in _mission_line(path, _ROOTS)}
             continue
         try:
             plan = understand(read_net(path)[0])
@@ -200,12 +213,16 @@ def list_files(folder: Path) -> dict[str, str]:
     return lines
 
 
-def _mission_line(path: Path) -> Iterator[str]:
-    """Yield the line of a mission file; nothing for another YAML file."""
+_STATES = rb"^(\xef\xbb\xbf)?states *:"
+_ROOTS = rb"^(\xef\xbb\xbf)?<(StateMachine|scxml)\b"
+
+
+def _mission_line(path: Path, sign: bytes) -> Iterator[str]:
+    """Yield the line of a mission file; nothing for another file, which has no such line."""
     from smachpy.files import MissionFileError, read
 
     try:
-        if not re.search(rb"^(\xef\xbb\xbf)?states *:", read_limited(path), re.MULTILINE):
+        if not re.search(sign, read_limited(path), re.MULTILINE):
             return
         yield (read(path)[0] or "A mission file.").splitlines()[0]
     except (OSError, MissionFileError) as error:
@@ -222,7 +239,8 @@ def load_target(text: str, *, imports: bool = True, allow: Sequence[str] | None 
             function with `@smachpy.mission`, else its only machine. Or a Petri net plan,
             `path.pnml` (.plan, .pddlout), with its actions and conditions in STEM.actions.yaml or
             actions.yaml beside it.
-            Or a mission file, `path.yaml`.
+            Or a mission file, `path.yaml`, or a machine of another tool: YASMIN's `path.xml`,
+            `path.scxml`, a behaviour of FlexBE.
         imports: False to import nothing that a plan or a mission file names: it is only looked at.
         allow: Packages of which a mission file may name code, besides its own folder; None: no
             others, and with `imports=False` any.
@@ -232,7 +250,7 @@ def load_target(text: str, *, imports: bool = True, allow: Sequence[str] | None 
     """
     if text.endswith(PLANS):
         return _plan_target(text, imports)
-    if text.endswith(MISSION_FILES):
+    if is_data(text):
         return _mission_file(text, imports, allow)
     place, _, attribute = text.partition(":")
     if place.endswith(".py") or "/" in place:
@@ -272,7 +290,8 @@ def _mission_file(text: str, imports: bool, allow: Sequence[str] | None) -> Targ
 
     path = Path(text)
     if not path.is_file():
-        near = [str(p) for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+        files = path.parent.iterdir() if path.parent.is_dir() else ()
+        near = [str(p) for p in files if p.suffix in (*MISSION_FILES, path.suffix)]
         raise TargetError(text, f"no file {text!r}; {_suggest(text, near)}")
     try:
         about, parameters = read(path)

@@ -18,6 +18,7 @@ from actionlib_core.inputs.yaml_text import YamlTextError, load_with_marks
 from actionlib_core.resources import POLICIES
 from smachpy.base.problems import unknown_name
 from smachpy.exceptions import MissionError, SmachError, error_text
+from smachpy.files.others import FOREIGN, NotKept, OwnStates, lacking
 from smachpy.files.reference import (
     Naming,
     Origin,
@@ -198,12 +199,16 @@ class _Reader:
     ) -> None:
         self._to_run = to_run
         self._columns: dict[str, int] = {}
+        self._own: OwnStates | None = None
+        self._notes: tuple[tuple[int, str], ...] = ()
         self._path, self._folder, self._allow = path, folder, allow
         self._around = (*around, path.resolve())
         self._values: dict[str, Any] = {}
         self.file = CheckedFile(path, self._error, self._parse)
 
     def _parse(self, file: CheckedFile, text: str) -> Parsed:
+        if self._path.suffix in FOREIGN:
+            return self._parse_foreign(text)
         try:
             data, marks = load_with_marks(text)
         except YamlTextError as error:
@@ -212,6 +217,20 @@ class _Reader:
             return None, {}
         self._columns = {path: column for path, (_, column) in marks.items()}
         return data, {path: line for path, (line, _) in marks.items()}
+
+    def _parse_foreign(self, text: str) -> Parsed:
+        """Return the data of the file of another tool."""
+        from smachpy import foreign
+
+        self._own = OwnStates(self._folder)
+        draft = foreign.read(self._path, text, self._own.named, is_included=len(self._around) > 1)
+        self._notes = tuple((place[0], text) for place, text in sorted(draft.notes))
+        if draft.problems:
+            where = [(f"{self._path}:{line}:{column}", t) for (line, column), t in draft.problems]
+            raise MissionFileError([f"{place}: {text}" for place, text in where])
+        marks = draft.marks()
+        self._columns = {path: column for path, (_, column) in marks.items()}
+        return draft.data(), {path: line for path, (line, _) in marks.items()}
 
     def _error(self, problems: SequenceOf[Problem]) -> MissionFileError:
         return MissionFileError([self._text(one) for one in problems])
@@ -258,6 +277,9 @@ class _Reader:
         self.file.check()
         shown = {key: top.value(key) for key in ("help", "parameters") if key in top}
         machine._smachpy.made_from = shown
+        if self._notes:
+            notes = NotKept(str(self._path), self._notes)
+            machine._smachpy_check = notes  # noqa: SLF001  where a check asks a machine itself
         return machine  # type: ignore[no-any-return]
 
     def _name(self, top: Section) -> str:
@@ -687,8 +709,9 @@ class _Reader:
         place: Naming,
         around: SequenceOf[str],
     ) -> State | None:
+        missing = self._own is not None and self._own.lacks(name)
         try:
-            if self._to_run:
+            if self._to_run and not missing:
                 check_named(name, arguments, place)
         except MissionError as error:
             text = str(error).removeprefix(f"{place.where}: ")
@@ -704,6 +727,8 @@ class _Reader:
         outputs = (*origin.keys.get("output_keys", ()), *renamed)
 
         def make() -> State:
+            if missing:
+                raise MissionError(f"{place.where}: {lacking(name, self._folder)}")
             return finish(make_named(name, arguments, place), origin, options, place)
 
         try:

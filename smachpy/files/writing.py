@@ -179,6 +179,7 @@ class _Writer:
         found["states"] = {
             label: self._entry(container, label, state, f"{path}/{label}")
             for label, state in others.items()
+            if not hasattr(state, "_smachpy_form")  # of a transition with `confirm`
         }
         return found | self._cleanup(container, path)
 
@@ -207,9 +208,29 @@ class _Writer:
         guards = getattr(data, "guards", {}).get(label, {})
         if transitions:
             found["on"] = {
-                outcome: self._target(target, guards.get(outcome, ()), outcome, path)
+                outcome: self._confirmed(parent, target, path)
+                or self._target(target, guards.get(outcome, ()), outcome, path)
                 for outcome, target in transitions.items()
             }
+        return found
+
+    def _confirmed(self, parent: Container, target: str | None, path: str) -> dict[str, Any]:
+        """Return a transition that a person confirms; nothing if it is none."""
+        form = getattr(parent.get_children().get(target or ""), "_smachpy_form", None)
+        if form is None or target is None:
+            return {}
+        from smachpy.states.confirming import PATIENCE_S  # here: few files need what it imports
+
+        level, question, patience = form
+        data: Any = parent._smachpy
+        leads = data.transitions[target]
+        if patience != PATIENCE_S or leads["no"] != leads["no_answer"]:
+            self._refuse(path, "got a `confirm` with `patience` or two other ways; expected none.")
+        found = {"to": leads["yes"], "confirm": level}
+        if leads["no"] != "preempted":
+            found["otherwise"] = leads["no"]
+        if question != f"Go on to {leads['yes']}?":
+            found["question"] = question
         return found
 
     def _target(self, target: str | None, cases: Any, outcome: str, path: str) -> Any:

@@ -18,7 +18,7 @@ from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces._sources import BUNDLED
 from smachpy.base.problems import unknown_name
 from smachpy.command.arguments import Text, parameters_of, read_words
-from smachpy.command.targets import MISSION_FILES, PLANS, load_target, names_file
+from smachpy.command.targets import PLANS, is_data, load_target, names_file
 from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
@@ -436,7 +436,7 @@ def _call(
     if text.endswith(PLANS):
         imported = "from smachpy.pnp.files import load_plan"
         return f"load_plan({_here(text, folder)})", [_PATH, imported]
-    if text.endswith(MISSION_FILES):
+    if is_data(text):
         packages = [one for one in map(str, allow) if one.replace(".", "_").isidentifier()]
         allowed = [f"allow={source(packages)}"] if packages else []
         words = [_here(text, folder), *allowed, *([arguments] if arguments else [])]

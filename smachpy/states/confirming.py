@@ -42,6 +42,7 @@ class Confirm(AskOperator):
     def __init__(self, question: str, level: int, patience: float) -> None:
         super().__init__(question, patience=patience)
         self.__level = level
+        self._smachpy_form = (level, question, patience)  # as a mission file has it
 
     def execute(self, userdata: UserData) -> str:
         """Ask, if the level is above the autonomy of the process."""

@@ -259,6 +259,21 @@ def readers() -> dict[str, Reader]:
             OWN,
             _seeds(Path(__file__).with_name("mission.yaml")),
         ),
+        "machine of YASMIN": Reader(
+            _file("m.xml", partial(load_mission, to_run=False)),
+            OWN,
+            _seeds(Path(__file__).with_name("rounds.xml")),
+        ),
+        "machine in SCXML": Reader(
+            _file("m.scxml", partial(load_mission, to_run=False)),
+            OWN,
+            _seeds(Path(__file__).with_name("rounds.scxml")),
+        ),
+        "behaviour of FlexBE": Reader(
+            _file("m.py", partial(load_mission, to_run=False)),
+            OWN,
+            _seeds(Path(__file__).with_name("rounds_sm.py.txt")),
+        ),
         "mapping": Reader(
             _file("actions.yaml", partial(read_mapping, imports=False)),
             OWN,

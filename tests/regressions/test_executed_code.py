@@ -58,12 +58,25 @@ with sm:
     smach.StateMachine.add("A", Work())
 sm.execute()
 """
+BEHAVIOR = """
+from flexbe_core import Behavior, OperatableStateMachine
+from my_flexbe_states import Go
+
+class RoundsSM(Behavior):
+    def create(self):
+        _state_machine = OperatableStateMachine(outcomes=["done"])
+        with _state_machine:
+            OperatableStateMachine.add("GO", Go(), transitions={"done": "done"})
+        return _state_machine
+"""
 FILES = {
     "mission.py": MISSION,
     "helper.py": "",
     "script.py": SCRIPT,
     "beside.py": "def go(userdata, *parameters):\n    pass\n",
     "steps.py": "import smachpy\n@smachpy.state(['done'])\ndef go(userdata):\n    return 'done'\n",
+    "smachpy_states.py": "import smachpy\n@smachpy.state(['done'])\ndef Go(userdata):\n    return 'done'\n",
+    "rounds_sm.py": BEHAVIOR,
     "test_mission.py": "import mission\ndef test_it():\n    assert mission.mission().execute()\n",
     "conftest.py": "",
     # Names of modules that commands import, and those that Python imports by itself.
@@ -91,6 +104,13 @@ def folder(tmp_path_factory):
     (made / "plan.plan").write_text("goto_kitchen;\n")
     (made / "file.yaml").write_text(
         "outcomes: [done]\nstates: {GO: {state: 'steps:go', on: {done: done}}}\n"
+    )
+    (made / "rounds.xml").write_text(
+        '<StateMachine outcomes="done"><State name="GO" class="Go"><Transition from="done" to="done"/>'
+        "</State></StateMachine>"
+    )
+    (made / "rounds.scxml").write_text(
+        '<scxml><state id="Go"><transition target="done"/></state><final id="done"/></scxml>'
     )
     (made / "actions.yaml").write_text('actions:\n  goto: {run: "beside:go"}\n')
     return made

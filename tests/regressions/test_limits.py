@@ -69,6 +69,56 @@ READERS = {
             lines.append(f"m{i}: &m{i} {{<<: [{names}]}}")
         reading(lambda: load_yaml("\\n".join(lines)), "aliases stand for more than 100000")
     """,
+    "other tools: length": """
+        from smachpy import load
+        from smachpy.foreign import MAX_LENGTH
+        path = file("m.xml", "<scxml>" + " " * 2 * MAX_LENGTH + "</scxml>")
+        reading(lambda: load(path), "characters; expected at most 1,000,000")
+    """,
+    "other tools: depth": """
+        from smachpy import load
+        from smachpy.foreign.draft import MAX_DEPTH
+        path = file("m.scxml", "<scxml>" + "<state>" * 2 * MAX_DEPTH)
+        reading(lambda: load(path), "more than 50 elements inside each other")
+    """,
+    "other tools: elements": """
+        from smachpy import load
+        from smachpy.foreign.xml_text import MAX_ELEMENTS
+        path = file("m.scxml", "<scxml>" + "<a/>" * 2 * MAX_ELEMENTS + "</scxml>")
+        reading(lambda: load(path), "more than 20,000 elements")
+    """,
+    "other tools: entities": """
+        from smachpy import load
+        lines = [f'<!ENTITY a{i} "{f"&a{i - 1};" * 10 if i else "x"}">' for i in range(12)]
+        text = f"<!DOCTYPE scxml [{''.join(lines)}]><scxml name='&a11;'/>"
+        reading(lambda: load(file("m.scxml", text)), "got an entity or a DOCTYPE with one")
+    """,
+    "other tools: events of states around": """
+        from smachpy import load
+        events = "".join(f'<transition event="e{i}" target="X"/>' for i in range(9000))
+        states = "".join(f'<state id="s{i}"/>' for i in range(9000))
+        text = f'<scxml><state id="A">{events}{states}</state><final id="X"/></scxml>'
+        reading(lambda: load(file("m.scxml", text)), "stands for more than 100,000 values")
+    """,
+    "other tools: keys of all machines": """
+        from smachpy import load
+        keys = "".join(f'<Key name="k{i}"/>' for i in range(9000))
+        states = "".join(f'<State name="s{i}" class="S"/>' for i in range(9000))
+        text = f'<StateMachine outcomes="x">{keys}{states}</StateMachine>'
+        reading(lambda: load(file("m.xml", text)), "stands for more than 100,000 values")
+    """,
+    "other tools: names for lists of names": """
+        from smachpy import load
+        lines = ["a0 = [1, 1]"] + [f"a{i} = [{f'a{i - 1}, ' * 10}]" for i in range(1, 12)]
+        body = "".join(f"        {line}\\n" for line in lines)
+        text = f"import flexbe_core\\nclass A(Behavior):\\n    def create(self):\\n{body}"
+        reading(lambda: load(file("a_sm.py", text)), "stands for more than 100,000 values")
+    """,
+    "other tools: brackets": """
+        from smachpy import load
+        text = f"class A(Behavior):\\n    def create(self):\\n        a = {'-' * 100_000}1\\n"
+        reading(lambda: load(file("a_sm.py", text)), "")
+    """,
     "yaml: a value inside itself": """
         from actionlib_core.inputs.yaml_text import load_yaml
         reading(lambda: load_yaml("a: &a [*a]"), "contains itself")
@@ -391,6 +441,7 @@ def test_limits_in_the_docs_are_those_of_the_code():
     from actionlib_core.ros1 import frames, links, node, publishers, rpc
     from smachpy.durable import journal, sqlite, store
     from smachpy.events import reading, recording
+    from smachpy.foreign import draft, xml_text
     from smachpy.network import reading as network
     from smachpy.places import occupancy
     from smachpy.pnp import net, pnml
@@ -416,6 +467,8 @@ def test_limits_in_the_docs_are_those_of_the_code():
         *(world_file.MAX_THINGS, occupancy.MAX_CELLS),
         *(_sources.LARGEST_FILE, _definition.MAX_FIELDS, _definition.MAX_TYPE_NESTING),
         *(pnml.LARGEST_FILE, net.MAX_PARTS),
+        *(draft.MAX_LENGTH, draft.MAX_VALUES, draft.MAX_NOTES, draft.MAX_DEPTH),
+        xml_text.MAX_ELEMENTS,
         *(json_text.MAX_JSON_LENGTH, json_text.MAX_JSON_NESTING, json_text.MAX_JSON_PARTS),
         *(
             recording.LARGEST,

@@ -168,3 +168,19 @@ def test_the_schema_takes_a_good_file_and_refuses_a_bad_one():
     assert list(
         validator.iter_errors({"outcomes": ["a"], "states": {"A": {"state": "x", "plan": "y"}}})
     )
+
+
+def test_transitions_with_confirm_are_written_and_read_again():
+    machine = StateMachine(["done", "failed", "preempted"], name="M")
+    with machine:
+        machine.add("A", Up(), {"a": smachpy.states.confirm("B"), "b": "done"})
+        ask = smachpy.states.confirm("done", 3, otherwise="failed", question="Done?")
+        machine.add("B", Up(), {"a": ask, "b": "A"})
+    text = write(machine)
+    assert "CONFIRM" not in text
+    assert "confirm: 3\n        otherwise: failed\n        question: Done?" in text
+    ask = smachpy.states.confirm("done", patience=5.0)
+    other = StateMachine(["done", "preempted"], name="M")
+    other.add("A", Up(), {"a": ask, "b": "done"})
+    with pytest.raises(NotWrittenError, match="/M/A: got a `confirm` with `patience`"):
+        write(other)

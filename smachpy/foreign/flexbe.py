@@ -1,0 +1,355 @@
+"""Behaviours of FlexBE: the Python file that its editor writes is parsed, never executed.
+
+Source: flexbe_behavior_engine 4 (https://github.com/FlexBE/flexbe_behavior_engine).
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.foreign.conditions import Conditions
+from smachpy.foreign.draft import MAX_DEPTH, Part, allow_preempt
+from smachpy.foreign.literals import NotPlainError, parse_python, plain, shown
+
+if TYPE_CHECKING:
+    from smachpy.foreign.draft import Draft, Place
+
+MACHINES: Final = ("OperatableStateMachine", "PriorityContainer")
+CONCURRENCE: Final = "ConcurrencyContainer"
+LEVELS: Final = {"Off": 0, "Low": 1, "High": 2, "Full": 3, "Inherit": -1}
+KINDS: Final = {bool: "flag", int: "whole", float: "number", str: "text", list: "list"}
+_SET_UP: Final = ("initialize_ros", "initialize", "add_behavior", "__init__")
+
+
+def behavior_in(tree: ast.Module) -> ast.ClassDef | None:
+    """Return the behaviour of a file; None if it has none."""
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and _function(node, "create") is not None:
+            bases = (getattr(base, "id", getattr(base, "attr", "")) for base in node.bases)
+            if "Behavior" in bases:
+                return node
+    return None
+
+
+def read(draft: Draft, text: str) -> None:
+    """Read a behaviour from the text of its file."""
+    try:
+        tree = parse_python(text)
+        behavior = behavior_in(tree)
+        if behavior is not None:
+            _Reader(draft, tree).behavior(behavior)
+            return
+        expected = "expected a class with the base Behavior and a method create"
+        draft.problem((1, 1), f"got no behaviour of FlexBE; {expected}.")
+    except SyntaxError as error:
+        where = (error.lineno or 1, error.offset or 1)
+        draft.problem(where, f"not Python: {error.msg}.")
+    except ValueError as error:  # a zero byte
+        draft.problem((1, 1), f"not Python: {error}.")
+    except (RecursionError, MemoryError):
+        draft.problem((1, 1), "it is nested too deeply.")
+
+
+def _function(node: ast.ClassDef, name: str) -> ast.FunctionDef | None:
+    found = [one for one in node.body if isinstance(one, ast.FunctionDef) and one.name == name]
+    return found[0] if found else None
+
+
+def _place(node: ast.AST) -> Place:
+    return getattr(node, "lineno", 1), getattr(node, "col_offset", 0) + 1
+
+
+class _Known(ast.NodeTransformer):
+    """Puts literals in the places of what a behaviour has given a name."""
+
+    def __init__(self, draft: Draft) -> None:
+        self._draft = draft
+        self.names: dict[str, tuple[ast.expr, int]] = {}
+        self.parameters = Part((1, 1))
+
+    def name(self, name: str, value: ast.expr) -> None:
+        """Give a literal a name."""
+        made = self.visit(copy.deepcopy(value))
+        self.names[name] = made, sum(1 for _ in ast.walk(made))
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Return the literal."""
+        made, size = self.names.get(node.id, (node, 1))
+        self._draft.spend(size)  # lists of lists of lists of names grow without end
+        return made
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Return the text that stands for a parameter, and the name of a level of the log."""
+        match node:
+            case ast.Attribute(value=ast.Name(id="self"), attr=name) if name in self.parameters:
+                return ast.Constant(f"${{{name}}}")
+            case ast.Attribute(value=ast.Name(id="Logger"), attr=level):
+                return ast.Constant(level)
+        return node
+
+
+class _Reader:
+    def __init__(self, draft: Draft, tree: ast.Module) -> None:
+        self._draft = draft
+        self._known = _Known(draft)
+        self._containers: dict[str, tuple[str, Part]] = {}
+        self._root = ""
+        self._used: set[str] = set()
+        self._conditions: dict[int, Conditions] = {}
+        self._ends: dict[int, list[str]] = {}
+        self._imported: dict[str, tuple[str, str]] = {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom):
+                for one in node.names:
+                    self._imported[one.asname or one.name] = (node.module or "", one.name)
+
+    def behavior(self, node: ast.ClassDef) -> None:
+        """Read the whole."""
+        name = node.name
+        for one in node.body:
+            if isinstance(one, ast.FunctionDef) and one.name == "__init__":
+                name = self._set_up(one) or name
+            elif isinstance(one, ast.FunctionDef) and one.name != "create":
+                self._draft.note(_place(one), f"the method {one.name}")
+            elif isinstance(one, ast.FunctionDef):
+                self._create(one)
+        if self._root in self._used or self._containers.get(self._root, ("",))[0] not in MACHINES:
+            expected = "expected `return` with an OperatableStateMachine"
+            self._draft.problem(_place(node), f"create: got {self._root or 'none'!r}; {expected}.")
+            return
+        top = self._containers[self._root][1]
+        self._check_depth(top)
+        if self._draft.problems:
+            return
+        top["name"] = name
+        if ast.get_docstring(node):
+            top["help"] = ast.get_docstring(node)
+        if self._known.parameters:
+            top["parameters"] = self._known.parameters
+        allow_preempt(top)
+        self._draft.top = top
+
+    def _note_code(self, node: ast.stmt) -> None:
+        is_text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if not is_text and not isinstance(node, ast.Pass):
+            self._draft.note(_place(node), f"code: {shown(node)}")
+
+    def _create(self, function: ast.FunctionDef) -> None:
+        for statement in function.body:
+            match statement:
+                case ast.Return(value=ast.Name(id=name)):
+                    self._root = name
+                case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call() as call) if (
+                    self._kind(call) in {*MACHINES, CONCURRENCE}
+                ):
+                    self._container(name, call)
+                case ast.Assign(targets=[target], value=value):
+                    self._assign(statement, target, value)
+                case ast.With(items=[ast.withitem(context_expr=ast.Name(id=name))], body=body):
+                    self._fill(name, body, statement)
+                case _:
+                    self._note_code(statement)
+
+    def _kind(self, node: ast.expr) -> str:
+        """Return the name of what is called, as its module has it."""
+        name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+        return self._imported[name][1] if name in self._imported else str(name)
+
+    def _assign(self, statement: ast.stmt, target: ast.expr, value: ast.expr) -> None:
+        """Keep a literal that is given to a name, or to a key of the userdata."""
+        try:
+            made = plain(value, self._known)
+            match target:
+                case ast.Name(id=name):
+                    self._known.name(name, value)
+                    return
+                case ast.Attribute(
+                    value=ast.Attribute(value=ast.Name(id=name), attr="userdata"), attr=key
+                ) if name in self._containers:
+                    part = self._containers[name][1]
+                    part.setdefault("userdata", Part(part.place)).put(key, made, _place(target))
+                    return
+        except NotPlainError:
+            pass
+        self._note_code(statement)
+
+    def _set_up(self, function: ast.FunctionDef) -> str:
+        """Read the parameters; return the name."""
+        found = ""
+        for statement in function.body:
+            match statement:
+                case ast.Expr(
+                    value=ast.Call(
+                        func=ast.Attribute(attr="add_parameter"),
+                        args=[ast.Constant(value=str() as name), default],
+                    )
+                ):
+                    self._parameter(statement, name, default)
+                case ast.Assign(
+                    targets=[ast.Attribute(value=ast.Name(id="self"), attr="name")],
+                    value=ast.Constant(value=str() as text),
+                ):
+                    found = text
+                case ast.Assign(targets=[ast.Attribute(attr="node")]):
+                    pass
+                case ast.Expr(value=ast.Call(func=ast.Attribute(attr=name))) if name in _SET_UP:
+                    pass
+                case _:
+                    self._note_code(statement)
+        return found
+
+    def _parameter(self, statement: ast.stmt, name: str, default: ast.expr) -> None:
+        where = _place(statement)
+        about = Part(where)
+        try:
+            about["default"] = plain(default)
+            about["type"] = KINDS.get(type(about["default"]), "any")
+        except NotPlainError:
+            self._draft.note(where, f"the default of the parameter {name!r}: {shown(default)}")
+        self._known.parameters.put(name, about, where)
+
+    # -- machines ------------------------------------------------------------------------------
+
+    def _keywords(self, call: ast.Call) -> dict[str, Any]:
+        """Return the arguments with names that are plain; the others are noted."""
+        found = {}
+        for one in call.keywords:
+            try:
+                found[one.arg or "**"] = plain(one.value, self._known)
+            except NotPlainError:
+                text = f"the argument {one.arg or '**'}: {shown(one.value)}"
+                self._draft.note(_place(one.value), text)
+        for each in call.args:
+            self._draft.note(_place(each), f"an argument without a name: {shown(each)}")
+        return found
+
+    def _container(self, name: str, call: ast.Call) -> None:
+        kind, part = self._kind(call), Part(_place(call), states=Part(_place(call)))
+        given = self._keywords(call)
+        for key in ("outcomes", "input_keys", "output_keys"):
+            if key in given:
+                part[key] = given[key]
+        if kind == "PriorityContainer":
+            text = "the priority of a PriorityContainer: other branches go on meanwhile"
+            self._draft.note(_place(call), text)
+        if kind == CONCURRENCE:
+            conditions = self._conditions[id(part)] = Conditions(given.get("conditions", []))
+            outcomes = part.get("outcomes")
+            part["default_outcome"] = (
+                outcomes[-1] if isinstance(outcomes, list) and outcomes else ""
+            )
+            part["outcome_map"] = conditions.rules
+            for problem in conditions.problems:
+                self._draft.problem(part.place, problem)
+            for note in conditions.notes:
+                self._draft.note(part.place, note)
+        self._containers[name] = (kind, part)
+
+    def _fill(self, name: str, body: list[ast.stmt], around: ast.stmt) -> None:
+        if name not in self._containers:
+            text = f"got `with {name}`; expected a machine that is made above."
+            self._draft.problem(_place(around), text)
+            return
+        kind, part = self._containers[name]
+        for statement in body:
+            match statement:
+                case ast.Expr(
+                    value=ast.Call(
+                        func=ast.Attribute(attr="add"),
+                        args=[ast.Constant(value=str() as label), state],
+                    ) as call
+                ):
+                    if label in part["states"]:
+                        text = f"got {label!r} a second time; expected one."
+                        self._draft.problem(_place(statement), text)
+                    entry = self._state(state)
+                    self._connect(entry, call, kind == CONCURRENCE)
+                    part["states"].put(label, entry, _place(statement))
+                case _:
+                    self._draft.note(_place(statement), f"code: {shown(statement)}")
+        if kind == CONCURRENCE:
+            ends = {label: self._ends.get(id(one), []) for label, one in part["states"].items()}
+            stops, notes = self._conditions[id(part)].stops(ends)
+            for note in notes:
+                self._draft.note(part.place, note)
+            if stops:
+                part["stop_others"] = stops
+
+    def _connect(self, entry: Part, call: ast.Call, in_concurrence: bool) -> None:
+        """Read where a state leads to, and its keys."""
+        levels: dict[str, int] = {}
+        others = []
+        for one in call.keywords:
+            if one.arg == "autonomy" and isinstance(one.value, ast.Dict):
+                for key, value in zip(one.value.keys, one.value.values, strict=True):
+                    name = getattr(value, "attr", "")
+                    levels[str(getattr(key, "value", ""))] = LEVELS.get(name, 0)
+            else:
+                others.append(one)
+        given = self._keywords(ast.Call(func=call.func, args=[], keywords=others))
+        transitions, renamed = given.get("transitions"), given.get("remapping")
+        on = Part(_place(call))
+        for outcome, target in (transitions if isinstance(transitions, dict) else {}).items():
+            level = levels.get(outcome, 0)
+            if level > 0 and in_concurrence:
+                text = f"the autonomy level of {outcome!r}, inside a concurrence"
+                self._draft.note(_place(call), text)
+            on[outcome] = Part(_place(call), to=target, confirm=level + 1) if level > 0 else target
+        if renamed:
+            entry["remapping"] = renamed
+        if not in_concurrence:
+            entry["on"] = on
+        elif "state" in entry:
+            entry["outcomes"] = list(on)
+        self._ends[id(entry)] = list(on)
+
+    def _state(self, node: ast.expr) -> Part:
+        """Return a state, without what its container does with it."""
+        where = _place(node)
+        match node:
+            case ast.Name(id=name) if name in self._containers:
+                if name in self._used:
+                    text = f"got the machine {name} a second time; expected it once."
+                    self._draft.problem(where, text)
+                    return Part(where)
+                self._used.add(name)
+                kind, part = self._containers[name]
+                return Part(where, **{"concurrence" if kind == CONCURRENCE else "machine": part})
+            case ast.Call(func=ast.Attribute(attr="use_behavior"), args=[ast.Name(id=name), *_]):
+                module, name = self._imported.get(name, ("", name))
+                file = f"{module.rpartition('.')[2]}.py"
+                if module and (self._draft.folder / file).is_file():
+                    entry = Part(where, mission=file)
+                else:
+                    entry = Part(where, state=self._draft.leaf(name))
+                given = self._keywords(ast.Call(func=node.func, args=[], keywords=node.keywords))
+                arguments = given.pop("parameters", None)
+                for key in given:
+                    self._draft.note(where, f"the argument {key} of use_behavior")
+            case ast.Call(func=ast.Name() | ast.Attribute(value=ast.Name())):
+                name = self._kind(node) or getattr(node.func, "attr", "")
+                entry = Part(where, state=self._draft.leaf(name))
+                arguments = self._keywords(node)
+            case _:
+                text = f"got {shown(node)}; expected a state, a machine or use_behavior."
+                self._draft.problem(where, text)
+                return Part(where)
+        if arguments:
+            entry["with"] = arguments
+        return entry
+
+    def _check_depth(self, top: Part) -> None:
+        level, depth = [top], 0
+        while level and depth <= MAX_DEPTH:
+            depth += 1
+            entries = [entry for part in level for entry in part["states"].values()]
+            level = [
+                entry[kind]
+                for entry in entries
+                for kind in ("machine", "concurrence")
+                if kind in entry
+            ]
+        if level:
+            self._draft.problem(top.place, f"got more than {MAX_DEPTH} machines in each other.")
