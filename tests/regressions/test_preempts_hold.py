@@ -47,6 +47,23 @@ class Work(State):
         return "done"
 
 
+class Stone(State):
+    """Works for 50 s, whatever is asked of it or raised in it."""
+
+    def __init__(self, clock):
+        super().__init__(["done"])
+        self.clock = clock
+
+    def execute(self, userdata):
+        end = self.clock.now() + 50.0
+        while self.clock.now() < end:
+            try:
+                self.clock.sleep(end - self.clock.now())
+            except BaseException:  # what a stone does
+                continue
+        return "done"
+
+
 def both(*states, **options):
     made = Concurrence(
         ["done", "other", "preempted"],
@@ -543,22 +560,7 @@ def test_no_timer_waits_for_whoever_hears_of_an_overdue_state(who):
 
 
 def test_the_listeners_hear_the_end_of_what_was_left_behind_in_order(clock):
-    class Stone(State):
-        """Can not be broken into."""
-
-        def __init__(self):
-            super().__init__(["done"])
-
-        def execute(self, userdata):
-            end = clock.now() + 50.0
-            while clock.now() < end:
-                try:
-                    clock.sleep(end - clock.now())
-                except BaseException:  # what a stone does
-                    continue
-            return "done"
-
-    machine = both(chain(Stone()), Work(), preempt_timeout=2.0)
+    machine = both(chain(Stone(clock)), Work(), preempt_timeout=2.0)
     heard = []
     machine.subscribe(heard.append)
     clock.call_later(1.5, machine.request_preempt)
@@ -629,20 +631,7 @@ def test_a_state_is_left_behind_while_others_write_userdata():
 
 
 def test_who_waits_for_the_end_hears_of_a_machine_that_was_left_behind(clock):
-    class Stone(State):
-        def __init__(self):
-            super().__init__(["done"])
-
-        def execute(self, userdata):
-            end = clock.now() + 50.0
-            while clock.now() < end:
-                try:
-                    clock.sleep(end - clock.now())
-                except BaseException:  # what a stone does
-                    continue
-            return "done"
-
-    inner = chain(Stone())
+    inner = chain(Stone(clock))
     machine = both(inner, Work(), preempt_timeout=2.0)
     ended = []
     waiter = clock.spawn(

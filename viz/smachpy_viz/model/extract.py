@@ -97,15 +97,8 @@ def _node(record: StateRecord, levels: int, wired: frozenset[str], *, show_impli
         replace(child, note="at any end") if child.label == record.cleanup else child
         for child in children
     )
-    return Node(
-        path=record.path,
-        label=record.label,
-        kind=record.kind,
-        type_name=record.type_name,
-        doc=record.doc,
-        details=record.details,
-        outcomes=record.outcomes,
-        success=record.success,
+    return replace(
+        _box(record),
         children=children + _missing(record, edges, labels),
         initial=record.initial,
         edges=edges,
@@ -163,15 +156,8 @@ def _net_node(record: StateRecord, levels: int, *, show_implicit: bool) -> Node:
     starts = [names[place.id] for place in net.places if place.tokens]
     order = [*starts, *(node.label for node in nodes)]
     backward = _backward(order, [(source, target) for source, target, _ in arrows])
-    return Node(
-        path=record.path,
-        label=record.label,
-        kind=record.kind,
-        type_name=record.type_name,
-        doc=record.doc,
-        details=record.details,
-        outcomes=record.outcomes,
-        success=record.success,
+    return replace(
+        _box(record),
         children=tuple(nodes),
         initial=tuple(starts),
         edges=tuple(
@@ -225,6 +211,11 @@ def _missing(
 
 
 def _closed(record: StateRecord) -> Node:
+    return replace(_box(record), hidden=sum(1 for _ in record.walk()) - 1)
+
+
+def _box(record: StateRecord) -> Node:
+    """Return the node of a state, without what is inside."""
     return Node(
         path=record.path,
         label=record.label,
@@ -234,7 +225,6 @@ def _closed(record: StateRecord) -> Node:
         details=record.details,
         outcomes=record.outcomes,
         success=record.success,
-        hidden=sum(1 for _ in record.walk()) - 1,
     )
 
 
