@@ -76,13 +76,11 @@ class Written:
         text: The file's content.
         runs: Number of runs for shortening it.
         notes: What it leaves open, in words.
-        needs_recording: It reads the recording, as the world cannot be written down.
     """
 
     text: str
     runs: int
     notes: tuple[str, ...]
-    needs_recording: bool = False
 
 
 def write_test(
@@ -512,7 +510,7 @@ def test_{name}_as_recorded():
     {check}
 '''
     why = "what the world did cannot be written as a script: the test reads the recording"
-    return Written(text, runs, (why,), needs_recording=True)
+    return Written(text, runs, (why,))
 
 
 _PATH: Final = "from pathlib import Path"
