@@ -68,6 +68,8 @@ WORDS: Final = {
 }
 MOST_FILES: Final = 50
 """Mission files in each other, at most."""
+MOST_PARTS: Final = 1000
+"""Mission files that one is made of, at most; each counts as often as it is named."""
 
 
 class MissionFileError(MissionError):
@@ -82,6 +84,10 @@ class MissionFileError(MissionError):
     def __init__(self, problems: SequenceOf[str]) -> None:
         self.problems = tuple(problems)
         super().__init__("\n".join(problems))
+
+
+class _TooManyPartsError(MissionFileError):
+    """Names of mission files in each other multiply without an end; it ends the reading at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +202,10 @@ class _Reader:
         around: tuple[Path, ...],
         *,
         to_run: bool = True,
+        parts: list[str] | None = None,
     ) -> None:
         self._to_run = to_run
+        self._parts = [] if parts is None else parts  # those of the whole mission, by name
         self._columns: dict[str, int] = {}
         self._own: OwnStates | None = None
         self._notes: tuple[tuple[int, str], ...] = ()
@@ -761,8 +769,12 @@ class _Reader:
             near = sorted(each.name for each in beside if each.is_file())
             hint = did_you_mean(name, near)
             raise MissionError(f"got {name!r}, which is no file; expected one of {near}.{hint}")
-        if path in self._around or len(self._around) > MOST_FILES:
+        if path in self._around:
             raise MissionError(f"got {name!r}, which contains this file; expected another one.")
+        if len(self._around) > MOST_FILES:
+            raise MissionError(
+                f"got {name!r} inside of {MOST_FILES} mission files; expected fewer levels."
+            )
         return path
 
     def _inner(
@@ -775,11 +787,24 @@ class _Reader:
         place: Naming,
     ) -> State | None:
         """Return another mission file's machine."""
+        self._parts.append(name)
+        if len(self._parts) > MOST_PARTS:
+            many = f"got more than {MOST_PARTS} mission files, counted as often as they are named"
+            raise _TooManyPartsError([f"{place.where}: {many}; expected fewer."])
         try:
             self._inside(name)
             shown = self._path.parent / name
-            reader = _Reader(shown, self._folder, self._allow, self._around, to_run=self._to_run)
+            reader = _Reader(
+                shown,
+                self._folder,
+                self._allow,
+                self._around,
+                to_run=self._to_run,
+                parts=self._parts,
+            )
             return finish(reader.machine(arguments), origin, options, place)
+        except _TooManyPartsError:
+            raise
         except MissionFileError as error:
             for problem in error.problems:
                 entry.file.report(entry.path("mission"), f"in it: {problem}")

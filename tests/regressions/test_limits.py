@@ -56,6 +56,14 @@ READERS = {
         text = "[" * 2 * MAX_YAML_NESTING + "]" * 2 * MAX_YAML_NESTING
         reading(lambda: load_yaml(text), "nested too deeply")
     """,
+    "mission files: each names the next one twice": """
+        from smachpy.files import load
+        for level in range(40):
+            both = f"A: {{mission: m{level + 1}.yaml}}, B: {{mission: m{level + 1}.yaml}}"
+            file(f"m{level}.yaml", f"outcomes: [done]\\nstates: {{{both}}}\\n")
+        file("m40.yaml", "outcomes: [done]\\nstates: {A: {state: wait, with: {seconds: 1}, on: {preempted: done}}}\\n")
+        reading(lambda: load(tmp / "m0.yaml"), "more than 1000 mission files")
+    """,
     "yaml: aliases": """
         from actionlib_core.inputs.yaml_text import load_yaml
         lines = [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}' if i else 'x'] * 10)}]" for i in range(12)]
@@ -441,6 +449,7 @@ def test_limits_in_the_docs_are_those_of_the_code():
     from actionlib_core.ros1 import frames, links, node, publishers, rpc
     from smachpy.durable import journal, sqlite, store
     from smachpy.events import reading, recording
+    from smachpy.files.reading import MOST_FILES, MOST_PARTS
     from smachpy.foreign import draft, xml_text
     from smachpy.network import reading as network
     from smachpy.places import occupancy
@@ -465,6 +474,7 @@ def test_limits_in_the_docs_are_those_of_the_code():
             LARGEST_SECRET,
         ),
         *(world_file.MAX_THINGS, occupancy.MAX_CELLS),
+        *(MOST_FILES, MOST_PARTS),
         *(_sources.LARGEST_FILE, _definition.MAX_FIELDS, _definition.MAX_TYPE_NESTING),
         *(pnml.LARGEST_FILE, net.MAX_PARTS),
         *(draft.MAX_LENGTH, draft.MAX_VALUES, draft.MAX_NOTES, draft.MAX_DEPTH),

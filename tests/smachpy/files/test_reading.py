@@ -167,6 +167,27 @@ states:
     assert "Did you mean 'timeout'?" in found[5]
 
 
+def test_files_that_name_each_other_twice_do_not_multiply(tmp_path):
+    for level in range(40):
+        inner = f"{{mission: m{level + 1}.yaml, on: {{done: done}}}}"
+        states = f"A: {inner}, B: {inner}" if level < 39 else "A: {state: wait}"
+        text = f"outcomes: [done, preempted]\nstates: {{{states}}}\n"
+        (tmp_path / f"m{level}.yaml").write_text(text)
+    with pytest.raises(MissionFileError, match="got more than 1000 mission files") as caught:
+        load(tmp_path / "m0.yaml")
+    assert len(caught.value.problems) == 1
+
+
+def test_files_are_not_too_deep_in_each_other(tmp_path):
+    for level in range(60):
+        states = f"A: {{mission: m{level + 1}.yaml, on: {{done: done}}}}"
+        text = f"outcomes: [done, preempted]\nstates: {{{states}}}\n"
+        (tmp_path / f"m{level}.yaml").write_text(text)
+    (tmp_path / "m60.yaml").write_text("outcomes: [done]\nstates: {A: {state: wait}}\n")
+    with pytest.raises(MissionFileError, match="inside of 50 mission files; expected fewer levels"):
+        load(tmp_path / "m0.yaml")
+
+
 def test_a_transition_from_an_unknown_outcome_is_told_with_its_line(file):
     text = "outcomes: [done, preempted]\nstates:\n  A: {state: wait, on: {dne: done}}\n"
     (problem,) = problems_of(file(text))
