@@ -5,6 +5,7 @@ A reader takes bytes: a file, a message or a request. Anything but one of its er
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import json
 import shutil
@@ -12,7 +13,7 @@ import sqlite3
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -80,13 +81,18 @@ def _text(read: Callable[[str], object]) -> Callable[[bytes], object]:
 
 
 def _file(name: str, read: Callable[[Path], object], beside: tuple[Path, ...] = ()) -> Any:
-    """A reader of a file; the same folder is used again and again."""
-    folder = Path(tempfile.mkdtemp(prefix="smachpy-fuzz-"))
-    for other in beside:
-        shutil.copy(other, folder)
+    """A reader of a file; the folder of the first time is used again and again."""
+
+    @cache
+    def folder() -> Path:
+        made = Path(tempfile.mkdtemp(prefix="smachpy-fuzz-"))
+        atexit.register(shutil.rmtree, made, ignore_errors=True)
+        for other in beside:
+            shutil.copy(other, made)
+        return made
 
     def read_bytes(data: bytes) -> object:
-        path = folder / name
+        path = folder() / name
         path.write_bytes(data)
         return read(path)
 
