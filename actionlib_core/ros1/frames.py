@@ -38,9 +38,14 @@ def pack_frame(payload: bytes) -> bytes:
     return LENGTH.pack(len(payload)) + payload
 
 
+def pack_fields(fields: Mapping[str, str]) -> bytes:
+    """Return a connection header without the length in front."""
+    return b"".join(pack_frame(f"{k}={v}".encode()) for k, v in fields.items())
+
+
 def pack_header(fields: Mapping[str, str]) -> bytes:
     """Return a connection header with its length in front."""
-    return pack_frame(b"".join(pack_frame(f"{k}={v}".encode()) for k, v in fields.items()))
+    return pack_frame(pack_fields(fields))
 
 
 def unpack_header(raw: bytes) -> Header:

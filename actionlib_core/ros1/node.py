@@ -29,7 +29,7 @@ from actionlib_core.ros1.answers import (
     split_address,
 )
 from actionlib_core.ros1.backoff import Backoff
-from actionlib_core.ros1.frames import Header, pack_service_answer
+from actionlib_core.ros1.frames import Header, pack_fields, pack_service_answer
 from actionlib_core.ros1.links import Budget, Connection, TcpListener
 from actionlib_core.ros1.publishers import MAX_PUBLISHERS, Publishers
 from actionlib_core.ros1.rpc import RpcServer, call
@@ -326,12 +326,14 @@ class Publication:
         self._seen = ours
         fields = {"callerid": self._node.name, "topic": self.topic, "type": ours[0]}
         fields |= {"md5sum": ours[1], "message_definition": self._definition}
-        connection.send_header({**fields, "latching": str(int(self.latching))})
+        fields["latching"] = str(int(self.latching))
         try:
-            # In one step, so that it gets each message once: as kept or from `put`.
+            # In one step: once the subscriber has the header it gets each message, and gets it
+            # once, as kept or from `put`.
             with self.lock:
                 if self._closed:
                     return
+                connection.put(pack_fields(fields))
                 for payload in self.kept.values():
                     connection.put(payload)
                 self._connections.add(connection)

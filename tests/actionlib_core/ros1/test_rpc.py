@@ -209,6 +209,35 @@ def test_publishers_of_all_topics_together_start_few_threads(clock, caplog, monk
         node.close()
 
 
+def test_a_subscriber_that_has_the_header_gets_every_message(clock, monkeypatch):
+    """What was published before the bridge's thread ran again did not come."""
+    published = threading.Event()
+    send_header = Connection.send_header
+
+    def send_and_wait(connection, fields):
+        send_header(connection, fields)
+        if "type" in fields and "latching" in fields:
+            published.wait(WAIT_S)
+
+    monkeypatch.setattr(Connection, "send_header", send_and_wait)
+    node = Ros1Node("/bridge", "http://127.0.0.1:9", clock=clock)
+    made = node.advertise(
+        "/chatter", "std_msgs/String", "1" * 32, "", latching=False, accept=lambda _header: bool
+    )
+    port = node._data.port
+    try:
+        with Connection.open("127.0.0.1", port, "/bridge", clock, Budget(10**6)) as link:
+            link.send_header({"callerid": "/ear", "topic": "/chatter", "type": "*", "md5sum": "*"})
+            assert link.read_header()["type"] == "std_msgs/String"
+            link.limit(WAIT_S)
+            made.put(b"hello")
+            published.set()
+            assert link.read_frame() == b"hello"
+    finally:
+        made.close()
+        node.close()
+
+
 @pytest.mark.parametrize(
     "sent", [b"", b"POST / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nContent-Length"]
 )
