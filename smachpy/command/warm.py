@@ -52,6 +52,7 @@ NEEDED: Final = (
     "smachpy.command.watching",
     "smachpy.durable.mission",
     "smachpy.durable.sqlite",
+    "smachpy.foreign",
     "smachpy_viz.terminal.panel",
 )
 """What `smachpy run` imports for any mission, with all that these import."""
