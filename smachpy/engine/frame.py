@@ -122,7 +122,9 @@ class Run:
             with self.lock:
                 before = self._publisher
                 if before in {0, me}:
-                    place = next((n for n, p in enumerate(self.pending) if p is not _taken), None)
+                    # By number: others append meanwhile, without the lock.
+                    numbers = range(len(self.pending))
+                    place = next((n for n in numbers if self.pending[n] is not _taken), None)
                     if place is None:  # this thread is in a listener, or was interrupted in one
                         return
                     publish, self.pending[place] = self.pending[place], _taken

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+from collections import deque
 
 import pytest
 
 from smachpy import Concurrence, State, StateMachine
+from smachpy.engine.frame import Run
 from smachpy.events import Abandoned, Finished, Left, PreemptRequested
 
 
@@ -102,3 +104,28 @@ def test_a_request_waits_for_no_listener_of_another_thread(clock):
     clock.spawn(sm.execute, name="runner").join()
     clock.sleep(60.0)
     assert min(took) == 0.0
+
+
+class Growing(deque):
+    """Another thread appends between any two looks at the items."""
+
+    def __iter__(self):
+        for item in super().__iter__():
+            yield item
+            self.append(int)
+
+
+def test_events_are_told_while_other_threads_add_to_them():
+    """The thread that told them ended: deque mutated during iteration."""
+    run = Run(None)
+    run.pending = Growing()
+    told = []
+
+    def first():
+        told.append("first")
+        run.flush()  # as a listener does that publishes: the first one is still being told
+
+    run.pending.extend([first, lambda: told.append("second")])
+    run.flush()
+    assert told == ["first", "second"]
+    assert not run.pending
