@@ -150,7 +150,8 @@ class UserData:
         return [*object.__dir__(self), *self._data]
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{key}={masked(value, key)!r}" for key, value in self._data.items())
+        items = list(self._data.items())  # other branches may write meanwhile
+        values = ", ".join(f"{key}={masked(value, key)!r}" for key, value in items)
         return f"UserData({values})"
 
     def __reduce__(self) -> tuple[object, ...]:  # also for `copy.copy`

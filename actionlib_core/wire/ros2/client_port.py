@@ -190,7 +190,7 @@ class RosClientPort:
     # -- calls of the client -------------------------------------------------------------------
 
     def is_heard(self) -> bool:
-        return any(error is None for error in self._present.values())
+        return None in list(self._present.values())  # a copy: a token may come meanwhile
 
     @property
     def lost_link(self) -> str:

@@ -825,3 +825,17 @@ def test_a_value_with_itself_and_what_is_read_only_says_so():
     sm.add("MIX", smachpy.CBState(mix, outcomes=["ok"], input_keys=["read"], output_keys=["out"]))
     with pytest.raises(smachpy.InvalidUserCodeError, match=r"Try copy\.deepcopy"):
         sm.execute()
+
+
+def test_repr_is_complete_while_another_branch_writes():
+    """It raised: dictionary changed size during iteration."""
+    userdata = UserData()
+
+    class Shown:
+        def __repr__(self):
+            userdata.other = 1  # as another thread does meanwhile
+            return "shown"
+
+    userdata.first = Shown()
+    userdata.last = 2
+    assert repr(userdata) == "UserData(first=shown, last=2)"
