@@ -14,7 +14,14 @@ from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
 from actionlib_core.goal.states import TERMINAL, Status
 from actionlib_core.inputs.arguments import check_delay, check_function
 from actionlib_core.names import check_name
-from actionlib_core.resources import POLICIES, Claim, around_sender, inside, resources_on
+from actionlib_core.resources import (
+    POLICIES,
+    CircleError,
+    Claim,
+    around_sender,
+    inside,
+    resources_on,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -550,7 +557,11 @@ class SimpleActionServer:
         """
         self._claim = claim
         held = resources_on(self._clock)
-        holder = held.claim(claim)
+        try:
+            holder = held.claim(claim)
+        except CircleError as error:  # through what its sender holds
+            self._turn_away(handle, "reject", str(error))
+            return False
         if holder is None:
             return True
         by = holder.who()

@@ -218,3 +218,34 @@ def test_a_wrong_resource_is_an_error_at_once(world, given, part):
 def test_a_server_without_code_for_goals_can_hold_nothing(world):
     with pytest.raises(ActionException, match="without execute_cb"):
         SimpleActionServer("drive", Action, node=world.robot, resource="base")
+
+
+def test_a_goal_that_would_wait_for_its_sender_in_a_circle_is_rejected(world, caplog):
+    """It never ended, and so did its mission."""
+
+    class Wash(State):
+        def __init__(self, seconds, **options):
+            super().__init__(["done", "preempted"], **options)
+            self.seconds = seconds
+
+        def execute(self, userdata):
+            return "preempted" if self.sleep(self.seconds) else "done"
+
+    def chain(resource, seconds, last, ends):
+        sm = StateMachine(["done", "aborted", "preempted"], resource=resource)
+        sm.add("FIRST", Wash(seconds), {"done": "LAST"})
+        sm.add("LAST", last, ends)
+        return sm
+
+    world.serve("drive", "base")
+    ends = {}
+    both = Concurrence(
+        ["done", "preempted"], "done", outcome_cb=lambda found: ends.update(found) or "done"
+    )
+    drive = world.state("drive", 1)
+    both.add("ARM", chain("arm", 1.0, drive, {"succeeded": "done"}))
+    both.add("BASE", chain("base", 0.5, Wash(1.0, resource="arm"), {"done": "done"}))
+    assert both.execute() == "done"
+    assert ends == {"ARM": "aborted", "BASE": "done"}
+    assert "closes a circle" in caplog.text
+    assert world.ran == []
