@@ -88,7 +88,7 @@ bench:  ## Measure everything beside its peers and write benchmarks/RESULTS.md (
 	@VENV=.venv-bench .ci/venv dot,sim,web,bench
 	.venv-bench/bin/python benchmarks/bench.py --write benchmarks $(if $(ROUNDS),--rounds $(ROUNDS)) $(if $(ONLY),--only $(ONLY))
 
-bench-check:  ## Measure a short form of each; fail on a figure beyond its budget (benchmarks/budgets.toml) twice in a row
+bench-check:  ## Measure a short form of each; fail on a figure that stays beyond its budget (benchmarks/budgets.toml)
 	@VENV=.venv-bench .ci/venv dot,sim,web,bench
 	.venv-bench/bin/python benchmarks/bench.py --check $(if $(ONLY),--only $(ONLY))
 

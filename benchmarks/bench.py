@@ -1,7 +1,7 @@
 """Runs the benchmarks, beside their peers in the same runs, and judges them by budgets.toml.
 
     make bench          all of them, several rounds each; writes RESULTS.md and its picture
-    make bench-check    a short form of each; fails if a figure is beyond its budget twice in a row
+    make bench-check    a short form of each; fails if a figure stays beyond its budget
     python benchmarks/bench.py [--check] [--rounds N] [--only machines,actions] [--write FOLDER]
 
 A figure is the median of the rounds, its spread from the lowest to the highest. The noise of the
@@ -76,10 +76,21 @@ class Figure:
         """The median of the rounds."""
         return statistics.median(self.values)
 
-    def holds(self) -> bool:
-        """Return whether the median is within the budget."""
-        lowest = self.budget.get("at_least", -math.inf)
-        return bool(lowest <= self.median <= self.budget.get("at_most", math.inf))
+    def holds(self, room: float = 1.0) -> bool:
+        """Return whether the median is within `room` times the budget."""
+        lowest = self.budget.get("at_least", -math.inf) / room
+        return bool(lowest <= self.median <= self.budget.get("at_most", math.inf) * room)
+
+    def fails(self) -> bool:
+        """Return whether it is beyond its budget on any computer, however busy.
+
+        On a shared computer, times of a program and its peer that ran by turns were 1.7 times
+        apart from one minute to the next. A mistake that a robot feels makes a figure several
+        times larger.
+        """
+        if self.budget.get("machine"):
+            return False
+        return not self.holds(2.0 if self.budget.get("timed") else 1.0)
 
     def limit(self) -> str:
         """Return the budget, and the goal behind it."""
@@ -275,22 +286,27 @@ def page(figures: list[Figure], noisy: float, left_out: list[str], rounds: int) 
 
 
 def check(chosen: list[Benchmark]) -> int:
-    """Run the short forms; return 1 if a figure is beyond its budget twice in a row."""
+    """Run the short forms; return 1 if a figure fails in three measurements of three."""
     figures, noisy, left_out = measure(chosen, 1, short=True)
-    missed = [one for one in figures if not one.holds() and not one.budget.get("machine")]
-    again: list[Figure] = []
-    if missed:
-        names = {one.benchmark for one in missed}
-        second, _, _ = measure([one for one in chosen if one.name in names], 1, short=True)
-        keys = {(one.benchmark, one.name) for one in missed}
-        again = [one for one in second if (one.benchmark, one.name) in keys and not one.holds()]
+    failed = {(one.benchmark, one.name): one for one in figures if one.fails()}
+    for _ in range(2):
+        names = {benchmark for benchmark, _ in failed}
+        again, _, _ = measure([one for one in chosen if one.name in names], 1, short=True)
+        failed = {
+            key: one
+            for one in again
+            if (key := (one.benchmark, one.name)) in failed and one.fails()
+        }
     print("\n".join(table(figures, budgets_only=True)))
     print(f"noise {noisy:.0%}")
     for line in left_out:
         print(line)
-    for one in again:
-        print(f"{one.benchmark}: {one.name}: got {one.median:.4g}, twice; expected {one.limit()}.")
-    return 1 if again else 0
+    for one in failed.values():
+        print(
+            f"{one.benchmark}: {one.name}: got {one.median:.4g}, and too much twice before; "
+            f"expected {one.limit()}{', or twice that' if one.budget.get('timed') else ''}."
+        )
+    return 1 if failed else 0
 
 
 def main() -> int:
