@@ -54,10 +54,10 @@ def run_child(frame: Frame, step: Step) -> Decision:
     except Interruption:
         if frame.dead:
             raise
-        outcome = step.interrupted(outcome)
+        outcome = step.outcome_if_interrupted(outcome)
     except BaseException as error:
         uninterrupted(frame, partial(forget_visit, frame))
-        step.ask_again()  # the journal may have raised after the conditions had decided
+        step.forget_choices()  # the journal may have raised after the conditions had decided
         if frame.is_branch or isinstance(error, SmachError) or not isinstance(error, Exception):
             raise
         raise user_error(step.path_in(frame), step.state, error) from error
@@ -75,7 +75,7 @@ def _decided(frame: Frame, step: Step, decision: Decision) -> Decision:
     """
     assert step.choices is not None
     choice = step.choices.get(decision.outcome) if isinstance(decision.outcome, str) else None
-    step.ask_again()
+    step.forget_choices()
     if choice is None or decision.target is not choice or decision.why is Why.STOPPED:
         return decision
     target = call_bounded(frame.container, frame, choice.decide, (frame,))

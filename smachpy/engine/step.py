@@ -17,7 +17,7 @@ from smachpy.engine.callback import call_bounded
 from smachpy.engine.container import run_container
 from smachpy.engine.errors import raised
 from smachpy.engine.frame import clock_of_run
-from smachpy.engine.interrupt import Interruption, ProgramEnds
+from smachpy.engine.interrupt import Interruption, ProgramEnds, uninterrupted
 from smachpy.engine.options import NO_OPTIONS
 from smachpy.engine.preempt import (
     ask,
@@ -69,7 +69,7 @@ class Step:
     watched_window: _WatchedRemapper | None = None
     choices: dict[str, Any] | None = None
     final: Literal[False] = False  # a slot is found faster than a class attribute; see `End`
-    _base: str = ""
+    _base: str | None = None  # None, so that a root's "" is taken for no path that is known
     _path: str = ""
 
     def __post_init__(self) -> None:
@@ -96,14 +96,14 @@ class Step:
         if self.choices is not None and self.is_undecided(outcome):
             self.next[outcome] = following(outcome, self.choices[outcome].decide(frame))
 
-    def interrupted(self, outcome: Any) -> Any:
+    def outcome_if_interrupted(self, outcome: Any) -> Any:
         """Return the outcome that counts after an interruption; `outcome` is what it was before.
 
         A condition that has outlasted the grace is not asked again.
         """
         return "preempted" if self.is_undecided(outcome) else outcome
 
-    def ask_again(self) -> None:
+    def forget_choices(self) -> None:
         """Forget what the conditions have decided, for the next visit."""
         for outcome, choice in (self.choices or {}).items():
             self.next[outcome] = following(outcome, choice)
@@ -427,9 +427,10 @@ def _with_options(
         try:
             if not wait or _begins_again(frame, state, wait):
                 outcome = _attempts(frame, state, options, execute, userdata, attempt)
-        except Exception:
+        except (Exception, Interruption) as error:
             if options.on_exit is not None and not frame.dead:
-                _tidy_up(frame, state, options.on_exit, userdata)
+                left = None if isinstance(error, Exception) else outcome
+                _tidy_up(frame, state, options.on_exit, userdata, left)
             raise
         if options.on_exit is not None:
             _call_hook(frame, state, options.on_exit, userdata, outcome)
@@ -462,7 +463,7 @@ def _attempts(
             result = error
         finally:
             if timer is not None:
-                timed_out = timer.end(result)
+                timed_out = uninterrupted(frame, partial(timer.end, result))
                 result = "preempted" if timed_out and timer.stopped else result
         asked = _is_asked(frame, state)
         decision = after_attempt(result, options, attempt, asked=asked, timed_out=timed_out)
@@ -504,10 +505,12 @@ def _tell_retried(frame: Frame, attempt: int, wait: float, result: Any) -> None:
     frame.emit(Retried, attempt, reason)
 
 
-def _tidy_up(frame: Frame, state: Child, hook: Callable[..., object], userdata: Any) -> None:
-    """Call `on_exit` of a state that has raised; that error counts, not one of the hook."""
+def _tidy_up(
+    frame: Frame, state: Child, hook: Callable[..., object], userdata: Any, outcome: str | None
+) -> None:
+    """Call `on_exit` of a state that has raised or was interrupted; its own error hides neither."""
     try:
-        _call_hook(frame, state, hook, userdata, None)
+        _call_hook(frame, state, hook, userdata, outcome)
     except Exception as error:  # noqa: BLE001  of the user's function
         log.logerr(error_text(error))
 
@@ -537,6 +540,7 @@ class Timeout:
         self.stopped = False
         self._passed = False
         self._ended = False
+        self._alone = False
         self._halts = 0  # states below that an operator holds; these three need the run's lock
         self._due = self._left = 0.0
         self._timer: Timer | None = None
@@ -589,6 +593,8 @@ class Timeout:
     def end(self, result: object) -> bool:
         """End the attempt, whose outcome or exception is `result`.
 
+        An interruption may end this, then it must be called again.
+
         Returns:
             Whether only this timeout had asked the child to stop. The request then ends with the
             attempt, and the next attempt starts fresh; a request from anyone else stays.
@@ -606,16 +612,17 @@ class Timeout:
         if visit is None or visit.step is not self._step:
             return False
         if self._step.state._smachpy_is_container and isinstance(result, str):
-            self.stopped = visit.spent or visit.has_answered(result)
+            self.stopped = self.stopped or visit.spent or visit.has_answered(result)
         if frame.run.watched and visit.has_answered(result):
             visit.service()
         with frame.run.lock:
+            visit.take_back()  # from here on no interruption of this attempt is pending
             # Looked up under the lock: a request may have arrived since the timeout's.
-            alone = visit.by_timeout and not frame.dead
-            if alone:
+            if visit.by_timeout and not frame.dead:
+                self._alone = True
                 visit.happen(Event.NEXT_ATTEMPT)
         visit.settle()
-        return alone
+        return self._alone
 
     def over(self) -> None:
         """Ask the child to stop; only the first call counts."""

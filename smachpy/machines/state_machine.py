@@ -392,7 +392,7 @@ class StateMachine(Container):
             guards = self.__cases(label)
             if guards:
                 step.choices = choices_of(guards, steps, ends, step.next, self.userdata)
-                step.ask_again()
+                step.forget_choices()
         return plan
 
     def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:

@@ -12,6 +12,9 @@ import pytest
 import smachpy
 from actionlib_core.clock import RealClock, current_clock, use_clock
 from actionlib_core.shutdown import Shutdown, use_shutdown
+from smachpy.engine.interrupt import Interruption
+from smachpy.engine.preempt import Visit
+from smachpy.engine.step import Timeout
 from smachpy.events import (
     Abandoned,
     Finished,
@@ -452,6 +455,83 @@ def test_a_state_that_raises_is_left_through_its_hook(caplog, nested, breaks):
 
     assert heard == ["on", ("off", None), *([("out", None)] if nested else [])]
     assert ("hook Grips.on_exit" in caplog.text and "stuck" in caplog.text) == breaks
+
+
+@pytest.mark.parametrize("asks", ["preempt", "timeout", "operator"])
+def test_a_state_that_was_interrupted_is_left_through_its_hook(clock, asks):
+    """A light that on_enter had switched on stayed on, if a preempt had to interrupt the state."""
+    heard = []
+
+    class Deaf(smachpy.State):
+        def on_enter(self, userdata):
+            heard.append("on")
+
+        def execute(self, userdata):
+            current_clock().sleep(100.0)
+            return "ok"
+
+        def on_exit(self, userdata, outcome):
+            heard.append(("off", outcome))
+
+    limit = 2.0 if asks == "timeout" else None
+    state = Deaf(["ok", "aborted"], preempt_timeout=1.0, timeout=limit)
+    sm = smachpy.StateMachine(["ok", "aborted", "preempted"])
+    sm.add("A", state)
+    ask = {
+        "preempt": sm.request_preempt,
+        "operator": lambda: sm.control.preempt("/SM_ROOT/A"),
+        "timeout": lambda: None,
+    }[asks]
+    asked = clock.spawn(lambda: (clock.sleep(2.0), ask()), name="asks")
+    ended = {"timeout": "aborted"}.get(asks, "preempted")
+
+    assert sm.execute() == ended
+    asked.join()
+
+    assert heard == ["on", ("off", ended)]
+    assert clock.now() == 3.0
+
+
+@pytest.mark.parametrize("finishes", [True, False])
+@pytest.mark.parametrize(
+    "step", ["has_answered", "service", "take_back", "happen", "settle", "cancel"]
+)
+def test_an_interruption_at_the_end_of_an_attempt_changes_no_result(
+    clock, monkeypatch, step, finishes
+):
+    """The grace ended just as the state had returned: its result was lost."""
+    late, ended, inside = [], [], []
+    real_end, kind = Timeout.end, Visit
+    if step == "cancel":
+        kind = type(clock.call_later(0.0, lambda: None))
+    real = getattr(kind, step)
+
+    def end(self, result):
+        if not ended:
+            ended.append(result)
+            late.append(step)
+        inside.append(self)
+        try:
+            return real_end(self, result)
+        finally:
+            inside.pop()
+
+    def interrupted(self, *arguments):
+        if late and inside:
+            late.clear()
+            raise Interruption
+        return real(self, *arguments)
+
+    class Slow(smachpy.State):
+        def execute(self, userdata):
+            assert self.wait_preempt(50.0)
+            return "ok" if finishes else "preempted"
+
+    monkeypatch.setattr(Timeout, "end", end)
+    monkeypatch.setattr(kind, step, interrupted)
+    outcome, _ = run(Slow(["ok", "preempted", "aborted"], timeout=2.0))
+    assert outcome == ("ok" if finishes else "aborted")
+    assert late == (["service"] if step == "service" and finishes else [])  # it was not called
 
 
 def test_a_state_whose_exception_is_an_outcome_is_left_with_that():
