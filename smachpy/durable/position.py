@@ -434,7 +434,12 @@ class Position:
         if "override" in entry:
             visit = self.visits.get(entry["path"])
             if visit is not None:  # it may have ended meanwhile
-                visit["asked"] = {**request, "override": entry["override"]}
+                override = entry["override"]  # outcome, label, maybe whether only if it stopped
+                earlier = (visit.get("asked") or {}).get("override")
+                # As `smachpy.engine.visit.Override.instead_of`.
+                if earlier is not None and (override is None or override[2:] == [True]):
+                    override = earlier
+                visit["asked"] = {**request, "override": override}
             return
         visit = self.visits.get(entry["path"])
         if visit is not None:

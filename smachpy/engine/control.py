@@ -231,7 +231,7 @@ class Control:
                 request_soon(self._machine)
                 return
             frame, step = self._step_at(path)
-            self._stop_at(frame, step, path, None)
+            self._stop_at(frame, step, path, Override())
 
     def active(self) -> tuple[str, ...]:
         """Return the paths of all running states, containers first."""
@@ -409,7 +409,7 @@ class Control:
         if root is not None and root.path == path:
             return root
         for frame, step in self._active():
-            inner = _frame_of(step.state)
+            inner = _inner_frame(step.state)
             if inner is not None and f"{frame.path}/{step.label}" == path:
                 return inner
         raise ControlError(wanted, f"its container {path!r} does not run", self.active())
@@ -420,14 +420,14 @@ class Control:
                 return frame, step
         raise ControlError(path, "no state runs there", self.active())
 
-    def _stop_at(self, frame: Frame, step: Step, path: str, override: Override | None) -> None:
+    def _stop_at(self, frame: Frame, step: Step, path: str, override: Override) -> None:
         self._watch()
         if not self._ask(frame, step, override):
             raise ControlError(path, "it has just ended", self.active())
         self._wake()  # the state may wait at the gate; each one checks whether it was called off
 
     @staticmethod
-    def _ask(frame: Frame, step: Step, override: Override | None) -> bool:
+    def _ask(frame: Frame, step: Step, override: Override) -> bool:
         """Ask a child to stop; return whether it was running."""
         frame.run.journal.asked_one(frame, step, override)
         return ask_child(frame, step, override)
@@ -441,7 +441,7 @@ def _no_outcome(
     return ControlError(path, problem, active)
 
 
-def _frame_of(state: Child) -> Frame | None:
+def _inner_frame(state: Child) -> Frame | None:
     """Return the frame of a running container; None for any other state."""
     data = state._smachpy
     return data.live.frame if isinstance(data, ContainerData) else None
@@ -463,6 +463,6 @@ def _walk(frame: Frame) -> Iterator[tuple[Frame, Step]]:
         if step is None:
             continue
         yield branch, step
-        inner = _frame_of(step.state)
+        inner = _inner_frame(step.state)
         if inner is not None:
             yield from _walk(inner)

@@ -533,11 +533,18 @@ def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool
 
 
 def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool:
-    """Ask the child of `step` to stop, but not its container; return whether it was running."""
+    """Ask the child of `step` to stop, but not its container; return whether it was running.
+
+    Args:
+        frame: Where it runs.
+        step: The child.
+        override: What the operator chose for its end, in place of an earlier choice; a pause that
+            cancels the child (`if_stopped`) replaces none. None if it is no operator who asks.
+    """
     with frame.run.lock:
-        asked = ask(frame, step)
-        if asked and frame.visit is not None:
-            frame.visit.override = override
+        asked, visit = ask(frame, step), frame.visit
+        if asked and visit is not None and override is not None:
+            visit.override = override.instead_of(visit.override)
     frame.run.flush_soon()
     return asked
 
@@ -559,10 +566,8 @@ def pass_on(container: Parent) -> None:
         try:
             mark_preempt(container)
         finally:
-            if live.frame is not None:
-                group = live.frame.group
-                for each in (live.frame,) if group is None else group.running():
-                    ask(each)
+            for each in () if live.frame is None else live.frame.running():
+                ask(each)
             if live.callback is not None:
                 ask(live.callback)
     finally:

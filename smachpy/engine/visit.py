@@ -259,6 +259,8 @@ PREEMPTED = End("preempted")
 class Override:
     """An operator's choice instead of a child's own outcome: another outcome, or a jump.
 
+    Without either, the child's own outcome counts: the operator has stopped it, and no more.
+
     Attributes:
         outcome: The outcome.
         label: The child to jump to.
@@ -271,7 +273,12 @@ class Override:
 
     def holds(self, *, answered: bool) -> bool:
         """Return whether it replaces an outcome with which the child `answered` the request."""
-        return answered or not self.if_stopped
+        is_choice = self.outcome is not None or self.label is not None
+        return is_choice and (answered or not self.if_stopped)
+
+    def instead_of(self, earlier: Override | None) -> Override:
+        """Return the one that counts after an `earlier` one: a pause only adds that it waits."""
+        return earlier if earlier is not None and self.if_stopped else self
 
 
 class Decision(NamedTuple):
@@ -338,14 +345,17 @@ def after(
         override: An operator's choice.
     """
     decision = followed(outcome, leads)
-    if decision.why is Why.UNKNOWN and outcome == "preempted" and (override is None or run_asked):
+    chosen = None
+    if override is not None and not run_asked and override.holds(answered=answered):
+        chosen = override
+    if decision.why is Why.UNKNOWN and outcome == "preempted" and chosen is None:
         return STOPPED
     if run_asked and decision.why is FOLLOWED and not decision.target.final:
         if answered:
             return decision._replace(why=Why.ANSWERED)
         return STOPPED if outcome == "preempted" else STOPPED._replace(target=decision.target)
-    if not run_asked and override is not None and override.holds(answered=answered):
-        if override.label is not None:
-            return Decision(Why.JUMPED, override.label)
-        return followed(override.outcome, leads)._replace(why=Why.FORCED)
+    if chosen is not None:
+        if chosen.label is not None:
+            return Decision(Why.JUMPED, chosen.label)
+        return followed(chosen.outcome, leads)._replace(why=Why.FORCED)
     return decision

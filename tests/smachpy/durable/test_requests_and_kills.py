@@ -241,6 +241,34 @@ def test_a_sibling_s_end_reaches_a_branch_that_is_quicker_after_a_kill(kind, out
         assert ("LOOK done" in ends) is (outcome == "cleaned"), (place, ends)
 
 
+class SlowToStop(Work):
+    """Takes two more seconds when it is asked to stop."""
+
+    def end(self, *, stopped):
+        if stopped:
+            current_clock().sleep(2.0)
+        return super().end(stopped=stopped)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_pause_does_not_void_an_operators_jump_after_a_kill_either(shape):
+    make, path = SHAPES[shape]
+
+    def jumped_then_paused(sm, path):
+        clock = sm._smachpy.live.frame.run.clock
+        sm.control.jump(f"{path}/LOOK")
+        clock.call_later(1.0, lambda: sm.control.pause(running="cancel"))
+        clock.call_later(6.0, sm.control.resume)
+
+    def build(ends):
+        return make(ends, SlowToStop)
+
+    for place, outcome, ends in lives(build, path, jumped_then_paused):
+        assert outcome == "cleaned", (place, ends)
+        assert ends[-1] == "LOOK done", (place, ends)
+
+
 # -- requests that a state withdraws ---------------------------------------------------------------
 
 
@@ -298,6 +326,43 @@ def test_a_request_that_a_state_has_withdrawn_does_not_come_back_after_a_kill(sh
                 assert "DRIVE heard" not in ends[before:], (kill_at, written, ends)
             assert "DRIVE done" in ends, (kill_at, written, ends)
     assert late  # kills came after the state had withdrawn the request
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("ask", [of_the_run, timed_out])
+def test_a_request_to_the_run_that_is_withdrawn_for_the_whole_run_does_not_come_back(ask):
+    """Written without those whom it had come from, it was made again after the kill."""
+
+    def build(ends):
+        class Withdraws(Recalls):
+            def recall_preempt(self):
+                super().recall_preempt()
+                sm.recall_preempt()
+
+        limit = REQUEST_S if ask is timed_out else None
+        sm = StateMachine(ENDS, name="M", timeout=limit, timeout_outcome="preempted")
+        sm.add("DRIVE", Withdraws(ends, "DRIVE"), {"done": "LOOK"})
+        sm.add("LOOK", Work(ends, "LOOK"))
+        return sm
+
+    calm, store = [], KillingStore()
+    assert live(build, "/M", ask, calm, store) == "done"
+    assert calm == ["DRIVE heard", "DRIVE done", "LOOK done"]
+    late = 0
+    for kill_at in range(1, store.writes):
+        ends, killed = [], KillingStore()
+        killed.arm(kill_at, written=True)
+        assert live(build, "/M", ask, ends, killed) is None
+        withdrawn = sum(b'"kind":"Recalled"' in entry for entry in killed.entries["m"])
+        before = len(ends)
+        killed.arm(0, written=False)
+        # Killed between the two, the state has withdrawn it, and the run has not.
+        expected = "preempted" if withdrawn == 1 else "done"
+        assert live(build, "/M", ask, ends, killed) == expected, (kill_at, ends)
+        if withdrawn == 2:
+            late += 1
+            assert "DRIVE heard" not in ends[before:], (kill_at, ends)
+    assert late
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

@@ -9,8 +9,10 @@ import threading
 import pytest
 
 import smachpy
+from actionlib_core.clock import current_clock
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from smachpy.engine.control import ControlError
+from smachpy.engine.preempt import ask_child
 from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed
 
 
@@ -163,6 +165,52 @@ def test_preempt_while_paused_ends_the_mission(clock):
     assert clock.now() == 3.0
     sm.control.resume()
     assert sm.execute() == "ok"
+
+
+class Slows(smachpy.State):
+    """Takes two seconds to stop."""
+
+    def __init__(self):
+        super().__init__(["ok", "failed", "preempted"])
+        self.runs = 0
+
+    def execute(self, userdata):
+        self.runs += 1
+        if not self.wait_preempt(50.0):
+            return "ok"
+        current_clock().sleep(2.0)
+        return "preempted"
+
+
+@pytest.mark.parametrize("stop", ["pause", "emergency", "resource"])
+@pytest.mark.parametrize("chosen", ["preempt", "force", "jump"])
+def test_what_an_operator_has_chosen_outlasts_a_pause_and_a_taker_of_the_resource(
+    clock, chosen, stop
+):
+    """Stopped for good, and then by the emergency stop: it drove on after the release."""
+    drive = Slows()
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    sm.add("A", drive, {"preempted": "B", "failed": "C"})
+    for label in "BCD":
+        sm.add(label, Work())
+    sm.events = []
+    sm.subscribe(sm.events.append)
+    live = sm._smachpy.live
+    choose = {
+        "preempt": lambda: sm.control.preempt("/P/A"),
+        "force": lambda: sm.control.force_outcome("/P/A", "failed"),
+        "jump": lambda: sm.control.jump("/P/D"),
+    }[chosen]
+    pause = {
+        "pause": lambda: sm.control.pause(running="cancel"),
+        "emergency": sm.control.emergency_stop,
+        "resource": lambda: ask_child(live.frame, live.frame.step),
+    }[stop]
+    at(clock, (1.0, choose), (2.0, pause), (10.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    after = {"preempt": "/P/B", "force": "/P/C", "jump": "/P/D"}[chosen]
+    assert entered(sm) == ["/P/A", after]
+    assert drive.runs == 1
 
 
 def test_jump_preempts_what_runs_and_goes_there(clock):

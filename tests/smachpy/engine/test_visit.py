@@ -212,6 +212,8 @@ class Child:
 def plainly(outcome, targets, run_asked, answered, override):
     """Decide as the page in the docs says, line by line, without a thought for brevity."""
     decided = None
+    if override == Override():  # an operator has stopped it, and chosen nothing
+        override = None
     if outcome == "preempted" and "preempted" not in targets and (run_asked or override is None):
         decided = "STOPPED", "preempted"
     elif run_asked:
@@ -247,7 +249,9 @@ TARGETS = [
 @pytest.mark.parametrize("run_asked", [False, True])
 @pytest.mark.parametrize("answered", [False, True])
 @pytest.mark.parametrize(
-    "override", [None, Override(outcome="done"), Override(label="NEXT")], ids=str
+    "override",
+    [None, Override(), Override(outcome="done"), Override(label="NEXT")],
+    ids=str,
 )
 def test_every_line_with_every_kind_of_request(targets, outcome, run_asked, answered, override):
     leads = {name: following(name, target) for name, target in targets.items()}
@@ -258,6 +262,24 @@ def test_every_line_with_every_kind_of_request(targets, outcome, run_asked, answ
         assert (found.target.final, found.target.outcome) == (True, "preempted")
     else:
         assert found.target == target
+
+
+AGAIN = Override(label="DRIVE", if_stopped=True)  # of a pause
+
+
+@pytest.mark.parametrize(
+    ("earlier", "later", "counts"),
+    [
+        (None, AGAIN, AGAIN),
+        (AGAIN, Override(outcome="done"), Override(outcome="done")),
+        (Override(outcome="done"), Override(label="NEXT"), Override(label="NEXT")),
+        (Override(label="NEXT"), Override(), Override()),
+        (Override(label="NEXT"), AGAIN, Override(label="NEXT")),
+        (Override(), AGAIN, Override()),
+    ],
+)
+def test_the_last_choice_of_an_operator_counts_and_a_pause_is_none(earlier, later, counts):
+    assert later.instead_of(earlier) == counts
 
 
 @pytest.mark.parametrize("outcome", [None, 3, ["done"], {"done": 1}])
