@@ -95,7 +95,7 @@ def _run(frame: Frame, parent_ud: Any) -> str:
         return outcome
     finally:
         uninterrupted(frame, partial(leave, frame))
-        frame.first.innermost = frame.parent or frame
+        frame.first.innermost = frame.parent
         if around is not None and not frame.dead:
             around.begin()
 

@@ -331,10 +331,10 @@ class Frame:
             if subscribers is None or subscribers.epoch is not EPOCH.value:
                 subscribers = self.find_subscribers()
         listeners = subscribers.all
-        asked = 0
+        called = 0
         try:
             for listener in listeners:
-                asked += 1
+                called += 1
                 try:
                     listener(event)
                 except Exception as error:  # noqa: BLE001  the user's: reported in the log
@@ -343,7 +343,7 @@ class Frame:
                     log.log_exception(f"{where} raised {error_text(error)} on {on}", error)
         except Interruption:
             if not self.dead:
-                self.publish(event, subscribers._replace(all=listeners[asked:]))
+                self.publish(event, subscribers._replace(all=listeners[called:]))
             raise
 
     def find_subscribers(self) -> Subscribers:

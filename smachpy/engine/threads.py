@@ -59,12 +59,11 @@ class Branch(Frame):
 
     def work(self) -> None:
         """Run the child and report how it ended; the body of the thread."""
-        self.first = self.innermost = self
-        self.thread = threading.get_ident()
+        self.begin_thread()
         THREAD.set(self)
         outcome, failure = None, None
         try:
-            outcome = self.run_child()
+            outcome = self.execute_child()
         except Interruption:
             outcome = "preempted"
         except BaseException as error:  # noqa: BLE001  handed to the container's thread
@@ -85,11 +84,7 @@ class Branch(Frame):
                 waiting.set()
             return
 
-    def here(self) -> str:
-        """Return the path of the child."""
-        return f"{self.path}/{self.step.label}"
-
-    def run_child(self) -> str:
+    def execute_child(self) -> str:
         """Run the child and return its outcome."""
         raise NotImplementedError
 
@@ -112,11 +107,11 @@ class ChildBranch(Branch):
     """A child of a concurrence, in a thread of its own.
 
     Attributes:
-        called_off: Its container has asked it to stop.
+        was_asked: Its container has asked it to stop.
         siblings: All branches that run with it, itself included.
     """
 
-    called_off = False
+    was_asked = False
     siblings: Group
 
     is_branch = True
@@ -129,7 +124,7 @@ class ChildBranch(Branch):
         self.visit = Visit(self, step)
         self.siblings = group
 
-    def run_child(self) -> str:
+    def execute_child(self) -> str:
         """Run the child, and again if an operator jumps to it; return its outcome."""
         while True:
             decision = run_child(self, self.step)
@@ -137,7 +132,7 @@ class ChildBranch(Branch):
                 outcome: str = decision.outcome
                 return outcome
             with self.run.lock:
-                self.called_off = False
+                self.was_asked = False
 
     def end(self, outcome: str | None, error: BaseException | None) -> ClockEvent | None:
         """Report how the child ended; the event returned wakes the container."""
@@ -293,8 +288,8 @@ class Group:
         """
         with self.frame.run.lock:
             for branch in branches:
-                if not (branch.ended or branch.called_off):
-                    branch.called_off = True
+                if not (branch.ended or branch.was_asked):
+                    branch.was_asked = True
                     ask(branch)
         self.frame.run.flush()
 
@@ -499,17 +494,16 @@ class Root(Branch):
     def run_here(self) -> str:
         """Run the root in this thread, which is the caller's and cannot be left behind."""
         self.can_be_left = False
-        self.first = self.innermost = self
-        self.thread = threading.get_ident()
+        self.begin_thread()
         token = THREAD.set(self)
         try:
-            return self.run_child()
+            return self.execute_child()
         finally:
             THREAD.reset(token)
             self.ended = True
             self.end_thread()
 
-    def run_child(self) -> str:
+    def execute_child(self) -> str:
         """Run the root and publish its start and end."""
         step, root, live, journal = self.step, self.container, self.live, self.run.journal
         self._begin()
