@@ -715,7 +715,7 @@ def test_blocked_leaf_in_the_main_thread_is_broken(body, depth, quiet):
 
 
 ON_THE_WAY_UP = {
-    "child": (step.Step, "interrupted"),
+    "child": (step.Step, "outcome_if_interrupted"),
     "container": (frame.Frame, "end_preempted"),
     "leaves": (preempt, "forget_visit"),
     "ends": (preempt.Visit, "end"),
