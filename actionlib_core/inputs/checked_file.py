@@ -178,7 +178,10 @@ class CheckedFile:
             data, self._lines = parse(self, content.decode("utf-8-sig"))
         except (OSError, UnicodeDecodeError) as reason:
             got = repr(reason.strerror) if isinstance(reason, OSError) else "no UTF-8"
-            self.report("", f"got {got}; expected a readable text.", 0)
+            line = 0
+            if isinstance(reason, UnicodeDecodeError):
+                line = reason.object.count(b"\n", 0, reason.start) + 1
+            self.report("", f"got {got}; expected a readable text.", line)
             raise error(self.problems) from reason
         self.check()
         if data is None and may_be_empty:

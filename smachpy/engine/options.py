@@ -95,9 +95,9 @@ class Resource:
         problems = Problems("")
         word = problems.word("resource: name", name)
         try:
-            check_name(word or "x", "resource: name")
+            check_name(word or "x", "resource name")
         except InvalidNameError as error:
-            problems.add(str(error))
+            problems.add(f"resource: {error}")
         if not isinstance(policy, str) or policy not in POLICIES:
             problems.add(f"resource: policy: got {policy!r}; expected one of {list(POLICIES)}.")
         problems.raise_all()

@@ -221,7 +221,7 @@ class _Reader:
             data, marks = load_with_marks(text)
         except YamlTextError as error:
             self._columns[""] = max(1, error.column)
-            file.report("", f"not YAML: {error.reason}.", error.line)
+            file.report("", f"not YAML: {error.reason}.", max(1, error.line))
             return None, {}
         self._columns = {path: column for path, (_, column) in marks.items()}
         return data, {path: line for path, (line, _) in marks.items()}
@@ -386,9 +386,29 @@ class _Reader:
                 of = [one for one in labels if label.startswith(f"CONFIRM_{one}_")]
                 label = max(of, key=len, default=label)
             field = f"states.{label}" if label else ""
+            if label in labels:
+                field += self._at_transition(section.section("states").section(label), text)
             known = not section.is_good(field) if field else bool(self.file.problems)
             if not known and not any(f"got {one!r}" in text for one in missing):
                 self.file.report(section.path(field), text)
+
+    @staticmethod
+    def _at_transition(entry: Section, text: str) -> str:
+        """Return the field of a state about whose transition a machine says something, or ""."""
+        on = entry.section("on")
+        for outcome in on:
+            starts = (
+                f"transition {outcome!r} leads nowhere",
+                f"transition from an unknown outcome: got {outcome!r}",
+            )
+            if text.startswith(starts):
+                return f".on.{outcome}"
+            rows = on.value(outcome)
+            if text.startswith("transition if ") and isinstance(rows, list):
+                for number, row in enumerate(rows):
+                    if f"got {row.get('to')!r};" in text:
+                        return f".on.{outcome}[{number}].to"
+        return ""
 
     def _made(self, section: Section, kind: Any, given: dict[str, Any]) -> Any:
         try:
@@ -539,9 +559,9 @@ class _Reader:
             elif is_last:
                 found.append(target)
             else:
-                condition = str(row.value("when"))
+                condition = row.text("when", REQUIRED)
                 try:
-                    found.append(when(condition, target))
+                    found.append(when(condition if row.is_good("when") else "True", target))
                 except SmachError as error:
                     row.report("when", str(error).partition(": ")[2])
             row.allow("when")

@@ -156,7 +156,7 @@ states:
         "15:7: states.D.mission: got '../x.yaml', which is not in",
         "16:7: states.E.mission: got 'mission.yaml', which contains this file",
         "17:7: states.F.plan: got 'nothing.pnml', which is no file",
-        "18:41: states.G.machine.states.Q: transition 'done' leads nowhere",
+        "18:63: states.G.machine.states.Q.on.done: transition 'done' leads nowhere",
         "19:3: states.H: got no kind of state",
         "20:20: states.I.machine: got ['state', 'machine']",
         "21:31: states.J.on.done[0]: got a case without a condition before the last",
@@ -191,7 +191,35 @@ def test_files_are_not_too_deep_in_each_other(tmp_path):
 def test_a_transition_from_an_unknown_outcome_is_told_with_its_line(file):
     text = "outcomes: [done, preempted]\nstates:\n  A: {state: wait, on: {dne: done}}\n"
     (problem,) = problems_of(file(text))
-    assert problem.startswith("3:3: states.A: transition from an unknown outcome: got 'dne'")
+    place = "3:25: states.A.on.dne: "
+    assert problem.startswith(f"{place}transition from an unknown outcome: got 'dne'")
+
+
+@pytest.mark.parametrize(
+    ("state", "problem"),
+    [
+        (
+            "{state: wait, on: {done: [{when: x > 1, to: A}, {when: x > 2, to: B}, {to: done}]}}",
+            "3:75: states.A.on.done[1].to: transition if 'x > 2' leads nowhere: got 'B'",
+        ),
+        (
+            "{state: wait, on: {done: [{when: 5, to: A}, {to: done}]}}",
+            "3:40: states.A.on.done[0].when: got 5; expected a text",
+        ),
+        ("{state: wait, resource: a b}", "3:27: states.A.resource: invalid resource name"),
+    ],
+)
+def test_a_problem_of_a_state_has_the_place_of_its_value(file, state, problem):
+    text = f"outcomes: [done, preempted]\ninput_keys: [x]\nstates: {{A: {state}}}\n"
+    found = problems_of(file(text))
+    assert [one[: len(problem)] for one in found] == [problem]
+
+
+def test_bytes_that_are_no_text_have_their_line(tmp_path):
+    path = tmp_path / "latin.yaml"
+    path.write_bytes("outcomes: [done]\nhelp: Fährt\n".encode("latin-1"))
+    (problem,) = problems_of(path)
+    assert problem.startswith("2:1: got no UTF-8")
 
 
 # -- code --------------------------------------------------------------------------------------

@@ -147,7 +147,7 @@ def test_what_is_lost_is_noted_with_its_line(tmp_path):
         ),
         (
             '<StateMachine outcomes="e"><State name="A" class="B"><Transition from="x" to="y"/></State></StateMachine>',
-            "1:28: states.A: transition 'x' leads nowhere: got 'y'; expected one of the states ['A'] or outcomes ['e', 'preempted'].",
+            "1:54: states.A.on.x: transition 'x' leads nowhere: got 'y'; expected one of the states ['A'] or outcomes ['e', 'preempted'].",
         ),
         (
             '<StateMachine outcomes="e"><StateMachine name="A" file_path="../b.xml"/></StateMachine>',
