@@ -578,12 +578,18 @@ def terminable() -> Iterator[None]:
         raise Terminated(number)
 
     taken = [number for number in default_signals() if number != signal.SIGINT]
+
+    def restore() -> None:
+        for number in taken:
+            if signal.getsignal(number) is on_signal:
+                signal.signal(number, signal.SIG_DFL)
+
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     try:
+        restorers.append(restore)
         for number in taken:
             signal.signal(number, on_signal)
         yield
     finally:
-        for number in taken:
-            if signal.getsignal(number) is on_signal:
-                signal.signal(number, signal.SIG_DFL)
+        restore()
+        restorers.remove(restore)

@@ -127,7 +127,9 @@ def run_with_cleanup(frame: Frame, step: Step, run_others: Callable[[], str]) ->
             if frame.dead:
                 raise
             outcome = "preempted" if frame.answered else frame.end_preempted()
-        except Exception as error:  # noqa: BLE001  raised below, after the clean-up
+        except Exception as error:  # raised below, after the clean-up
+            if frame.dead:
+                raise
             failure = error
         asked = container._preempt_requested or frame.answered
         error_of = "" if failure is None else error_text(failure)

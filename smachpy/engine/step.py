@@ -457,14 +457,14 @@ def _attempts(
         timed_out = False
         try:
             result = "preempted" if passed else execute(userdata)
-        except (Exception, Interruption) as error:
-            if frame.dead:  # the thread was left behind: no retry, no hook
-                raise
+        except (Exception, Interruption) as error:  # noqa: BLE001  raised below
             result = error
         finally:
             if timer is not None:
                 timed_out = uninterrupted(frame, partial(timer.end, result))
                 result = "preempted" if timed_out and timer.stopped else result
+        if frame.dead:  # the thread was left behind: no retry, no hook, however it ended
+            raise result if isinstance(result, BaseException) else Interruption
         asked = _is_asked(frame, state)
         decision = after_attempt(result, options, attempt, asked=asked, timed_out=timed_out)
         if isinstance(decision, Again):

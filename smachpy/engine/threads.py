@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections import deque
 from contextvars import copy_context
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core import shutdown
 from actionlib_core.clock import RealClock
+from actionlib_core.clock.forks import end_copy
 from smachpy.base import log
 from smachpy.base.context import THREAD
 from smachpy.base.slips import accepts
@@ -401,6 +403,23 @@ def execute_root(root: Parent, parent_ud: Any) -> str:
                 top.live.control.detach(top.run)
 
 
+def _leave_in_copy() -> None:
+    """In a forked process, treat this thread as left behind: its run goes on in the parent."""
+    first = THREAD.get()
+    frame = None if first is None else first.innermost
+    if frame is None:
+        return
+    run = frame.run
+    run.lock, run.pending = threading.RLock(), deque()  # another thread may have held the lock
+    while frame is not None:
+        frame.dead, frame.subscribers = True, None
+        frame = frame.parent
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_leave_in_copy)
+
+
 def _share_no_state(top: Root, other: Root) -> None:
     """See to it that a preempt of one of two machines reaches none of the other's states.
 
@@ -498,6 +517,10 @@ class Root(Branch):
         token = THREAD.set(self)
         try:
             return self.execute_child()
+        except BaseException as error:
+            if self.dead:  # this thread cannot be left behind, so it is that of a copy
+                end_copy(None if isinstance(error, Interruption) else error)
+            raise
         finally:
             THREAD.reset(token)
             self.ended = True

@@ -225,3 +225,56 @@ def test_a_copy_does_not_end_a_process_of_its_parent(tmp_path):
         assert in_copy(lambda: robot.stop() is None)
         os.kill(robot.pid, 0)
         assert robot.exit_code is None
+
+
+def comes_back(error):
+    if error is not None:
+        raise error
+    return "done"
+
+
+@pytest.mark.parametrize(
+    ("error", "code"), [(None, 0), (SystemExit(IGNORED), IGNORED), (ValueError("wrong"), 1)]
+)
+@pytest.mark.parametrize("place", ["state", "nested", "branch", "callback"])
+def test_a_copy_that_comes_back_from_a_state_runs_no_other_state(place, error, code, tmp_path):
+    """It ran the rest of the mission a second time, or waited for the threads of its parent."""
+    ends, ran = [], tmp_path / "ran"
+
+    def fork(*_):
+        child = os.fork()
+        if child == 0:
+            signal.alarm(20)  # it ends the process
+            return comes_back(error)
+        ends.append(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+        return "done"
+
+    def note(_userdata):
+        with ran.open("a") as file:
+            file.write("ran\n")
+        return "done"
+
+    inner = machine_of(Concurrence if place == "branch" else StateMachine, fork)
+    machine = StateMachine(["done"])
+    with machine:
+        if place == "callback":
+            machine.register_start_cb(fork)
+        elif place == "state":
+            options = {"retry": (3, 0.0, ValueError), "on_exit": lambda _ud, _out: note(None)}
+            machine.add("FORK", CBState(fork, outcomes=["done"], **options), {"done": "AFTER"})
+        else:
+            machine.add("FORK", inner, {"done": "AFTER"})
+        machine.add("AFTER", CBState(note, outcomes=["done"]))
+        machine.add_cleanup("TIDY", CBState(note, outcomes=["done"]))
+
+    assert machine.execute() == "done"
+    assert ran.read_text().count("ran") == (3 if place == "state" else 2)
+    # An error in the copy's thread of a branch or a callback is not told by its exit code.
+    assert ends == [code if place == "state" else ends[0]]
+
+
+def test_a_worker_of_a_command_is_ended_by_a_signal():
+    """`multiprocessing.Pool` printed a traceback for each worker that it ended."""
+    with shutdown.terminable():
+        assert end_of_child(signal.SIGTERM) == signal.SIGTERM
+        assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL

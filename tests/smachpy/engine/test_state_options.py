@@ -247,6 +247,29 @@ def test_timeout_of_what_must_be_left_behind(clock, where, asked_at):
     assert ends[-2] == ("preempted" if sm.name or asked_at else "late")
 
 
+@pytest.mark.parametrize("outcome", ["ok", "aborted"])
+def test_what_was_left_behind_has_no_other_attempt_and_no_hook(clock, outcome):
+    """It was executed again, maybe after the end of the mission, if it returned in the end."""
+    ends = []
+
+    class Again(Stone):
+        attempts = 0
+
+        def execute(self, userdata):
+            self.attempts += 1
+            super().execute(userdata)
+            return outcome
+
+    state = Again(
+        ["ok", "aborted"], preempt_timeout=1.0, retry=3, on_exit=lambda *_: ends.append(1)
+    )
+    sm = beside(state)
+    clock.call_later(2.5, sm.request_preempt)
+    clock.spawn(sm.execute, name="mission").join()
+    clock.sleep(3000.0)
+    assert (state.attempts, ends) == (1, [])
+
+
 def test_timeout_in_a_concurrence_ends_that_branch_only(clock):
     both = smachpy.Concurrence(["done", "mixed"], "done", outcome_map={"mixed": {"A": "aborted"}})
     both.add("A", Waits(10.0, timeout=1.0))
