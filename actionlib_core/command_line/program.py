@@ -6,6 +6,7 @@ import argparse
 import signal
 import sys
 import traceback
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from actionlib_core.process.output import printable, run_program, tell
@@ -54,7 +55,7 @@ def run_command(
         except KeyboardInterrupt:
             return EXIT_INTERRUPTED
         except Exception as error:
-            text = text_of(error)
+            text = text_of(error) or _text_of_folder(error)
             if text is None:
                 raise
             if "--debug" in words:
@@ -64,3 +65,14 @@ def run_command(
             return EXIT_ERROR
 
     return run_program(program, checked, draws=draws)
+
+
+def _text_of_folder(error: Exception) -> str | None:
+    """Return the text of an error that comes from a current folder that is not there any more."""
+    if not isinstance(error, FileNotFoundError) or error.filename is not None:
+        return None
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return "the current folder: got one that was removed; expected one that is there. Try cd."
+    return None

@@ -170,7 +170,7 @@ class SQLiteStore(SqlStore):
 
     def _check_log(self) -> None:
         """Refuse a file without the log that it needs, and a log without its file."""
-        log = self._file.with_name(f"{self._file.name}-wal")
+        log = self._file.parent / f"{self._file.name}-wal"
         if log.exists():
             # SQLite creates the file first, and would delete the log of an empty file.
             if log.stat().st_size and not (self._file.exists() and self._file.stat().st_size):

@@ -254,6 +254,19 @@ def test_what_cannot_be_had(arguments, text, capsys):
     assert "Traceback" not in error
 
 
+def test_a_current_folder_that_was_removed(nap, capsys, tmp_path, monkeypatch):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    assert main(["run", nap, "--time", "virtual", "--plain"]) == 2
+    error = capsys.readouterr().err
+    assert error == (
+        "smachpy: the current folder: got one that was removed; expected one that is there. "
+        "Try cd.\n"
+    )
+
+
 def test_a_mission_that_waits_for_somebody_outside(tmp_path, capsys):
     path = tmp_path / "stuck.py"
     path.write_text(STUCK)

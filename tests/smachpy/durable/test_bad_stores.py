@@ -221,6 +221,10 @@ def test_a_folder_is_no_journal(place):
     refused(place.parent / "file" / "journal.db", "unreachable")
 
 
+def test_the_top_folder_is_no_journal():
+    refused("/", "unreachable")
+
+
 def test_a_locked_file_is_waited_for_no_longer_than_allowed(place):
     store, lease, written = fill(place)
     store.close()
