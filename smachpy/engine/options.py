@@ -146,16 +146,16 @@ NO_OPTIONS = Options()
 NAMES = tuple(field.name for field in dataclasses.fields(Options))
 
 
+def _is_caught(kind: object) -> bool:
+    """Return whether `kind` is a type of exceptions of states; what ends a program is none."""
+    if not (isinstance(kind, type) and issubclass(kind, BaseException)):
+        return False
+    return issubclass(kind, Exception) or issubclass(ExceptionGroup, kind)
+
+
 def _results(problems: Problems, on: Any) -> tuple[Any, ...]:
     found = (on,) if isinstance(on, (str, type)) or not isinstance(on, Iterable) else tuple(on)
-    wrong = [
-        item
-        for item in found
-        if not (
-            (isinstance(item, str) and item)
-            or (isinstance(item, type) and issubclass(item, BaseException))
-        )
-    ]
+    wrong = [item for item in found if not ((isinstance(item, str) and item) or _is_caught(item))]
     if wrong or not found:
         problems.add(f"retry: on: got {wrong or on!r}; expected outcomes or exception types.")
     return found
@@ -209,7 +209,7 @@ def _on_exception(problems: Problems, name: str, given: Any) -> dict[type[BaseEx
         problems.add(f"{name}: got {given!r}; expected a dict: {holds}.")
         return {}
     for kind, outcome in (given or {}).items():
-        if not (isinstance(kind, type) and issubclass(kind, BaseException)):
+        if not _is_caught(kind):
             problems.add(f"{name}: got {kind!r} in it; expected {holds}.")
         if not isinstance(outcome, str) or not outcome:
             problems.add(f"{name}: got outcome {outcome!r} in it; expected {holds}.")

@@ -42,9 +42,14 @@ _END = object()
 
 @dataclass(slots=True, eq=False)
 class IteratorData(ContainerData):
-    """The library's data of one iterator; see the arguments of `Iterator`."""
+    """The library's data of one iterator; see the arguments of `Iterator`.
+
+    Attributes:
+        used_up: Items that give themselves, such as a generator, once a run has had all of them.
+    """
 
     items: Any = ()
+    used_up: Any = None
     items_label: str = ""
     exhausted_outcome: str = ""
     loop_outcomes: tuple[str, ...] = ()
@@ -64,7 +69,8 @@ class Iterator(Container):
         outcomes: Outcomes; `exhausted_outcome` is added.
         input_keys: Keys copied from the parent's userdata when it starts.
         output_keys: Keys copied to the parent's userdata when it ends.
-        it: The items: any iterable, or a function that returns one, called at each run.
+        it: The items: any iterable, or a function that returns one, called at each run. A generator
+            lasts for one run; a second one that finds it used up raises an `InvalidUserCodeError`.
         it_label: Userdata key under which the child finds its item.
         exhausted_outcome: Outcome when no item is left.
         name: Name of the machine when it is the root.
@@ -312,21 +318,34 @@ class Iterator(Container):
         def call(function: Callable[..., Any], *arguments: Any) -> Any:
             return call_bounded(self, frame, function, arguments)
 
+        data, is_used_up = self._smachpy, False
         try:
-            items = self._smachpy.items
+            items = data.items
             if callable(items):
                 items = call(items)
             if type(items) in _PLAIN:
                 yield from items
                 return
             iterator = call(iter, items)
-            while (item := call(next, iterator, _END)) is not _END:
+            item = call(next, iterator, _END)
+            is_used_up = item is _END and iterator is data.used_up
+            while item is not _END:
                 yield item
+                item = call(next, iterator, _END)
+            data.used_up = iterator if iterator is items else None
         except Exception as error:
             raise InvalidUserCodeError(
                 f"{frame.path}: items: {error_text(error)}; expected an iterable.",
                 path=frame.path,
             ) from error
+        if is_used_up:
+            problem = (
+                f"{frame.path}: items: got a {type(data.used_up).__name__} that an earlier run has "
+                "used up; expected items that can be had again. Try a list, or a function that "
+                "returns them."
+            )
+            if not accepts(problem):
+                raise InvalidUserCodeError(problem, path=frame.path)
 
 
 def _describe_items(items: Any) -> str:

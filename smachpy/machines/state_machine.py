@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, get_args
 
@@ -52,6 +53,7 @@ class MachineData(ContainerData):
     Attributes:
         transitions: Label -> outcome -> label of the next child, outcome of the machine, or None.
         guards: Label -> outcome -> cases, which come before the transition of that outcome.
+        constants: Label -> key of the userdata -> fixed value.
         initial: Label of the initial child.
         next_initial: The initial child of the next run only; None for `initial`.
         follow_connectors: The label of a child and its outcomes that lead to the child added next.
@@ -60,6 +62,7 @@ class MachineData(ContainerData):
 
     transitions: dict[str, dict[str, str | None]] = field(default_factory=dict)
     guards: dict[str, dict[str, Cases]] = field(default_factory=dict)
+    constants: dict[str, dict[str, Any]] = field(default_factory=dict)
     initial: str | None = None
     next_initial: str | None = None
     follow_connectors: tuple[str, tuple[str, ...]] | None = None
@@ -68,11 +71,20 @@ class MachineData(ContainerData):
     _kept = (
         "transitions",
         "guards",
+        "constants",
         "initial",
         "next_initial",
         "follow_connectors",
         "connector_outcome",
     )
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy of a constant; the object itself if there is none, as of a device."""
+    try:
+        return deepcopy(value)
+    except Exception:  # noqa: BLE001  the user's class
+        return value
 
 
 class StateMachine(Container):
@@ -124,7 +136,7 @@ class StateMachine(Container):
             **options,
         )
         data = self._smachpy  # reset for a second call of __init__, as in Container
-        data.transitions, data.guards = {}, {}
+        data.transitions, data.guards, data.constants = {}, {}, {}
         data.initial = data.next_initial = data.follow_connectors = None
         problems = Problems(type(self).__name__)
         if reenter not in get_args(Reenter):
@@ -210,6 +222,9 @@ class StateMachine(Container):
         targets, guards = split(transitions, problems)
         given = problems.names_of("transitions", targets, holds, optional=True)
         fixed = problems.mapping("constants", constants, "key of the state -> value")
+        twice = sorted(key for key in fixed if key in (remapping or ()))
+        if twice and not accepts(f"{label}: constants: {twice} are in remapping, too"):
+            problems.add(f"remapping, constants: got {twice} in both; expected each key in one.")
         stored = self._smachpy_store_child(label, state, remapping, problems, fixed)
         label = plain(label)
         if accepting():
@@ -220,6 +235,7 @@ class StateMachine(Container):
         for key, value in fixed.items():
             name = ConstantKey(f"{label}.{key}")
             self.userdata[name] = value
+            self._smachpy.constants.setdefault(label, {})[name] = value
             self._smachpy.remappings[label][key] = name
             stored.register_input_keys([key])
         if self._smachpy.follow_connectors is not None:
@@ -389,11 +405,29 @@ class StateMachine(Container):
                     step.next[outcome] = following(outcome, steps[target])
                 elif (target or outcome) in ends:
                     step.next[outcome] = following(outcome, ends[target or outcome])
+            if label in self._smachpy.constants:
+                self.__restore_constants(label, step)
             guards = self.__cases(label)
             if guards:
                 step.choices = choices_of(guards, steps, ends, step.next, self.userdata)
                 step.forget_choices()
         return plan
+
+    def __restore_constants(self, label: str, step: Step) -> None:
+        """Let each visit begin with those constants that the state itself can change."""
+        names, userdata, execute = self._smachpy.remappings[label], self.userdata, step.execute
+        written = {names.get(key) for key in step.state._smachpy.output_keys}
+        fixed = {
+            name: value for name, value in self._smachpy.constants[label].items() if name in written
+        }
+
+        def begin(window: Any) -> Any:
+            for name, value in fixed.items():
+                userdata[name] = _copied(value)
+            return execute(window)
+
+        if fixed:
+            step.execute = begin
 
     def _smachpy_terminal_labels(self, frame: Frame) -> list[str]:
         return [] if frame.step is None else [frame.step.label]

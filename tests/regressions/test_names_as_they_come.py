@@ -41,6 +41,12 @@ def test_a_constant_that_the_state_does_not_read_is_refused() -> None:
         machine_with(constants={"forse": 3})
 
 
+def test_a_key_that_is_remapped_and_constant_is_refused() -> None:
+    """The constant won, without a word."""
+    with pytest.raises(InvalidStateError, match=r"GRIP: remapping, constants: got \['force'\] in"):
+        machine_with(remapping={"force": "max_force"}, constants={"force": 3})
+
+
 def test_all_kinds_of_containers_refuse_a_remapped_key_that_is_unknown() -> None:
     concurrence = Concurrence(["done"], "done", name="C")
     concurrence.add("GRIP", Grip(), remapping={"forse": "x"})

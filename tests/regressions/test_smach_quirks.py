@@ -57,16 +57,16 @@ def test_a_string_is_no_list_of_outcomes():
 
 
 def test_the_callers_lists_and_dicts_are_never_changed():
-    outcomes, keys, transitions, remapping = ["a"], ["k"], {"a": "done"}, {"k": "m"}
+    outcomes, keys, transitions, remapping = ["a"], ["k", "n"], {"a": "done"}, {"k": "m"}
     state = smach.State(outcomes, io_keys=keys)
     state.register_outcomes(["b"])
     sm = machine()
-    sm.add("A", state, transitions, remapping, constants={"k": 1})
+    sm.add("A", state, transitions, remapping, constants={"n": 1})
     names = ["done"]
     smach.Iterator(names, [], [], exhausted_outcome="exhausted")
     assert (outcomes, keys, transitions, remapping, names) == (
         ["a"],
-        ["k"],
+        ["k", "n"],
         {"a": "done"},
         {"k": "m"},
         ["done"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -152,5 +153,83 @@ def test_programs_for_ros_1_keep_the_way_of_smach() -> None:
     try:
         inner = machine(writes_first_time(), output_keys=["pose"])
         assert twice(inner) == ["at the door", "at the door"]
+    finally:
+        set_accepting(False)
+
+
+def test_a_constant_that_the_state_has_changed_is_whole_at_the_next_visit() -> None:
+    """The gripper was opened a little wider in each round."""
+    seen: list[Any] = []
+
+    def work(userdata: Any) -> str:
+        seen.append((userdata.width, list(userdata.tried)))
+        userdata.width += 1
+        userdata.tried.append(userdata.width)
+        return "again" if len(seen) % 2 else "ok"
+
+    state = CBState(work, outcomes=["again", "ok"], io_keys=["width", "tried"])
+    sm = StateMachine(["ok"], name="M")
+    sm.add("GRIP", state, {"again": "GRIP"}, constants={"width": 3, "tried": []})
+    sm.execute()
+    sm.reset_userdata()
+    sm.execute()
+    assert seen == [(3, [])] * 4
+
+
+def test_a_constant_that_cannot_be_copied_is_given_as_it_is() -> None:
+    device, seen = threading.Lock(), []
+    state = CBState(lambda ud: seen.append(ud.port) or "ok", outcomes=["ok"], io_keys=["port"])
+    sm = StateMachine(["ok"])
+    sm.add("ASK", state, constants={"port": device})
+    sm.execute()
+    assert seen == [device]
+
+
+USED_UP = {
+    "a generator": lambda: (n for n in (1, 2)),
+    "an iterator": lambda: iter([1, 2]),
+    "a map": lambda: map(str, (1, 2)),
+}
+
+
+def rounds(items: Any) -> tuple[Iterator, list[Any]]:
+    done: list[Any] = []
+    child = CBState(lambda ud: done.append(ud.item) or "ok", outcomes=["ok"], input_keys=["item"])
+    made = Iterator([], [], [], items, "item", "ok", name="ROUNDS")
+    made.set_contained_state("CHILD", child)
+    return made, done
+
+
+@pytest.mark.parametrize("kind", USED_UP)
+@pytest.mark.parametrize("given", ["the items", "a function"])
+def test_items_that_a_former_run_has_used_up_are_no_work_that_is_done(
+    kind: str, given: str
+) -> None:
+    """The second round visited no place, and the mission succeeded."""
+    items: Any = USED_UP[kind]()
+    machine, done = rounds(items if given == "the items" else lambda: items)
+    assert machine.execute() == "ok"
+    assert len(done) == 2
+    with pytest.raises(InvalidUserCodeError, match=r"/ROUNDS: items: .* used up; .*Try a list"):
+        machine.execute()
+    machine.set_iteritems(USED_UP[kind](), "item")
+    assert machine.execute() == "ok"
+    assert len(done) == 4
+
+
+@pytest.mark.parametrize("items", [[], range(0), lambda: iter([]), lambda: (n for n in ())])
+def test_no_items_are_no_work_at_each_run(items: Any) -> None:
+    machine, done = rounds(items)
+    assert [machine.execute() for _ in range(3)] == ["ok"] * 3
+    assert done == []
+
+
+@pytest.mark.filterwarnings("ignore::smachpy.base.slips.SlipWarning")
+def test_programs_for_ros_1_are_only_warned_of_items_that_are_used_up() -> None:
+    set_accepting(True)
+    try:
+        machine, done = rounds(iter([1]))
+        assert [machine.execute() for _ in range(2)] == ["ok", "ok"]
+        assert done == [1]
     finally:
         set_accepting(False)

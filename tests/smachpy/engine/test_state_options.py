@@ -373,6 +373,21 @@ def test_exceptions_become_outcomes():
         run(Fails(1, on_exception={OSError: "aborted"}))
 
 
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit, GeneratorExit, object])
+def test_what_ends_a_program_becomes_no_outcome_and_no_other_attempt(kind):
+    """It was accepted, and had no effect."""
+    with pytest.raises(smachpy.InvalidStateError, match="on_exception: got <class"):
+        Fails(1, on_exception={kind: "aborted"})
+    with pytest.raises(smachpy.InvalidStateError, match="retry: on: got"):
+        Fails(1, retry=(3, 0.0, ["aborted", kind]))
+
+
+@pytest.mark.parametrize("kind", [Exception, BaseException, BaseExceptionGroup])
+def test_exceptions_of_all_kinds_become_outcomes(kind):
+    error = ExceptionGroup("two", [ValueError("a"), OSError("b")])
+    assert run(Fails(1, error, on_exception={kind: "aborted"}))[0] == "aborted"
+
+
 def test_exceptions_of_children_become_outcomes_of_the_container():
     inner = smachpy.StateMachine(["ok", "aborted"], on_exception={ValueError: "broken"})
     inner.add("F", Fails(1))
