@@ -121,14 +121,20 @@ def _marks(value: Any, path: str, around: Place) -> Iterator[tuple[str, Place]]:
             yield from _marks(one, f"{path}[{number}]", place)
 
 
-def allow_preempt(part: Part) -> None:
-    """Let all containers end with `preempted`: other tools have it without saying so."""
+def allow_preempt(part: Part, depth: int = 1) -> None:
+    """Let all containers end with `preempted`: other tools have it without saying so.
+
+    Raises:
+        TooMuchError: they are too many in each other.
+    """
+    if depth > MAX_DEPTH:
+        raise TooMuchError(f"got more than {MAX_DEPTH} machines in each other.")
     for kind in ("machine", "concurrence"):
         if kind in part:
-            allow_preempt(part[kind])
+            allow_preempt(part[kind], depth + 1)
     if "states" in part:
         outcomes = part.get("outcomes", [])
         if isinstance(outcomes, list) and "preempted" not in outcomes:
             part["outcomes"] = [*outcomes, "preempted"]
         for entry in part["states"].values():
-            allow_preempt(entry)
+            allow_preempt(entry, depth)

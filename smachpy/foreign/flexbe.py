@@ -6,12 +6,11 @@ Source: flexbe_behavior_engine 4 (https://github.com/FlexBE/flexbe_behavior_engi
 from __future__ import annotations
 
 import ast
-import copy
 from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.foreign.conditions import Conditions
-from smachpy.foreign.draft import MAX_DEPTH, Part, allow_preempt
-from smachpy.foreign.literals import NotPlainError, parse_python, plain, shown
+from smachpy.foreign.draft import Part, allow_preempt
+from smachpy.foreign.literals import Known, NotPlainError, parse_python, plain, shown
 
 if TYPE_CHECKING:
     from smachpy.foreign.draft import Draft, Place
@@ -61,39 +60,10 @@ def _place(node: ast.AST) -> Place:
     return getattr(node, "lineno", 1), getattr(node, "col_offset", 0) + 1
 
 
-class _Known(ast.NodeTransformer):
-    """Puts literals in the places of what a behaviour has given a name."""
-
-    def __init__(self, draft: Draft) -> None:
-        self._draft = draft
-        self.names: dict[str, tuple[ast.expr, int]] = {}
-        self.parameters = Part((1, 1))
-
-    def name(self, name: str, value: ast.expr) -> None:
-        """Give a literal a name."""
-        made = self.visit(copy.deepcopy(value))
-        self.names[name] = made, sum(1 for _ in ast.walk(made))
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        """Return the literal."""
-        made, size = self.names.get(node.id, (node, 1))
-        self._draft.spend(size)  # lists of lists of lists of names grow without end
-        return made
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Return the text that stands for a parameter, and the name of a level of the log."""
-        match node:
-            case ast.Attribute(value=ast.Name(id="self"), attr=name) if name in self.parameters:
-                return ast.Constant(f"${{{name}}}")
-            case ast.Attribute(value=ast.Name(id="Logger"), attr=level):
-                return ast.Constant(level)
-        return node
-
-
 class _Reader:
     def __init__(self, draft: Draft, tree: ast.Module) -> None:
         self._draft = draft
-        self._known = _Known(draft)
+        self._known = Known(draft)
         self._containers: dict[str, tuple[str, Part]] = {}
         self._root = ""
         self._used: set[str] = set()
@@ -120,7 +90,6 @@ class _Reader:
             self._draft.problem(_place(node), f"create: got {self._root or 'none'!r}; {expected}.")
             return
         top = self._containers[self._root][1]
-        self._check_depth(top)
         if self._draft.problems:
             return
         top["name"] = name
@@ -235,16 +204,11 @@ class _Reader:
             text = "the priority of a PriorityContainer: other branches go on meanwhile"
             self._draft.note(_place(call), text)
         if kind == CONCURRENCE:
-            conditions = self._conditions[id(part)] = Conditions(given.get("conditions", []))
-            outcomes = part.get("outcomes")
-            part["default_outcome"] = (
-                outcomes[-1] if isinstance(outcomes, list) and outcomes else ""
-            )
+            conditions = Conditions(self._draft, part.place, given.get("conditions", []))
+            self._conditions[id(part)] = conditions
+            ends = part.get("outcomes")
+            part["default_outcome"] = ends[-1] if isinstance(ends, list) and ends else ""
             part["outcome_map"] = conditions.rules
-            for problem in conditions.problems:
-                self._draft.problem(part.place, problem)
-            for note in conditions.notes:
-                self._draft.note(part.place, note)
         self._containers[name] = (kind, part)
 
     def _fill(self, name: str, body: list[ast.stmt], around: ast.stmt) -> None:
@@ -271,28 +235,21 @@ class _Reader:
                     self._draft.note(_place(statement), f"code: {shown(statement)}")
         if kind == CONCURRENCE:
             ends = {label: self._ends.get(id(one), []) for label, one in part["states"].items()}
-            stops, notes = self._conditions[id(part)].stops(ends)
-            for note in notes:
-                self._draft.note(part.place, note)
+            stops = self._conditions[id(part)].stops(ends)
             if stops:
                 part["stop_others"] = stops
 
     def _connect(self, entry: Part, call: ast.Call, in_concurrence: bool) -> None:
         """Read where a state leads to, and its keys."""
-        levels: dict[str, int] = {}
-        others = []
-        for one in call.keywords:
-            if one.arg == "autonomy" and isinstance(one.value, ast.Dict):
-                for key, value in zip(one.value.keys, one.value.values, strict=True):
-                    name = getattr(value, "attr", "")
-                    levels[str(getattr(key, "value", ""))] = LEVELS.get(name, 0)
-            else:
-                others.append(one)
-        given = self._keywords(ast.Call(func=call.func, args=[], keywords=others))
-        transitions, renamed = given.get("transitions"), given.get("remapping")
+        given = self._keywords(ast.Call(func=call.func, args=[], keywords=call.keywords))
+        transitions, levels = (
+            value if isinstance(value, dict) else {}
+            for value in (given.get("transitions"), given.get("autonomy"))
+        )
+        renamed = given.get("remapping")
         on = Part(_place(call))
-        for outcome, target in (transitions if isinstance(transitions, dict) else {}).items():
-            level = levels.get(outcome, 0)
+        for outcome, target in transitions.items():
+            level = LEVELS.get(str(levels.get(outcome)), 0)
             if level > 0 and in_concurrence:
                 text = f"the autonomy level of {outcome!r}, inside a concurrence"
                 self._draft.note(_place(call), text)
@@ -339,17 +296,3 @@ class _Reader:
         if arguments:
             entry["with"] = arguments
         return entry
-
-    def _check_depth(self, top: Part) -> None:
-        level, depth = [top], 0
-        while level and depth <= MAX_DEPTH:
-            depth += 1
-            entries = [entry for part in level for entry in part["states"].values()]
-            level = [
-                entry[kind]
-                for entry in entries
-                for kind in ("machine", "concurrence")
-                if kind in entry
-            ]
-        if level:
-            self._draft.problem(top.place, f"got more than {MAX_DEPTH} machines in each other.")

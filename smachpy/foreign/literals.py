@@ -7,7 +7,12 @@ import copy
 import json
 import re
 import warnings
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+from smachpy.foreign.draft import Part
+
+if TYPE_CHECKING:
+    from smachpy.foreign.draft import Draft
 
 LONGEST: Final = 60
 """Longest text of another file in a note [characters]."""
@@ -32,7 +37,36 @@ def parse_python(source: str | bytes) -> ast.Module:
         return ast.parse(source)
 
 
-def plain(node: ast.expr, known: ast.NodeTransformer | None = None) -> Any:
+class Known(ast.NodeTransformer):
+    """Puts literals in the places of what a behaviour of FlexBE has given a name."""
+
+    def __init__(self, draft: Draft) -> None:
+        self._draft = draft
+        self.names: dict[str, tuple[ast.expr, int]] = {}
+        self.parameters = Part((1, 1))
+
+    def name(self, name: str, value: ast.expr) -> None:
+        """Give a literal a name."""
+        made = self.visit(copy.deepcopy(value))
+        self.names[name] = made, sum(1 for _ in ast.walk(made))
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Return the literal."""
+        made, size = self.names.get(node.id, (node, 1))
+        self._draft.spend(size)  # lists of lists of lists of names grow without end
+        return made
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Return the text that stands for a parameter, and the name of a level."""
+        match node:
+            case ast.Attribute(value=ast.Name(id="self"), attr=name) if name in self.parameters:
+                return ast.Constant(f"${{{name}}}")
+            case ast.Attribute(value=ast.Name(id="Logger" | "Autonomy"), attr=level):
+                return ast.Constant(level)
+        return node
+
+
+def plain(node: ast.expr, known: Known | None = None) -> Any:
     """Return the data that an expression of Python writes down.
 
     Args:
