@@ -147,3 +147,9 @@ def test_the_command_has_the_option(tmp_path, capsys, autonomy, said):
     path.write_text(FILE)
     main(["run", str(path), "--time", "virtual", "--plain", *autonomy])
     assert said in "".join(capsys.readouterr())
+
+
+def test_a_mission_that_is_killed_before_while_or_after_it_asks_goes_the_same_way():
+    found = explore(machine, faults=["kill"])
+    found.assert_ok()
+    assert found.exhaustive
