@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.base.problems import Problems
+from smachpy.base.problems import name_of as name_of_code
 from smachpy.engine.child import run_child
 from smachpy.engine.preempt import ask_child, asking, choose
 from smachpy.engine.visit import Override, Why
 from smachpy.events import Jumped
 from smachpy.events.introspection import TransitionRecord
+from smachpy.exceptions import did_you_mean, error_text
 from smachpy.machines.container import Container, control_of
 from smachpy.machines.guards import when
 from smachpy.machines.history import forget, remember
@@ -95,6 +97,7 @@ class Modes(StateMachine):
         super().__init__(["preempted"], name=name, userdata=userdata, **options)
         table = self.__table = Table(states, transitions, initial, emergency)
         self.__listen = tuple(listen)
+        _check_sources(self.__listen, {event for _, event in table.ways})
         self.__emergency = emergency
         self.__frame: Frame | None = None  # of the run whose events are taken
         self.__mode = table.initial
@@ -121,6 +124,9 @@ class Modes(StateMachine):
         Raises:
             ModesError: it has conditions, or a mode is unknown.
         """
+        if not hasattr(machine, "states") or not hasattr(machine, "events"):
+            problem = f"machine: got {machine!r}; expected one of the package 'transitions'."
+            raise ModesError([problem])
         given, known = missions or {}, list[str]()
         states = states_of(machine, given, known)
         unknown = [name for name in given if name not in known]
@@ -362,6 +368,26 @@ def _condition(way: Way) -> Callable[[Any], bool]:
     return holds
 
 
+def _check_sources(sources: Iterable[Any], events: Iterable[str]) -> None:
+    """Check that each source is one, and that its event is in the table.
+
+    Raises:
+        ModesError: all problems.
+    """
+    problems = []
+    known = sorted(events)
+    for source in sources:
+        event = getattr(source, "event", None)  # others may have several
+        if not callable(getattr(source, "open", None)):
+            expected = "expected on_topic(...), on_service(...) or on_signal(...)"
+            problems.append(f"listen: got {source!r}; {expected}.")
+        elif isinstance(event, str) and event not in known:
+            near = did_you_mean(event, known)
+            problems.append(f"listen: got event {event!r}; expected one of {known}.{near}")
+    if problems:
+        raise ModesError(problems)
+
+
 def _mission(name: str, mission: Any) -> State:
     """Return the machine that a mode runs."""
     if isinstance(mission, (str, Path)):
@@ -369,7 +395,11 @@ def _mission(name: str, mission: Any) -> State:
 
         return load(mission)
     if not isinstance(mission, State) and callable(mission):
-        mission = mission()
+        try:
+            mission = mission()
+        except Exception as error:
+            text = f"{name}: mission: got {name_of_code(mission)}, which raised {error_text(error)}"
+            raise ModesError([f"{text}; expected a function that returns a machine."]) from error
     problems = Problems(f"Modes: {name}")
     if not isinstance(mission, Container):
         problems.add(f"mission: got {mission!r}; expected a machine, a function, or a file.")

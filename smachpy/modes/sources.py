@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from actionlib_core.clock import RealClock
 from actionlib_core.inputs.expression import Expression
 from smachpy.base import log
+from smachpy.modes.table import ModesError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -95,7 +96,10 @@ def on_topic(topic: str, msg_type: Any, event: str, when: str = "") -> Source:
 
     Raises:
         ExpressionError: `when` cannot be parsed.
+        ModesError: `msg_type` is no class.
     """
+    if not isinstance(msg_type, type):
+        raise ModesError([f"on_topic: msg_type: got {msg_type!r}; expected a class of messages."])
     return _Topic(topic, msg_type, event, Expression(when) if when else None)
 
 
@@ -110,6 +114,16 @@ def on_service(name: str, event: str) -> Source:
 def on_signal(number: signal.Signals | int, event: str) -> Source:
     """Return a source: a signal of the process, such as `signal.SIGUSR1`, triggers an event.
 
+    Raises:
+        ModesError: it is no signal, or one that no program gets.
+
     Threads: only modes that run in the main thread get signals.
     """
-    return _Signal(signal.Signals(number), event)
+    try:
+        known = signal.Signals(number)
+    except ValueError:
+        known = signal.SIGKILL
+    if known in {signal.SIGKILL, signal.SIGSTOP}:
+        expected = "expected a signal that a program gets, such as signal.SIGUSR1"
+        raise ModesError([f"on_signal: got {number!r}; {expected}."])
+    return _Signal(known, event)

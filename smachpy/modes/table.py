@@ -100,6 +100,11 @@ class Table:
         self.modes: dict[str, Mode] = {}
         self._firsts: dict[str, str] = {}  # a mode with modes in it -> its first one
         self._around: dict[str, set[str]] = {}  # a mode -> those that it is in
+        for what, given in (("states", states), ("transitions", transitions)):
+            if isinstance(given, (str, Mapping)) or not isinstance(given, Iterable):
+                self.problems.append(f"{what}: got {given!r}; expected a list.")
+        if self.problems:
+            raise ModesError(self.problems)
         plain = [self._add(state, "") for state in states]
         rows = [row for row in map(self._row, transitions) if row is not None]
         known = {*self.modes, *self._firsts}
@@ -136,8 +141,11 @@ class Table:
             self.problems.append(f"states: got {name!r}; expected a new name, without '/'.")
         children = given.get("children")
         if not children:
-            resume = bool(given.get("resume", False))
-            self.modes[name] = Mode(name, given.get("mission"), resume)
+            resume = given.get("resume", False)
+            if not isinstance(resume, bool):
+                problem = f"{name}: resume: got {resume!r}; expected True or False."
+                self.problems.append(problem)
+            self.modes[name] = Mode(name, given.get("mission"), bool(resume))
             return given["name"]
         if given.get("mission") is not None:
             self.problems.append(f"{name}: got a mission and children; expected one of them.")
@@ -161,7 +169,7 @@ class Table:
         if isinstance(row, Sequence) and not isinstance(row, str) and len(row) in {3, 4}:
             row = dict(zip(keys, row, strict=False))
         fits = isinstance(row, Mapping) and {"trigger", "source", "dest"} <= row.keys() <= {*keys}
-        if not fits or not isinstance(row["trigger"], str) or not isinstance(row["dest"], str):
+        if not fits or not all(row[key] and isinstance(row[key], str) for key in keys[::2]):
             self.problems.append(
                 f"transitions: got {row!r}; expected trigger, source, dest and maybe when."
             )
@@ -173,7 +181,12 @@ class Table:
                 "modes in a list, or '*'."
             )
             return None
-        when = str(row.get("when") or "")
+        when = row.get("when") or ""
+        if not isinstance(when, str):
+            self.problems.append(
+                f"transition {row['trigger']!r}: when: got {when!r}; expected an expression."
+            )
+            return None
         try:
             _ = Expression(when) if when else None
         except ExpressionError as error:

@@ -542,11 +542,37 @@ def test_a_way_is_not_for_a_mode_whose_name_only_begins_with_that_of_its_source(
         (["a"], [["x", ["a", 3], "a"]], "transition 'x': source: got"),
         ([{"name": "a", "children": [3]}], [], "states: got 3"),
         ([{"name": "a", "children": "bc"}], [], "a: children: got 'bc'"),
+        ("idle", [], "states: got 'idle'; expected a list"),
+        (None, 5, "states: got None; expected a list. transitions: got 5"),
+        (["a"], [["", "a", "a"]], "transitions: got {'trigger': ''"),
+        (["a"], [["x", "a", "a", 5]], "transition 'x': when: got 5; expected an expression"),
+        ([{"name": "a", "resume": "yes"}], [], "a: resume: got 'yes'; expected True or False"),
+        ([{"name": "a", "mission": lambda: 1 // 0}], [], "a: mission: got .* which raised"),
     ],
 )
 def test_what_no_table_can_hold_is_refused(states, rows, problem):
     with pytest.raises(ModesError, match=problem):
         Modes(states, rows)
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: 5, "listen: got 5"),
+        (lambda: on_service("s", "strat"), "listen: got event 'strat'; .* Did you mean 'start'"),
+        (lambda: on_signal(signal.SIGKILL, "start"), "on_signal: got <Signals.SIGKILL: 9>"),
+        (lambda: on_signal("USR1", "start"), "on_signal: got 'USR1'; expected a signal"),
+        (lambda: on_topic("t", "std_msgs/Bool", "start"), "msg_type: got 'std_msgs/Bool'"),
+    ],
+)
+def test_what_is_no_source_of_an_event_is_refused(make, problem):
+    with pytest.raises(ModesError, match=problem):
+        Modes(["a", "b"], [["start", "a", "b"]], listen=[make()])
+
+
+def test_what_is_no_machine_of_transitions_is_refused():
+    with pytest.raises(ModesError, match="machine: got 5; expected one of the package"):
+        Modes.from_machine(5)
 
 
 # -- random modes, random missions -------------------------------------------------------------
