@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.clock import Clock
     from actionlib_core.node import Node
 
 What: TypeAlias = Literal[
@@ -32,6 +33,7 @@ What: TypeAlias = Literal[
     "own",
     "asked",
     "once",
+    "said",
 ]
 
 
@@ -45,15 +47,17 @@ class Crossing(NamedTuple):
             program itself; "request", "response": of a
             service that the program calls; "absent": a wait for a service was in vain; "own": a
             service is called in the program that offers it; "asked": a request to a service that
-            the program offers; "once": a call of `smachpy.once` by the state `name` returned.
+            the program offers; "once": a call of `smachpy.once` by the state `name` returned;
+            "said": the condition of the state `name` said something else of a message than of
+            the one before.
         name: Full name of the action, topic or service.
         type: Its type.
         key: The goal's id, the number of the subscriber or call, or the session of an action's
-            client or server.
+            client or server; the topic of what is said.
         t: When, by the node's clock [s].
         node: Full name of the node.
         value: The message, or None.
-        state: Name of a goal's status, or of the class of an error.
+        state: Name of a goal's status, or of the class of an error; what is said, yes or no.
         text: The status text, or that of the error.
     """
 
@@ -91,6 +95,32 @@ def listen(listener: Listener) -> Callable[[], None]:
         listeners = tuple(one for one in listeners if one is not listener)
 
     return leave
+
+
+class Verdicts:
+    """Tells the listeners what a state's condition says of messages, whenever that changes.
+
+    Args:
+        path: Path of the state.
+        topic: The topic.
+        clock: Of the run.
+    """
+
+    def __init__(self, path: str, topic: str, clock: Clock) -> None:
+        self._path = path
+        self._topic = topic
+        self._clock = clock
+        self._last: bool | None = None
+
+    def note(self, message: Any, verdict: bool) -> None:
+        """Tell what is said of a message."""
+        if listeners and verdict != self._last:
+            self._last = verdict
+            kind, said = getattr(message, "_type", ""), "yes" if verdict else "no"
+            now = self._clock.now()
+            crossing = Crossing("said", self._path, kind, self._topic, now, "", message, said)
+            for listener in listeners:
+                listener(crossing)
 
 
 def tell(

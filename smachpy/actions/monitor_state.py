@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from actionlib_core import border
 from actionlib_core.pubsub.topic import NotingSubscriber
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.base import log
+from smachpy.base.context import current_path
 from smachpy.base.problems import Problems, name_of, no_coroutine
 from smachpy.engine.frame import current_scope
 from smachpy.events import CallbackFailed
@@ -109,6 +111,7 @@ class MonitorState(State):
 
     def __watch(self, ud: Any, wake: Wakeup, waiting: deque[Any]) -> str:
         clock = wake.clock
+        verdicts = border.Verdicts(current_path() or "", self.__topic, clock)
         until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
         good = 0
         while True:
@@ -120,7 +123,10 @@ class MonitorState(State):
             if not waiting:
                 wake.wait_until(until)
                 continue
-            if not self.__check(ud, waiting.popleft()):
+            message = waiting.popleft()
+            is_good = self.__check(ud, message)
+            verdicts.note(message, is_good)
+            if not is_good:
                 return "invalid"
             good += 1
             if good == self.__max_checks:

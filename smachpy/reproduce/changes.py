@@ -24,12 +24,18 @@ def changes(recording: Recording, record: StateRecord, code: dict[str, Any]) -> 
     """
     yield from _first(_of_machine(recording.record, record))
     before = (recording.origin or {}).get("code", {})
-    yield from _first(_of_values(before.get("constants", {}), code["constants"]))
+    # Of a module that is not loaded, because the mission is another file now, nothing is known.
+    was_ = {
+        key: value
+        for key, value in before.get("constants", {}).items()
+        if key.rpartition(".")[0] in code["files"]
+    }
+    yield from _first(_of_values(was_, code["constants"]))
     yield from _first(_of_files(before.get("files", {}), code["files"]))
     yield from _first(_of_values(before.get("versions", {}), code["versions"]))
     was, is_ = before.get("commit", ""), code["commit"]
     if was and was != is_:
-        yield f"commit {is_[:10]} now, was {was[:10]}"
+        yield f"commit {is_[:10] or 'unknown'} now, was {was[:10]}"
 
 
 def _first(found: Iterator[str]) -> Iterator[str]:

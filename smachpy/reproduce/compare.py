@@ -6,8 +6,11 @@ compared for itself, and the difference that came first counts.
 
 from __future__ import annotations
 
+import json
+import re
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.inputs.suggest import did_you_mean
@@ -15,7 +18,7 @@ from smachpy.command.evidence import NOTE
 from smachpy.userdata.shown import literal
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from smachpy.events.introspection import StateRecord
 
@@ -28,7 +31,7 @@ FIELDS: Final[dict[str, tuple[str, ...]]] = {
     "PreemptRequested": ("source",),
     "Preempted": ("label",),
     "Abandoned": (),
-    "TimedOut": (),
+    "TimedOut": ("timeout",),
     "Retried": ("attempt", "reason"),
     "Iterated": ("number",),
     "Noted": ("text",),
@@ -54,6 +57,20 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 GOES_ON_S: Final = 0.5
 """A state that ends later than recorded by more than this goes on [s]."""
 
+_BY_LIMIT: Final = 0.5
+"""A limit counts if the time has changed by so much of the limit's change."""
+
+_REMAPPED_S: Final = 0.6
+"""A state that reads other keys may take another time: it counts from half of this [s]."""
+
+_NEAR_S: Final = 600.0
+"""A value is a moment of the clock if it is nearer to now than this [s]."""
+
+_SHORT: Final = 60
+"""Of longer values that differ, only the parts that differ are shown [characters]."""
+
+_ENDS: Final = frozenset({"Left", "Retried", "QuestionAnswered"})
+_LIMIT: Final = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _PARALLEL: Final = frozenset({"concurrence", "plan"})
 _STAMPS: Final = frozenset({"stamp", "seq"})  # of headers: they are of the time, not of the run
 
@@ -68,6 +85,9 @@ class Step:
         kind, path: Of the event.
         facts: The fields that are compared.
         lane: The branch in which it happened, "" for the trunk.
+        took: How long the attempt took that it ends [s].
+        index: Number among all events, from 0.
+        t: When, by the mission's clock [s].
     """
 
     number: int
@@ -76,24 +96,41 @@ class Step:
     path: str
     facts: tuple[tuple[str, Any], ...]
     lane: str
+    took: float = 0.0
+    index: int = 0
+    t: float = 0.0
+
+    def is_same(self, other: Step) -> bool:
+        """Whether two steps are the same; so are moments of two clocks that are as far away."""
+        if self.sameness == other.sameness:
+            return True
+        then, now = dict(self.facts).get("value"), dict(other.facts).get("value")
+        if self.kind != "UserdataWritten" or not (
+            isinstance(then, float) and isinstance(now, float)
+        ):
+            return False
+        here, there = then - self.t, now - other.t
+        is_time = max(abs(here), abs(there)) < _NEAR_S and abs(self.t - other.t) > 2 * _NEAR_S
+        same_facts = {**dict(self.facts), "value": now} == dict(other.facts)
+        return is_time and self.path == other.path and same_facts and abs(here - there) < 1.0
 
     @property
     def sameness(self) -> Any:
         """Equal for equal steps."""
         return self.kind, self.path, self.facts
 
-    def words(self) -> str:
-        """Return the step in words for people."""
+    def words(self, after: str = "") -> str:
+        """Return the step in words for people, `after` which time."""
         facts = {
             key: literal(value) if not isinstance(value, str) else value
             for key, value in self.facts
         }
-        place = self.path.partition("/")[2].partition("/")[2] or self.path.strip("/")
+        where = place(self.path)
         said = _SAID.get(self.kind, self.kind)
         try:
-            return f"{place}  {said.format(**facts)}"
+            return f"{where}  {said.format(**facts)}{after}"
         except (KeyError, ValueError):
-            return f"{place}  {self.kind} {facts}"
+            return f"{where}  {self.kind} {facts}"
 
 
 _SAID: Final = {
@@ -105,7 +142,7 @@ _SAID: Final = {
     "PreemptRequested": "is asked to stop ({source})",
     "Preempted": "is preempted",
     "Abandoned": "does not stop, and is left behind",
-    "TimedOut": "runs into its timeout",
+    "TimedOut": "runs into its timeout of {timeout} s",
     "Retried": "is tried again after attempt {attempt}: {reason}",
     "Iterated": "takes item {number}",
     "Noted": "notes {text!r}",
@@ -119,6 +156,36 @@ _SAID: Final = {
     "GoalSent": "sends {action} {goal}",
     "GoalDone": "{action} is {status}, result {result}, cancelled: {cancelled}",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a condition says of a message; see `actionlib_core.border.Verdicts`."""
+
+    t: float
+    path: str
+    topic: str
+    value: Any
+    state: str
+    after: int
+
+
+@dataclass(frozen=True, slots=True)
+class Odd:
+    """Something that differs and is no event of the run.
+
+    Attributes:
+        at: When [s after the begin].
+        path: Path of the state, or of the machine.
+        recorded, now: What happened then and now, in words.
+        after: Number of events of the run before it.
+    """
+
+    at: float
+    path: str
+    recorded: str
+    now: str
+    after: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,12 +248,18 @@ def steps_of(
     left_out = {kind for name in tolerate for kind in GROUPS.get(name, ())}
     found: list[Step] = []
     began: float | None = None
-    for event in events:
+    begins: dict[str, float] = {}  # of the present attempts of states
+    for index, event in enumerate(events):
         kind, path, t = event["kind"], event["path"], event.get("t", 0.0)
         began = t if began is None else began
+        took = t - begins.get(path, t)
+        if kind in {"Entered", "Retried"}:
+            begins[path] = t
         names = FIELDS.get(kind)
-        if names is None or kind in left_out or _is_tolerated(event, tolerate):
+        if names is None or kind in left_out or is_tolerated(event, tolerate):
             continue
+        if kind == "UserdataWritten" and _is_progress(event.get("value")):
+            continue  # it is shown to people, and tells of times
         if kind == "Noted" and path == record.path and str(event.get("text")).startswith(NOTE):
             continue  # of the evidence that there was, and not of the run
         facts = {name: _plain(event.get(name)) for name in names}
@@ -195,9 +268,8 @@ def steps_of(
         if "cancelled" in facts:
             facts["cancelled"] = event.get("goal_id") in cancelled
         number = len(found) + 1
-        found.append(
-            Step(number, t - began, kind, path, tuple(facts.items()), _lane(path, parallel))
-        )
+        lane, at = _lane(path, parallel), t - began
+        found.append(Step(number, at, kind, path, tuple(facts.items()), lane, took, index, t))
     return found
 
 
@@ -217,13 +289,48 @@ def unknown_tolerated(
     ]
 
 
-def _is_tolerated(event: Mapping[str, Any], tolerate: Collection[str]) -> bool:
+def is_tolerated(event: Mapping[str, Any], tolerate: Collection[str]) -> bool:
+    """Whether a name of `tolerate` leaves out an event."""
     path = event["path"]
     for name in tolerate:
         word = name.strip("/")
         if event.get("key") == word or f"{path}/".endswith(f"/{word}/") or f"/{word}/" in path:
             return True
     return False
+
+
+def _is_progress(value: Any) -> bool:
+    return isinstance(value, dict) and value.get("$object") == "Progress"
+
+
+def limit_changes(old: StateRecord, new: StateRecord) -> dict[str, list[float]]:
+    """Return by how much the numbers in the details of states have changed: path -> changes.
+
+    These are limits: timeouts, waits, pauses before another attempt. A state with another
+    remapping may have another limit, too.
+    """
+    before = {state.path: state for state in old.walk()}
+    found: dict[str, list[float]] = {}
+    for state in new.walk():
+        then = before.get(state.path)
+        if then is None:
+            continue
+        if then.remapping != state.remapping:
+            found[state.path] = [_REMAPPED_S, -_REMAPPED_S]
+        details = dict(then.details)
+        for key, text in state.details:
+            was, is_ = (_LIMIT.findall(one) for one in (details.get(key, ""), text))
+            changed = [float(b) - float(a) for a, b in zip(was, is_, strict=False) if a != b]
+            if changed:
+                found.setdefault(state.path, []).extend(changed)
+    return found
+
+
+def _follows(then: Step, now: Step, limits: Mapping[str, Collection[float]]) -> bool:
+    """Whether a state took longer or shorter as a limit of it has become."""
+    later = now.took - then.took
+    changes = limits.get(then.path, ()) if then.kind in _ENDS else ()
+    return any(later / change > _BY_LIMIT for change in changes)
 
 
 def _plain(value: Any) -> Any:
@@ -238,8 +345,69 @@ def _lane(path: str, parallel: Iterable[str]) -> str:
     return f"{above}/{path.removeprefix(above).split('/')[1]}" if above else ""
 
 
+def odd_verdicts(
+    inputs: Iterable[Mapping[str, Any]], said: Iterable[Said], began: float
+) -> Iterator[Odd]:
+    """Yield the messages of which a condition says something else than in the recording.
+
+    Args:
+        inputs: What is recorded.
+        said: What is said now.
+        began: When this run began [s].
+    """
+    known: defaultdict[str, dict[str, set[str]]] = defaultdict(dict)
+    now = list(said)
+    if not now:
+        return
+    paths = {one.path for one in now}
+    before: dict[str, Mapping[str, Any]] = {}
+    messages: list[Mapping[str, Any]] = []
+    for one in inputs:
+        if one["what"] == "message":
+            messages.append(one)
+        elif one["what"] == "said" and one["name"] in paths:
+            path, last = one["name"], before.get(one["name"])
+            if last is not None:  # it said the same of the messages between the two
+                topic = f"/{one['key'].strip('/')}"
+                for message in messages:
+                    if (
+                        last["t"] <= message["t"] < one["t"]
+                        and f"/{message['name']}".endswith(topic)
+                        and message.get("value") != one.get("value")
+                    ):
+                        _add(known[path], message, last["state"])
+            _add(known[path], one, one["state"])
+            before[path] = one
+    for one_ in now:
+        then = known[one_.path].get(_text_of(one_.value), set())
+        if then and one_.state not in then:
+            shown = f"to {one_.topic} {literal(_plain(one_.value))}"
+            was, is_ = (
+                f"{place(one_.path)}  says {one} {shown}" for one in (min(then), one_.state)
+            )
+            yield Odd(one_.t - began, one_.path, was, is_, one_.after)
+
+
+def _add(known: dict[str, set[str]], one: Mapping[str, Any], said: str) -> None:
+    known.setdefault(_text_of(one.get("value")), set()).add(said)
+
+
+def _text_of(value: Any) -> str:
+    return json.dumps(_plain(value), sort_keys=True)
+
+
+def place(path: str) -> str:
+    """Return the path of a state as it is told to people: without the machine."""
+    return path.partition("/")[2].partition("/")[2] or path.strip("/")
+
+
 def compare(
-    recorded: Sequence[Step], now: Sequence[Step], *, is_complete: bool = True
+    recorded: Sequence[Step],
+    now: Sequence[Step],
+    *,
+    is_complete: bool = True,
+    limits: Mapping[str, Collection[float]] = MappingProxyType({}),
+    odds: Iterable[Odd] = (),
 ) -> Comparison:
     """Compare a run with its recording.
 
@@ -247,13 +415,35 @@ def compare(
         recorded: The recorded steps.
         now: Those of the run.
         is_complete: The recording has the end of the run: nothing may follow.
+        limits: What `limit_changes` returns: a state that takes another time for it differs.
+        odds: What differs besides the steps.
     """
     ours, theirs = _lanes(now), _lanes(recorded)
-    found: list[tuple[float, int, Difference]] = []
+    found: list[tuple[float, float, Difference]] = []
+    for odd in odds:
+        known = (lane for lane in theirs if f"{odd.path}/".startswith(f"{lane}/"))
+        lane = max(known, key=len, default="")
+        old, new = theirs.get(lane, []), ours.get(lane, [])
+        at = sum(step.index < odd.after for step in new)
+        number = 1 + (old[at - 1].number if 0 < at <= len(old) else 0)
+        one = Difference(
+            number,
+            odd.at,
+            odd.path,
+            tuple(step.words() for step in new[max(0, at - 2) : at]),
+            odd.recorded,
+            odd.now,
+            tuple(step.words() for step in old[at : at + 1]),
+            tuple(step.words() for step in new[at : at + 1]),
+        )
+        # It is the cause of what follows at that moment.
+        found.append((odd.at, number - 0.5, one))
     for lane in {**theirs, **ours}:
         old, new = theirs.get(lane, []), ours.get(lane, [])
         pairs = enumerate(zip(old, new, strict=False))
-        differs = (n for n, (then, now_) in pairs if then.sameness != now_.sameness)
+        differs = (
+            n for n, (then, now_) in pairs if not then.is_same(now_) or _follows(then, now_, limits)
+        )
         at = next(differs, min(len(old), len(new)))
         if at == len(old) and (at == len(new) or not is_complete):
             continue
@@ -273,19 +463,54 @@ def _lanes(steps: Iterable[Step]) -> dict[str, list[Step]]:
     return found
 
 
+def _apart(then: Any, now: Any) -> tuple[Any, Any]:
+    """Return two values with only the fields that differ, if they are long."""
+    if not (isinstance(then, dict) and isinstance(now, dict)):
+        return then, now
+    if max(len(literal(then)), len(literal(now))) <= _SHORT:
+        return then, now
+    left: tuple[dict[str, Any], dict[str, Any]] = ({}, {})
+    for key in dict.fromkeys([*then, *now]):
+        is_name = key.startswith("$") or not isinstance(then.get(key), dict | list)
+        if then.get(key) == now.get(key) and not (is_name and _is_kept(key)):
+            continue
+        parts = _apart(then.get(key), now.get(key))
+        for one, value, part in zip(left, (then, now), parts, strict=True):
+            if key in value:
+                one[key] = part
+    return left
+
+
+def _is_kept(key: str) -> bool:
+    """Whether a field that is the same is shown: the kind of a value, and what a step names."""
+    return key.startswith("$") or key in {"action", "key", "status", "cancelled"}
+
+
 def _difference(old: list[Step], new: list[Step], at: int, when: float) -> Difference:
     then = old[at] if at < len(old) else None
     now = new[at] if at < len(new) else None
     known = then or now
     assert known is not None
-    place = known.words().partition("  ")[0]
+    where = place(known.path)
+    goes_on = f"{where}  goes on", f"{where}  nothing of that"
     then_words = "ended before" if then is None else then.words()
-    if now is not None and (then is None or now.at <= then.at + GOES_ON_S):
+    if then is not None and now is not None and then.is_same(now):
+        then_words = then.words(f" after {then.took:.1f} s")
+        now_words = now.words(f" after {now.took:.1f} s")
+    elif now is not None and (
+        then is None or now.at <= then.at + GOES_ON_S or then.kind == now.kind == "TimedOut"
+    ):
         now_words = now.words()
+        if then is not None and (then.kind, then.path) == (now.kind, now.path):
+            apart = _apart(dict(then.facts), dict(now.facts))
+            then_words, now_words = (
+                replace(step, facts=tuple(facts.items())).words()
+                for step, facts in zip((then, now), apart, strict=True)
+            )
     elif then is not None and then.kind in {"Left", "GoalDone", "Finished", "PreemptRequested"}:
-        now_words = f"{place}  goes on"
+        now_words = goes_on[0]
     else:
-        now_words = f"{place}  nothing of that"
+        now_words = goes_on[1]
     return Difference(
         number=known.number,
         at=when,
@@ -295,7 +520,8 @@ def _difference(old: list[Step], new: list[Step], at: int, when: float) -> Diffe
         now=now_words,
         recorded_next=tuple(step.words() for step in old[at + 1 : at + 2]),
         now_next=tuple(
-            step.words() for step in new[at + (now is not None and now.words() == now_words) :][:1]
+            step.words()
+            for step in new[at + (now is not None and not now_words.startswith(goes_on)) :][:1]
         ),
         later=new[at - 1].at - old[at - 1].at if at else 0.0,
     )

@@ -17,9 +17,12 @@ from smachpy.engine.control import ControlError
 from smachpy.engine.preempt import asking
 from smachpy.events import Entered, Left, PreemptRequested, QuestionAsked, Started
 from smachpy.events.inputs import message_value
+from smachpy.events.introspection import describe
+from smachpy.reproduce.compare import Odd, Said, place
 from smachpy.reproduce.world import is_outline
 from smachpy.testing.servers import Reply
 from smachpy.userdata.json_text import decoded
+from smachpy.userdata.shown import literal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -33,7 +36,10 @@ if TYPE_CHECKING:
     from smachpy.testing.servers import ScriptedActionServer, ScriptedService
 
 STEP_S: Final = 1.0
-"""The run and its recording drift apart by less than this from one event to the next [s]."""
+"""The run gets later than its recording by less than this from one event to the next [s]."""
+
+NEAR_S: Final = 5.0
+"""Of branches that call one service, each gets its own answer if the calls are so near [s]."""
 
 LATER_S: Final = 0.001
 """A request to stop comes so much later, unless the run makes it itself meanwhile [s]."""
@@ -61,6 +67,10 @@ class Aligned:
             if event["kind"] in {"Started", "Entered", "Left"}:
                 self._times[event["kind"], event["path"]].append(event["t"])
         self._seen: Counter[tuple[str, str]] = Counter()
+        self._left = sorted(  # what has not happened yet, the next one last
+            ((t, key, n) for key, times in self._times.items() for n, t in enumerate(times)),
+            reverse=True,
+        )
         self._offset: float | None = None
         self.moved = self._clock.event("the run to come to the next recorded event")
 
@@ -74,8 +84,13 @@ class Aligned:
         if number >= len(times):
             return
         offset = event.t - times[number]
-        # A run that has taken another way is late or early by more: it keeps the time of the run.
-        if self._offset is None or abs(offset - self._offset) < STEP_S:
+        while self._left and self._left[-1][2] < self._seen[self._left[-1][1]]:
+            self._left.pop()
+        # Code that computed then takes no time now. But a run that has taken another way, and left
+        # something out or does something else, keeps its time.
+        is_on_the_way = not self._left or self._left[-1][0] > times[number] - STEP_S
+        later = 0.0 if self._offset is None else offset - self._offset
+        if abs(later) < STEP_S or (later < 0.0 and is_on_the_way):
             is_earlier = self._offset is None or offset < self._offset - 1e-6
             self._offset = offset
             if is_earlier:
@@ -99,7 +114,10 @@ class Player:
 
     Attributes:
         problems: What could not be played, in words.
-        cancelled: Ids of the goals of this run that were cancelled.
+        said: What conditions said of messages.
+        odd_requests: Requests to services that differ from the recorded ones; `at` is a moment of
+            this run.
+        count: Number of events until now.
     """
 
     def __init__(self, kit: MissionKit, world: World, events: list[dict[str, Any]]) -> None:
@@ -117,7 +135,11 @@ class Player:
         self._asked: list[tuple[float, tuple[str, str, str]]] = []  # requests to stop of the run
         self._subscribers: Counter[str] = Counter()
         self._subscribed = kit.clock.event("a subscriber of the recording")
-        self._count = -1
+        self.said: list[Said] = []
+        self.odd_requests: list[Odd] = []
+        self._published: Counter[str] = Counter()
+        self._entered: dict[str, int] = {}  # path -> number of the event
+        self.count = 0
         self._machine: Container
 
     def open(self) -> None:
@@ -179,6 +201,17 @@ class Player:
             self.problems.append(f"{where}: {error}")
             return None
 
+    def note_request(self, name: str, recorded: Any, now: Any) -> None:
+        """Note that a service is asked something else than then."""
+        states = [
+            state.path
+            for state in describe(self._machine).walk()
+            if f"/{name}".endswith(f"/{dict(state.details).get('service', ' ').strip('/')}")
+        ]
+        path = max(states, key=lambda one: self._entered.get(one, -1), default="")
+        then, is_ = (f"{place(path)}  asks {name} {literal(one)}" for one in (recorded, now))
+        self.odd_requests.append(Odd(self._clock.now(), path, then, is_, self.count))
+
     def wait_until(self, t: float) -> None:
         """Wait until a moment of the recording."""
         self._aligned.wait_until(t)
@@ -202,9 +235,11 @@ class Player:
 
     def _on_event(self, event: Event) -> None:
         self._aligned.on_event(event)
-        self._count += 1
-        if self._count in self._world.pauses:
+        if self.count in self._world.pauses:
             self._machine.control.pause()
+        if isinstance(event, Entered):
+            self._entered[event.path] = self.count
+        self.count += 1
         if isinstance(event, QuestionAsked):
             self._questions[event.path] = event.service
         elif isinstance(event, PreemptRequested):
@@ -216,11 +251,24 @@ class Player:
         if crossing.what == "subscriber":
             self._subscribers[crossing.name] += 1
             self._subscribed.set()
+        elif crossing.what == "said":
+            value = message_value(crossing.value)
+            said = Said(crossing.t, crossing.name, crossing.key, value, crossing.state, self.count)
+            self.said.append(said)
+        elif crossing.what == "published":
+            number, self._published[crossing.name] = (
+                self._published[crossing.name],
+                self._published[crossing.name] + 1,
+            )
+            # Nothing is locked there, and the clock is virtual: it may wait.
+            joined = self._world.own.get(crossing.name, [])
+            if number < len(joined):  # the mission talks to itself
+                self._wait_for_subscribers(crossing.name, joined[number])
 
-    def _wait_for_subscriber(self, act: Act) -> None:
-        """Wait until the one is there that got the message; not for ever: it may never come."""
+    def _wait_for_subscribers(self, name: str, count: int) -> None:
+        """Wait until those are there that got the message; not for ever: they may never come."""
         until = self._clock.now() + STEP_S
-        while self._subscribers[act.name] < act.subscribers and self._clock.now() < until:
+        while self._subscribers[name] < count and self._clock.now() < until:
             self._subscribed.wait(until - self._clock.now())
             self._subscribed.clear()
 
@@ -234,7 +282,7 @@ class Player:
 
     def _do(self, act: Act) -> None:
         if act.what == "message":
-            self._wait_for_subscriber(act)
+            self._wait_for_subscribers(act.name, act.subscribers)
             message = self.value(act.value, act.name)
             if message is not None and act.name in self._publishers:
                 self._publishers[act.name].publish(message)
@@ -457,8 +505,11 @@ class _Service:
     def _answer(self, request: Any) -> Any:
         clock = self._player.clock
         value = message_value(request)
-        same = next((call for call in self._left if call.request == value), None)
+        near = self._left[0].t + NEAR_S if self._left else 0.0
+        same = next((one for one in self._left if one.request == value and one.t <= near), None)
         call = same or (self._left[0] if self._left else None)
+        if call is not None and same is None and not is_outline(call.request):
+            self._player.note_request(self._name, call.request, value)
         if call is None:
             self._player.problems.append(f"{self._name}: one request more than the recording has")
             raise RuntimeError("the recording has no such request")

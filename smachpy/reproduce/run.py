@@ -6,7 +6,7 @@ import contextlib
 import json
 import random
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core import border
@@ -23,7 +23,14 @@ from smachpy.events.code import code_facts
 from smachpy.events.introspection import describe
 from smachpy.exceptions import MissionError, SmachError, error_text
 from smachpy.reproduce.changes import changes
-from smachpy.reproduce.compare import compare, steps_of, unknown_tolerated
+from smachpy.reproduce.compare import (
+    compare,
+    is_tolerated,
+    limit_changes,
+    odd_verdicts,
+    steps_of,
+    unknown_tolerated,
+)
 from smachpy.reproduce.play import Player
 from smachpy.reproduce.world import first_run, world_of
 from smachpy.testing.kit import MissionKit
@@ -40,7 +47,7 @@ if TYPE_CHECKING:
     from smachpy.events.introspection import StateRecord
     from smachpy.events.recording import Recording
     from smachpy.machines.container import Container
-    from smachpy.reproduce.compare import Comparison
+    from smachpy.reproduce.compare import Comparison, Odd
     from smachpy.reproduce.world import World
 
 LONGER_S: Final = 60.0
@@ -184,6 +191,8 @@ def reproduce(
         steps_of(events, recording.record, recorded_cancels(world), tolerate),
         steps_of(now, record, cancelled, tolerate),
         is_complete=world.is_complete,
+        limits=limit_changes(recording.record, record),
+        odds=_odds(recording, player, now, tolerate),
     )
     is_same = comparison.difference is None
     unknown = unknown_tolerated(tolerate, (recording.record, record), (*events, *now))
@@ -204,6 +213,17 @@ def reproduce(
         events=now,
         record=record,
     )
+
+
+def _odds(
+    recording: Recording, player: Player, now: list[dict[str, Any]], tolerate: Collection[str]
+) -> list[Odd]:
+    """Return what differs besides the events."""
+    began = next((event["t"] for event in now if "t" in event), 0.0)
+    odds = list(odd_verdicts(recording.inputs, player.said, began))
+    if "goals" not in tolerate:
+        odds += [replace(one, at=one.at - began) for one in player.odd_requests]
+    return [one for one in odds if not is_tolerated({"path": one.path}, tolerate)]
 
 
 def first_line(error: BaseException) -> str:

@@ -177,6 +177,8 @@ class World:
         actions: Full name -> action.
         services: Full name -> service.
         topics: Full name -> whether its messages are latched.
+        own: Topic on which the mission publishes -> how many subscribers it had had when each of
+            these messages was published.
         acts: Everything else, in order.
         pauses: Numbers, among the run's events, of those after which an operator paused it.
         breakpoints: Paths of states before which it stopped.
@@ -190,6 +192,7 @@ class World:
     actions: dict[str, RecordedAction] = field(default_factory=dict)
     services: dict[str, RecordedService] = field(default_factory=dict)
     topics: dict[str, bool] = field(default_factory=dict)
+    own: dict[str, list[int]] = field(default_factory=dict)
     acts: list[Act] = field(default_factory=list)
     pauses: set[int] = field(default_factory=set)
     breakpoints: set[str] = field(default_factory=set)
@@ -402,6 +405,7 @@ def _add_messages(world: World, inputs: list[dict[str, Any]]) -> None:
             joined[one["name"]] += 1
         elif what == "published":
             own[one["name"]].append((one["t"], one.get("value")))
+            world.own.setdefault(one["name"], []).append(joined[one["name"]])
         elif what == "message":
             heard[key] += 1
             name, value, t = one["name"], one.get("value"), one["t"]

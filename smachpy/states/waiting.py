@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core import border
 from smachpy.base import log
 from smachpy.base.context import current_path
 from smachpy.base.problems import Problems
@@ -71,13 +72,17 @@ class AwaitMessage(State):
         came: list[Any] = []
         errors: list[BaseException] = []
         count = 0
-        wake = clock_of_run().event(f"a message on {self.__topic}")
+        clock = clock_of_run()
+        wake = clock.event(f"a message on {self.__topic}")
+        verdicts = border.Verdicts(current_path() or "", self.__topic, clock)
 
         def on_message(message: Any) -> None:
             nonlocal count
             count += 1
             try:
-                if self.__wanted is None or self.__wanted(message):
+                is_wanted = self.__wanted is None or bool(self.__wanted(message))
+                verdicts.note(message, is_wanted)
+                if is_wanted:
                     came.append(message)
             except BaseException as error:  # noqa: BLE001  raised in the state's thread
                 errors.append(error)
@@ -138,3 +143,9 @@ class Wait(State):
         """Wait; a preempt ends it early."""
         seconds = userdata.seconds if self.__seconds is None else self.__seconds
         return "preempted" if State.sleep(self, seconds) else "done"
+
+    def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
+        """Add the time."""
+        kind, details = super().describe_details()
+        waits = () if self.__seconds is None else (("waits", f"{self.__seconds:g} s"),)
+        return kind, (*waits, *details)

@@ -19,9 +19,13 @@ from hypothesis import HealthCheck, given, settings
 import smachpy
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
+from actionlib_core.interfaces.std_msgs.msg import Bool
+from actionlib_core.interfaces.std_srvs.srv import SetBool
 from smachpy import CBState, StateMachine
 from smachpy.command import main
+from smachpy.events.introspection import describe
 from smachpy.events.recording import Recorder, read_recording
+from smachpy.reproduce.compare import compare, steps_of
 from smachpy.reproduce.report import lines_of
 from smachpy.reproduce.run import ReproductionError, reproduce
 from smachpy.testing import mission_kit
@@ -802,3 +806,136 @@ def test_the_new_run_is_recorded_and_programs_learn_where_the_two_part(night, tm
         places = [str(path)] if more else [str(path), str(today)]
         assert main([*words[:2], *places, *words[3:], *more]) == 2
         assert "--record: got" in capsys.readouterr().err
+
+
+DOOR = """
+import smachpy
+from actionlib_core.interfaces.std_msgs.msg import Bool
+from actionlib_core.interfaces.std_srvs.srv import SetBool, SetBoolRequest
+from smachpy.states import AwaitMessage, Wait
+
+
+class Late(smachpy.State):
+    def __init__(self):
+        super().__init__(["done", "preempted"], timeout=3.0, timeout_outcome="late")
+
+    def execute(self, userdata):
+        return "preempted" if self.sleep(60.0) else "done"
+
+
+def mission():
+    sm = smachpy.StateMachine(
+        ["done", "aborted", "preempted"], name="DOOR", userdata={"short": 0.0, "long": 5.0}
+    )
+    ask = smachpy.ServiceState("door/set", SetBool, request=SetBoolRequest(data=True), timeout=5.0)
+    with sm:
+        sm.add("OPEN", ask, {"succeeded": "WAIT"})
+        sm.add(
+            "WAIT",
+            AwaitMessage("door/open", Bool, lambda message: message.data, timeout=20.0),
+            {"came": "REST", "timeout": "aborted"},
+        )
+        sm.add("REST", Wait(), {"done": "SLEEP"}, {"seconds": "short"})
+        sm.add("SLEEP", Wait(2.0), {"done": "HANG"})
+        sm.add("HANG", Late(), {"done": "aborted", "late": "LOOK"})
+        sm.add("LOOK", AwaitMessage("nothing", Bool, timeout=8.0), {"timeout": "done", "came": "done"})
+    return sm
+"""
+
+WITHOUT_ANOTHER_PATH = [
+    # what is changed without another path, outcome or goal, and what is said of that
+    ("message.data,", "not message.data,", "WAIT  says no to door/open Bool()", "WAIT  says yes"),
+    ("SetBoolRequest(data=True)", "SetBoolRequest()", "OPEN  asks door/set", "OPEN  asks door/set"),
+    ("Wait(2.0)", "Wait(2.5)", "SLEEP  done after 2.0 s", "SLEEP  done after 2.5 s"),
+    ("timeout=3.0", "timeout=2.5", "HANG  runs into its timeout of 3.0 s", "timeout of 2.5 s"),
+    ("timeout=8.0", "timeout=9.0", "LOOK  timeout after 8.0 s", "LOOK  timeout after 9.0 s"),
+    ('"seconds": "short"', '"seconds": "long"', "REST  done after 0.0 s", "REST  done after 5.0 s"),
+    ("timeout=20.0", "timeout=30.0", "", ""),  # which the run never came near
+]
+
+
+@pytest.mark.parametrize(("old", "new", "then", "now"), WITHOUT_ANOTHER_PATH)
+def test_a_change_that_leaves_the_path_is_found_too(tmp_path, capsys, old, new, then, now):
+    from smachpy.command.targets import load_target
+
+    file, path = tmp_path / "door_mission.py", tmp_path / "run.jsonl"
+    file.write_text(DOOR)
+    with mission_kit() as kit:
+        kit.service_server("door/set", SetBool).reply({"success": True})
+        door = kit.topic("door/open", Bool)
+        door.publish_at(0.5, data=False)
+        door.publish_at(3.5, data=True)
+        machine = load_target(str(file)).build()
+        with Recorder(path, machine, origin={"target": str(file)}):
+            kit(machine)
+    assert old in DOOR
+    file.write_text(DOOR.replace(old, new))
+    code = main(["runs", "reproduce", str(path), f"--allow={file}"])
+    out = capsys.readouterr().out
+    assert code == (1 if then else 0), out
+    if then:
+        recorded = next(line for line in out.splitlines() if line.startswith("  recorded"))
+        present = next(line for line in out.splitlines() if line.startswith("  now"))
+        assert then in recorded
+        assert now in present
+        assert recorded != present
+        assert "is gone" not in out
+
+
+def numbered(values, begin):
+    events = [{"kind": "Entered", "path": "/M/A", "t": begin}]
+    for number, value in enumerate(values):
+        written = {"kind": "UserdataWritten", "path": "/M/A", "key": "due", "value": value}
+        events.append({**written, "t": begin + number})
+    return steps_of(events, describe(smachpy.StateMachine(["done"], name="M")), ())
+
+
+def test_moments_of_two_clocks_are_the_same_if_they_are_as_far_away():
+    recorded = numbered([13_700.5, 13_701.5], 13_700.0)
+    assert compare(recorded, numbered([0.3, 1.4], 0.0)).difference is None
+    assert compare(recorded, numbered([0.3, 9.4], 0.0)).difference.number == 3
+    assert compare(numbered([0.5], 13_700.0), numbered([0.4], 0.0)).difference.number == 2
+
+
+def test_what_is_shown_of_the_progress_is_not_compared():
+    text = {"$object": "Progress", "fields": {"fraction": 0.1, "seconds_left": 9.0, "text": "a"}}
+    assert compare(numbered([text, text], 0.0), numbered([text], 0.0)).difference is None
+
+
+class Computes(smachpy.State):
+    """Takes ten seconds that it neither sleeps nor waits."""
+
+    def __init__(self):
+        super().__init__(["done"])
+
+    def execute(self, userdata):
+        if ENVIRONMENT.environ.get("SLOW_COMPUTER"):
+            self.sleep(10.0)
+        return "done"
+
+
+def computing():
+    sm = StateMachine(["valid", "invalid", "aborted", "preempted"], name="COMPUTING")
+    with sm:
+        sm.add("COMPUTE", Computes(), {"done": "LOOK"})
+        look = smachpy.MonitorState(
+            "battery", BatteryState, lambda _, message: message.percentage < 0.5, 1, timeout=5.0
+        )
+        sm.add("LOOK", look)
+    return sm
+
+
+def test_code_that_computed_for_long_takes_no_time_and_what_follows_comes_earlier(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / "run.jsonl"
+    monkeypatch.setenv("SLOW_COMPUTER", "1")
+    with mission_kit() as kit:
+        kit.topic("battery", BatteryState).publish_at(13.0, percentage=0.4)
+        machine = computing()
+        with Recorder(path, machine):
+            assert kit(machine).outcome == "valid"
+    monkeypatch.delenv("SLOW_COMPUTER")
+    found = reproduce(read_recording(path), make=computing)
+    assert found.is_same, lines_of(found)
+    assert found.events[-1]["t"] - found.events[0]["t"] < 4.0
