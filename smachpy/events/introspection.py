@@ -206,9 +206,12 @@ class StateRecord:
 
     def walk(self) -> Iterator[StateRecord]:
         """Yield this record and all below it, parents first."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        # Without recursion: each record would pass through the generators of all above it.
+        left = [self]
+        while left:
+            record = left.pop()
+            yield record
+            left += reversed(record.children)
 
     def to_json(self, *, indent: int | None = None) -> str:
         """Return the record as JSON text."""

@@ -117,5 +117,31 @@ def test_properties_grow_with_the_machine(what: str) -> None:
     assert slope(ring, lambda machine: smachpy.check(machine, properties=[what])) < 1.2
 
 
+def test_a_walk_over_nested_machines_visits_each_once() -> None:
+    def nested(depth: int) -> StateMachine:
+        machine = chain(1)
+        for _ in range(depth):
+            outer = StateMachine(["done", "preempted"])
+            outer.add("IN", machine)
+            machine = outer
+        return machine
+
+    def turns(depth: int) -> int:
+        record, calls = smachpy.describe(nested(depth)), [0]
+
+        def count(_frame: Any, event: str, _arg: Any) -> None:
+            calls[0] += event == "call"  # a generator that goes on counts, too
+
+        before = sys.getprofile()
+        sys.setprofile(count)
+        try:
+            assert sum(1 for _ in record.walk()) == depth + 2
+        finally:
+            sys.setprofile(before)
+        return calls[0]
+
+    assert turns(80) < 2.5 * turns(40)
+
+
 def test_drawing_as_text_grows_with_the_machine(tmp_path: Path) -> None:
     assert slope(chain, lambda machine: smachpy.render(machine, tmp_path / "m.txt")) < 1.2
