@@ -1004,14 +1004,12 @@ class SqlStore(ABC):
             *(mission, last, zlib.crc32(snapshot), snapshot),
         )
         self._do(cursor, "DELETE FROM smachpy_entries WHERE mission = ? AND n <= ?", mission, last)
-        self._do(cursor, "SELECT digest FROM smachpy_blobs WHERE mission = ?", mission)
-        unused = [row[0] for row in cursor.fetchall() if row[0] not in kept]
-        if unused:
-            self._do_many(
-                cursor,
-                "DELETE FROM smachpy_blobs WHERE mission = ? AND digest = ?",
-                ((mission, digest) for digest in unused),
-            )
+        named = kept or ("",)  # PostgreSQL refuses an empty list
+        self._do(
+            cursor,
+            f"DELETE FROM smachpy_blobs WHERE mission = ? AND digest NOT IN ({_places(named)})",
+            *(mission, *named),
+        )
 
     def _may_take(self, held: Sequence[Any], now: float) -> bool:
         """Return whether a mission may be taken, by its columns `_HELD`."""

@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import pytest
 
+import smachpy
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import StoreError, open_store
+from smachpy.durable.store import StoreError, digest_of, open_store
 from smachpy.exceptions import MissionError
 from tests.free_port import free_port
 from tests.smachpy.durable.test_stores import LONG_S, ROW
@@ -357,24 +358,64 @@ def test_a_server_that_keeps_away_is_told(postgres_server, postgres_url):
 
 
 @pytest.mark.postgres
+def test_a_transaction_waits_two_or_three_times_for_the_server(postgres_url, monkeypatch):
+    import psycopg
+
+    store = open_store(postgres_url)
+    machine = smachpy.StateMachine(["done"], name="ERRAND")
+    machine.add("CARRY", smachpy.CBState(lambda _: "done", outcomes=["done"]))
+    smachpy.run_durable(machine, store, mission="m1")
+    execute, sent = psycopg.Cursor.execute, []
+
+    def counted(cursor, query, *arguments, **more):
+        sent.append(query)
+        return execute(cursor, query, *arguments, **more)
+
+    monkeypatch.setattr(psycopg.Cursor, "execute", counted)
+    smachpy.run_durable(machine, store, mission="m2")
+    assert len(sent) <= 13
+    assert sum(query.endswith("COMMIT") for query in sent) == 6
+    store.close()
+
+
+@pytest.mark.postgres
+@pytest.mark.parametrize("length", [10, 1 << 21])
+def test_long_values_are_kept_as_short_ones_are(postgres_url, length):
+    with contextlib.closing(open_store(postgres_url)) as store:
+        shape = b"s" * length
+        row, lease = store.start(replace(ROW, structure=shape), this_runner(), seconds=LONG_S)
+        assert store.mission(row.id).structure == shape
+        entry, value = b"\x00'\\%s" * (length // 6), b"\xff" * length
+        store.append(lease, [entry, b"b"], blobs={digest_of(value): value})
+        assert store.read(row.id) == (None, [entry, b"b"])
+        assert store.blob(row.id, digest_of(value)) == value
+        store.append(lease, [b"c"], snapshot=entry, kept=[digest_of(value)])
+        assert store.read(row.id) == (entry, [])
+        assert store.blob(row.id, digest_of(value)) == value
+        store.append(lease, [b"d"], snapshot=b"")
+        with pytest.raises(StoreError, match="is missing"):
+            store.blob(row.id, digest_of(value))
+
+
+@pytest.mark.postgres
 def test_an_answer_that_was_lost_is_no_second_entry(server_store, monkeypatch):
     import psycopg
 
     lease = server_store.claim("m1", this_runner(), seconds=LONG_S)
     server_store.append(lease, [b"a"])
-    execute = psycopg.Connection.execute
+    execute = psycopg.ClientCursor.execute
     lost = []
 
-    def loses_answer(connection, query, *arguments):
+    def loses_answer(cursor, query, *arguments):
         """The server commits, but the connection is gone before its answer is here."""
-        answer = execute(connection, query, *arguments)
-        if query == "COMMIT" and not lost:
+        answer = execute(cursor, query, *arguments)
+        if query.endswith("COMMIT") and not lost:
             lost.append(query)
-            connection.close()
+            cursor.connection.close()
             raise psycopg.OperationalError("server closed the connection unexpectedly")
         return answer
 
-    monkeypatch.setattr(psycopg.Connection, "execute", loses_answer)
+    monkeypatch.setattr(psycopg.ClientCursor, "execute", loses_answer)
     server_store.append(lease, [b"b", b"c"])
     assert lost
     assert server_store.read("m1") == (None, [b"a", b"b", b"c"])
