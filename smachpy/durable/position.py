@@ -183,6 +183,11 @@ class Position:
             "finished": False,
             "outcome": None,
         }
+        # Path -> the paths one level below that have a visit or a marking, or something below them.
+        # So the end of a branch does not look at all that run beside it.
+        self._below: dict[str, dict[str, None]] = {}
+        for path in (*self.visits, *self.markings):
+            self._link(path)
 
     def check(self) -> None:
         """Check all facts: a file may come from a stranger.
@@ -296,11 +301,29 @@ class Position:
 
     def _end_below(self, path: str) -> None:
         """Drop the visits and markings below a state that has ended or begins anew."""
-        below = f"{path}/"
-        for facts in (self.visits, self.markings):
-            for each in [each for each in facts if each.startswith(below)]:
-                del facts[each]
+        left = [*self._below.pop(path, ())]
+        while left:
+            each = left.pop()
+            self.visits.pop(each, None)
+            self.markings.pop(each, None)
+            left += self._below.pop(each, ())
         self.markings.pop(path, None)
+
+    def _link(self, path: str) -> None:
+        """Note a path below those above it."""
+        while path:
+            parent = path.rpartition("/")[0]
+            beside = self._below.setdefault(parent, {})
+            if path in beside:
+                break
+            beside[path] = None
+            path = parent
+
+    def _drop(self, path: str) -> None:
+        """Drop the visit of a state."""
+        del self.visits[path]
+        if not self._below.get(path):
+            self._below.get(path.rpartition("/")[0], {}).pop(path, None)
 
     def _serve(self, container: str) -> None:
         visit = self.visits.get(container)
@@ -308,6 +331,7 @@ class Position:
             visit["served"] = [*visit.get("served", []), *visit.pop("requests")][-MAX_REQUESTS:]
 
     def _begin(self, path: str, container: str, stamp_ns: int, number: int | None = None) -> None:
+        self._link(path)
         self.visits[path] = {
             "in": container,
             "since_ns": stamp_ns,
@@ -350,13 +374,13 @@ class Position:
         if entry.get("served"):
             self._serve(visit["in"])
         if visit.get("stopping"):
-            del self.visits[path]
+            self._drop(path)
             if visit.get("again"):
                 self._begin(path, visit["in"], entry["stamp_ns"])
         elif following is None:  # not followed yet: a resumed run enters the child for its outcome
             visit.update(outcome=entry["outcome"], goal=None, once={})
         else:
-            del self.visits[path]
+            self._drop(path)
             self._begin(following, visit["in"], entry["stamp_ns"])
 
     def _keep_end(self, path: str, visit: Mapping[str, Any], entry: Mapping[str, Any]) -> None:
@@ -409,6 +433,7 @@ class Position:
             self.visits[path]["met"] = True
 
     def _on_fired(self, entry: Mapping[str, Any]) -> None:
+        self._link(entry["path"])
         self.markings[entry["path"]] = entry["marking"]
         for path in entry["ends"]:
             visit = self.visits.get(path)
@@ -416,7 +441,7 @@ class Position:
                 visit["stopping"] = True
                 visit.pop("again", None)
             elif visit is not None:
-                del self.visits[path]
+                self._drop(path)
         for path in entry["begins"]:
             visit = self.visits.get(path)
             # One run of an action at a time: it begins once the one that is stopping has ended.
@@ -499,6 +524,7 @@ class Position:
     def _on_finished(self, entry: Mapping[str, Any]) -> None:
         self.visits.clear()
         self.markings.clear()
+        self._below.clear()
         self.data.update(finished=True, outcome=entry["outcome"])
 
     _FOLD: ClassVar[dict[str, Callable[[Position, Mapping[str, Any]], None]]] = {

@@ -178,8 +178,8 @@ class Recorder(RunJournal):
         }
         self._knowledge: dict[str, Any] = {}  # path of a plan -> its conditions and events
         self._known_changes: dict[str, int] = {}  # path of a plan -> its changes that were written
-        # Container -> child -> keys that it writes while it runs, side by side with others.
-        self._writes: dict[str, dict[str, frozenset[str]]] = {}
+        # Container -> key -> the children that write it while they run, side by side with others.
+        self._writers: dict[str, dict[str, set[str]]] = {}
         # Path -> key -> the value, and its JSON, or the digest of a long one, as last written.
         self._known: dict[str, dict[str, tuple[Any, str]]] = {}
         for path, container in self._containers.items():
@@ -286,10 +286,9 @@ class Recorder(RunJournal):
         written = None if step is None else set(getattr(step.userdata, "_output", {}).values())
         data = dict(data_of(userdata))  # a copy, as other branches may write at the same time
         known = self._known.setdefault(path, {})
-        others = self._written_by_others(frame.path, child)
         changed: dict[str, Any] = {}
         for key, value in data.items():
-            if key in others:
+            if self._is_written_by_others(frame.path, key, child):
                 continue
             before = known.get(key)
             if before is not None and before[0] is value:
@@ -303,21 +302,23 @@ class Recorder(RunJournal):
             if before is None or before[1] != short:
                 changed[key] = self._journal.compact(encoded, text)
             known[key] = (value, short)
-        gone = [key for key in known if key not in data and key not in others]
+        gone = [
+            key
+            for key in known
+            if key not in data and not self._is_written_by_others(frame.path, key, child)
+        ]
         for key in gone:
             del known[key]
         found: dict[str, Any] = {"userdata": {path: changed}} if changed else {}
         return {**found, "deleted": {path: gone}} if gone else found
 
-    def _written_by_others(self, container: str, child: str) -> frozenset[str]:
-        """Return the keys that only siblings of a child write that run now."""
-        visits, writes = self._journal.position.visits, self._writes.get(container, {})
-        found: frozenset[str] = frozenset()
-        for each, keys in writes.items():
-            visit = visits.get(each)
-            if each != child and visit is not None and visit["outcome"] is None:
-                found |= keys
-        return found - writes.get(child, frozenset()) if found else found
+    def _is_written_by_others(self, container: str, key: str, child: str) -> bool:
+        """Return whether only siblings of a child write a key that run now."""
+        writers = self._writers.get(container, {}).get(key)
+        if not writers or child in writers:
+            return False
+        found = map(self._journal.position.visits.get, writers)
+        return any(visit is not None and visit["outcome"] is None for visit in found)
 
     def _is_kept(self, path: str, key: str, value: object) -> bool:
         """Return whether a key is kept; constants come from the machine's code."""
@@ -433,9 +434,10 @@ class Recorder(RunJournal):
         """Note what a leaf writes while others run beside it; a container does so as it ends."""
         kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
         if kind in {"concurrence", "plan"} and not isinstance(step.state, Container):
-            keys = frozenset(getattr(step.userdata, "_output", {}).values())
             with self._journal.lock:
-                self._writes.setdefault(frame.path, {})[path] = keys
+                writers = self._writers.setdefault(frame.path, {})
+                for key in getattr(step.userdata, "_output", {}).values():
+                    writers.setdefault(key, set()).add(path)
 
     def _held_outcome(
         self, step: Step, visit: dict[str, Any] | None, outcome: str | None
@@ -605,12 +607,18 @@ class Recorder(RunJournal):
         # that this child writes.
         callbacks = frame.data.start_cbs
         self._write_with(frame, None if callbacks else step, "Left", path, facts)
+        if frame.path in self._writers:
+            with self._journal.lock:
+                for key in getattr(step.userdata, "_output", {}).values():
+                    self._writers[frame.path].get(key, set()).discard(path)
         return outcome
 
     # -- the position before the resume --------------------------------------------------------
 
     def _children(self, path: str) -> list[str]:
         """Return the paths of a container's children that have not been entered again."""
+        if path not in self._containers:
+            return []
         # `tuple`: other branches take their visits out at the same time.
         return [each for each, visit in tuple(self._unresumed.items()) if visit["in"] == path]
 

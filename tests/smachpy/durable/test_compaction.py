@@ -7,7 +7,9 @@ import itertools
 import smachpy
 from smachpy.durable import journal
 from smachpy.durable.journal import SNAPSHOT_EVERY, read_position
+from smachpy.durable.position import Position
 from smachpy.durable.store import open_store
+from tests.smachpy.checks.test_growth import lines_run
 
 STEPS = 5 * SNAPSHOT_EVERY // 2
 
@@ -60,3 +62,28 @@ def test_a_large_value_that_changes_in_each_state_does_not_fill_the_disk(tmp_pat
     assert smachpy.run_durable(machine, store) == "done"
     assert max(sizes) < 2_000_000
     store.close()
+
+
+def test_the_end_of_a_branch_looks_at_no_other_branch():
+    def turns(branches):
+        position, stamps = Position(), itertools.count(1)
+
+        def fold(kind, path, **facts):
+            position.fold({"kind": kind, "path": path, "stamp_ns": next(stamps), **facts})
+
+        fold("Started", "/BOTH")
+        paths = [f"/BOTH/B{number}" for number in range(branches)]
+        for path in paths:
+            fold("Entered", path, **{"in": "/BOTH", "beside": True})
+            fold("Entered", f"{path}/S", **{"in": path})
+
+        def end():
+            fold("Left", paths[0], outcome="done")
+            fold("Entered", paths[0], **{"in": "/BOTH", "beside": True})
+
+        end()
+        assert f"{paths[0]}/S" not in position.visits
+        assert f"{paths[1]}/S" in position.visits
+        return lines_run(end)
+
+    assert turns(3) == turns(300)
