@@ -1,10 +1,10 @@
-"""Services of ROS 1: serves each `NAME`; each line of standard input `SERVICE BOOL` is a call,
+"""Services of ROS 1: serves each `NAME`, as SetBool or, if it clears something, Empty; each line of standard input `SERVICE BOOL` is a call,
 `SERVICE persistent` two on one connection."""
 
 import sys
 
 import rospy
-from std_srvs.srv import SetBool, SetBoolResponse
+from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 
 rospy.init_node("ros_services")
 
@@ -15,7 +15,14 @@ def handle(request):
     return SetBoolResponse(True, "by ROS 1")
 
 
-services = [rospy.Service(name, SetBool, handle) for name in sys.argv[1:]]
+def clear(_request):
+    return EmptyResponse()
+
+
+services = [
+    rospy.Service(name, Empty, clear) if "clear" in name else rospy.Service(name, SetBool, handle)
+    for name in sys.argv[1:]
+]
 print("ready", flush=True)
 for line in sys.stdin:
     name, value = line.split()
