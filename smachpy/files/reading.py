@@ -7,6 +7,7 @@ Nothing of the user's code is imported for that. What the file names as `module:
 from __future__ import annotations
 
 import inspect
+import os
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -193,6 +194,11 @@ class _Pending:
     origin: Origin = field(default_factory=lambda: Origin("plan", ""))
 
 
+def _real(path: Path) -> Path:
+    """Return where a path leads; `Path.resolve` raises RuntimeError for a link to itself."""
+    return Path(os.path.realpath(path))
+
+
 class _Reader:
     def __init__(
         self,
@@ -210,7 +216,7 @@ class _Reader:
         self._own: OwnStates | None = None
         self._notes: tuple[tuple[int, str], ...] = ()
         self._path, self._folder, self._allow = path, folder, allow
-        self._around = (*around, path.resolve())
+        self._around = (*around, _real(path))
         self._values: dict[str, Any] = {}
         self.file = CheckedFile(path, self._error, self._parse)
 
@@ -776,7 +782,7 @@ class _Reader:
 
     def _inside(self, name: str) -> Path:
         try:
-            path = (self._path.parent / name).resolve()
+            path = _real(self._path.parent / name)
             there = path.is_file()
         except (OSError, ValueError) as error:  # too long, or with a zero byte
             raise MissionError(f"got a name of no file: {error_text(error)}") from error

@@ -215,6 +215,14 @@ def test_a_problem_of_a_state_has_the_place_of_its_value(file, state, problem):
     assert [one[: len(problem)] for one in found] == [problem]
 
 
+def test_a_link_to_itself_is_no_file(tmp_path, file):
+    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
+    (problem,) = problems_of(file("outcomes: [done]\nstates: {A: {mission: loop.yaml}}\n"))
+    assert problem.startswith("2:14: states.A.mission: got 'loop.yaml', which is no file")
+    with pytest.raises(MissionFileError, match="symbolic links"):
+        load(tmp_path / "loop.yaml")
+
+
 def test_bytes_that_are_no_text_have_their_line(tmp_path):
     path = tmp_path / "latin.yaml"
     path.write_bytes("outcomes: [done]\nhelp: Fährt\n".encode("latin-1"))
