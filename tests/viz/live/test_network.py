@@ -14,6 +14,7 @@ from smachpy import IntrospectionServer, State, StateMachine
 from smachpy.events import buffer
 from smachpy.events.introspection import describe
 from smachpy.network import feed
+from smachpy.network.remote_control import CommandError
 from smachpy_viz.live.machines import Machine, Machines
 from smachpy_viz.live.network import Network
 
@@ -274,6 +275,41 @@ def test_machines_of_two_networks_are_told_apart(clock, watch):
     server.stop()
     desk.close()
     robot.close()
+
+
+@pytest.fixture
+def left_alone(clock):
+    """A viewer that knew two robots of one name, of which "robot" was killed and "robot (2)" stays.
+
+    Yields the viewer and the job of the one that stays.
+    """
+    network = MemoryNetwork(clock)
+    gone, stays, desk = (
+        Node(name, transport=network.session(), clock=clock) for name in ("gone", "stays", "desk")
+    )
+    viewer = Network(desk, Machines(), control=True)
+    servers = []
+    for node in (gone, stays):
+        job = spinning(1)
+        servers.append(IntrospectionServer("robot", job, "/JOB", node=node, control=True))
+        servers[-1].start()
+        clock.sleep(2.0)
+    gone.transport.kill()
+    clock.sleep(2.0)
+    yield viewer, job
+    viewer.close()
+    servers[1].stop()
+    desk.close()
+    stays.close()
+
+
+def test_a_command_to_a_machine_that_is_gone_reaches_no_other_one_of_its_name(left_alone):
+    viewer, stays = left_alone
+    with pytest.raises(CommandError, match="robot: the machine is gone"):
+        viewer.send("robot", {"command": "pause"})
+    assert not stays.control.is_paused()
+    viewer.send("robot (2)", {"command": "pause"})
+    assert stays.control.is_paused()
 
 
 def test_the_end_of_a_run_that_arrives_after_its_program_has_gone_is_shown(clock):

@@ -143,24 +143,15 @@ class Network:
         """Send a command to a machine and return the answer.
 
         Raises:
-            CommandError: there is no such machine, or there are two; the command is wrong; or there
-                is no answer.
+            CommandError: there is no such machine, it is gone, or there are two; the command is
+                wrong; or there is no answer.
 
         Blocks: until the answer, a few seconds at most.
         """
-        link = self._link(name)
-        if command.get("command") == "answer":  # each question has a service of its own
-            return link.answer(command)
-        # Commands go to a service named after the machine, which its namesake has too.
-        with self._lock:
-            links = list(self._links.values())
-        twins = [one for one in links if one.alive and one.is_twin(link)]
-        if len(twins) > 1:
-            raise CommandError(
-                f"{name}: got {len(twins)} machines with the name {link.server!r}, which would all "
-                "get the command; expected one. Give each its own name or namespace."
-            )
-        return link.send(command)
+        # Each question has a service of its own.
+        if command.get("command") == "answer":
+            return self._link(name).answer(command)
+        return self._alone(name).send(command)
 
     def value(self, name: str, container: str, key: str) -> str:
         """Return the present value of a userdata key, unabridged.
@@ -187,6 +178,21 @@ class Network:
             link, known = self._links.get(name), sorted(self._links)
         if link is None:
             raise CommandError(f"{name}: no such machine; expected one of {known}.")
+        return link
+
+    def _alone(self, name: str) -> Link:
+        """The link to a machine that has its services' names, which have no session, to itself."""
+        link = self._link(name)
+        with self._lock:
+            links = list(self._links.values())
+        if not link.alive:  # a namesake would answer
+            raise CommandError(f"{name}: the machine is gone; expected one that is there.")
+        twins = [one for one in links if one.alive and one.is_twin(link)]
+        if len(twins) > 1:
+            raise CommandError(
+                f"{name}: got {len(twins)} machines with the name {link.server!r}, which would all "
+                "get the command; expected one. Give each its own name or namespace."
+            )
         return link
 
     def _on_presence(self, node: Node, presence: Presence) -> None:
