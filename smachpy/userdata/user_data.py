@@ -14,7 +14,7 @@ import types
 import typing
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from smachpy.base.context import current_path
+from smachpy.base.context import current_frame, current_path
 from smachpy.base.slips import accepts
 from smachpy.exceptions import InvalidStateError, UserDataKeyError, UserDataTypeError
 from smachpy.userdata.readonly import ATOMS, read_only, still_shows, writable
@@ -166,6 +166,20 @@ class UserData:
             self._data,
             path=current_path(),
         ) from None
+
+
+def _hint_above(name: str) -> str:
+    """Return what to try if a container above the one that runs here has a value of this key."""
+    frame = current_frame()
+    path = "" if frame is None else frame.path
+    while frame is not None and name not in frame.data.input_keys:
+        above = frame.parent
+        # The top has the root as its own container.
+        is_other = above is not None and above.container is not frame.container
+        if is_other and name in above.container.userdata:
+            return f" {above.path!r} has it. Try input_keys=[{name!r}] of {path!r}."
+        frame = above
+    return ""
 
 
 def typed_userdata(kind: type) -> UserData:
@@ -403,6 +417,7 @@ class Remapper:
             known = sorted(self._data.keys())
             alias = "" if name == key else f" (remapped from {key!r})"
             problem = f"userdata key has no value: got {name!r}{alias}; keys with a value: {known}."
+            problem += _hint_above(name)
             raise UserDataKeyError(key, problem, known, path=current_path()) from None
         declared = sorted(self._input)
         problem = (

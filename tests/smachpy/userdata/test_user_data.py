@@ -411,6 +411,23 @@ def test_declared_but_missing_key_says_its_name_in_the_container():
         sm.execute()
 
 
+def test_a_key_that_only_a_machine_above_has_is_told_with_what_to_try():
+    read = smachpy.CBState(lambda ud: ud.goal, outcomes=["ok"], input_keys=["goal"])
+    inner, sm = smachpy.StateMachine(["ok"]), smachpy.StateMachine(["ok"], name="P")
+    inner.add("READ", read)
+    sm.add("INNER", inner)
+    sm.userdata.goal = "ok"
+    way_out = r"'/P' has it\. Try input_keys=\['goal'\] of '/P/INNER'"
+    with pytest.raises(smachpy.UserDataKeyError, match=way_out):
+        sm.execute()
+    inner.register_input_keys(["goal"])
+    assert sm.execute() == "ok"
+    inner.reset_userdata()
+    with pytest.raises(smachpy.UserDataKeyError) as caught:
+        inner.execute()
+    assert "Try input_keys" not in str(caught.value)
+
+
 def test_constants_are_the_states_own():
     seen = []
     sm = smachpy.StateMachine(["ok"])
