@@ -65,13 +65,14 @@ class Retry:
 
     def wait_s(self, attempt: int) -> float:
         """Return the pause after attempt number `attempt` (from 1) [s]."""
-        return float(self.backoff * 2.0 ** (attempt - 1))
+        return float(self.backoff * 2.0 ** min(attempt - 1, _DOUBLINGS))
 
     def __str__(self) -> str:
         on = ", ".join(item if isinstance(item, str) else item.__name__ for item in self.on)
         return f"{self.attempts} attempts, {self.backoff:g} s apart, on {on}"
 
 
+_DOUBLINGS = 60  # of a pause, which lasts for ever by then; 1,024 of them are no float any more
 REFUSED = "refused"
 
 

@@ -278,6 +278,13 @@ def test_timeout_in_a_concurrence_ends_that_branch_only(clock):
     assert clock.now() == 3.0
 
 
+@pytest.mark.parametrize("backoff", [0.0, 1e-300])
+def test_attempts_have_no_limit_but_the_given_one(backoff):
+    """The 1,025th ended the mission: OverflowError."""
+    state = Fails(1500, "aborted", retry=(2000, backoff))
+    assert (run(state)[0], state.runs) == ("ok", 1501)
+
+
 @pytest.mark.parametrize("spec", [3, (3,), (3, 0.0), smachpy.Retry(3, on=("aborted",))])
 def test_retry_on_an_outcome(spec):
     state = Fails(2, "aborted", retry=spec)
