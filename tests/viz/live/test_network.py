@@ -64,7 +64,7 @@ def watch(clock):
         return machines.get("robot")
 
     watch.viewer, watch.machines, watch.robot, watch.desk = viewer, machines, robot, desk
-    watch.servers = servers
+    watch.network, watch.servers = network, servers
     yield watch
     for server in servers:
         server.stop()
@@ -310,6 +310,25 @@ def test_a_command_to_a_machine_that_is_gone_reaches_no_other_one_of_its_name(le
     assert not stays.control.is_paused()
     viewer.send("robot (2)", {"command": "pause"})
     assert stays.control.is_paused()
+
+
+def test_a_value_of_a_machine_that_is_gone_is_not_that_of_another_one_of_its_name(left_alone):
+    viewer, stays = left_alone
+    stays.userdata.place = "dock"
+    with pytest.raises(CommandError, match="robot: the machine is gone"):
+        viewer.value("robot", "/JOB", "place")
+    assert viewer.value("robot (2)", "/JOB", "place") == "dock"
+
+
+def test_a_value_is_not_fetched_while_two_machines_of_the_name_would_answer(clock, watch):
+    watch(spinning(1))
+    with Node("other", transport=watch.network.session(), clock=clock) as other:
+        server = IntrospectionServer("robot", spinning(1), "/JOB", node=other)
+        server.start()
+        clock.sleep(2.0)
+        with pytest.raises(CommandError, match="got 2 machines with the name 'robot'"):
+            watch.viewer.value("robot", "/JOB", "place")
+        server.stop()
 
 
 def test_the_end_of_a_run_that_arrives_after_its_program_has_gone_is_shown(clock):

@@ -157,11 +157,12 @@ class Network:
         """Return the present value of a userdata key, unabridged.
 
         Raises:
-            CommandError: there is no such machine or value, or no answer.
+            CommandError: there is no such machine, it is gone, or there are two; there is no such
+                value, or no answer.
 
         Blocks: until the answer, a few seconds at most.
         """
-        return self._link(name).value(container, key)
+        return self._alone(name).value(container, key)
 
     def picture(self, name: str, path: str) -> tuple[str, bytes] | None:
         """Return media type and bytes of a question's picture; None if it has none.
@@ -191,7 +192,7 @@ class Network:
         if len(twins) > 1:
             raise CommandError(
                 f"{name}: got {len(twins)} machines with the name {link.server!r}, which would all "
-                "get the command; expected one. Give each its own name or namespace."
+                "be asked; expected one. Give each its own name or namespace."
             )
         return link
 
