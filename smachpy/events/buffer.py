@@ -132,16 +132,19 @@ class EventBuffer:
             most: The most entries that are read.
         """
         with self._lock:
-            found = self._take_all(most)
-            if not found:
-                return []
-            if self._clock is not None:
-                wall_time(self._clock).check()
-            return [
-                self._number(record)
-                for record in self._records(found)
-                if not self._is_known(record)
-            ]
+            # What is known already is left out. If that was all, it looks for more: `take` tells of
+            # news only after a look that has found nothing.
+            while found := self._take_all(most):
+                if self._clock is not None:
+                    wall_time(self._clock).check()
+                records = [
+                    self._number(record)
+                    for record in self._records(found)
+                    if not self._is_known(record)
+                ]
+                if records:
+                    return records
+            return []
 
     def has_room(self) -> bool:
         """Return whether half of the limit is free."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import smachpy
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
-from smachpy.events import Entered, Left, Started, UserdataWritten, to_record
+from smachpy.events import Entered, Left, Recovered, Started, UserdataWritten, to_record
 from smachpy.events import buffer as buffers
 from smachpy.events.buffer import RawEventBuffer
 from smachpy.events.run_state import RunState
@@ -358,6 +358,22 @@ def test_news_are_told_once_until_everything_is_read(clock):
     sm["B"].left = 1
     sm.execute()
     assert told == [0, 1]
+
+
+def test_news_are_told_also_after_what_a_resumed_run_had_told_before(clock):
+    """The viewers of a mission that was resumed heard nothing more."""
+    told = []
+    buffer = StateMachine(["ok"], name="M").event_buffer(lambda: told.append(len(told)))
+    buffer.begin("/M", clock)
+    buffer.take(Recovered("/M", 0.0, 1, "", 1, (), (("/M", 1), ("/M/A", 1))))
+    assert [record["kind"] for record in buffer.read()] == ["Recovered"]
+    assert buffer.read() == []
+    buffer.take(Entered("/M/A", 1.0, 2))
+    assert told == [0, 1]
+    assert buffer.read() == []
+    buffer.take(Left("/M/A", 2.0, 3, "ok"))
+    assert told == [0, 1, 2]
+    assert [record["kind"] for record in buffer.read()] == ["Left"]
 
 
 def test_a_reader_that_cannot_be_told_hurts_nobody(clock, caplog):
