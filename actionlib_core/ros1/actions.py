@@ -486,7 +486,8 @@ class _ShownServer:
             result = self._goals.result(goal_id)
             if verdict is Admission.PASS:
                 self._goals.on_passed(goal_id, self._clock.now())
-            if verdict is Admission.PASS and unpack_cancel_if_lost(sample.payload):
+            wanted = unpack_cancel_if_lost(sample.payload, self._own_key)
+            if verdict is Admission.PASS and wanted:
                 self._cancel_if_lost[goal_id] = sample.source
                 if len(self._cancel_if_lost) > REMEMBERED:
                     del self._cancel_if_lost[next(iter(self._cancel_if_lost))]

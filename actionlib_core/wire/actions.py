@@ -63,7 +63,7 @@ STATUS = Quality(express=False, block=False)  # repeated every second
 
 _U32 = struct.Struct("<I")
 _HEADER = struct.Struct("<IIII")  # seq, stamp, length of the frame_id
-_SEQ_CANCEL_IF_LOST, _NO_FRAME = _U32.pack(1), _U32.pack(0)
+_SEQ_CANCEL_IF_LOST = _U32.pack(1)
 _ID = struct.Struct("<III")  # stamp, length of the id
 _FRONT = struct.Struct("<IIIIIII")  # a header with an empty frame_id and an `_ID` as one
 _TAIL = struct.Struct("<BI")  # status, length of its text
@@ -150,12 +150,16 @@ def unpack_age(payload: bytes, stamp_ns: int) -> float:
     return max(0.0, (sent_ns - stamp_ns) / _NS) if stamp_ns else 0.0
 
 
-def unpack_cancel_if_lost(payload: bytes) -> bool:
+def unpack_cancel_if_lost(payload: bytes, own_key: str) -> bool:
     """Read from an XActionGoal whether the server is to cancel it when its client dies.
 
-    Only with a receiver's token as `frame_id`: programs for ROS 1 count their messages in `seq`.
+    Only with the server's own token, `own_key`, as `frame_id`: programs for ROS 1 count their
+    messages in `seq`, and some fill in a frame such as "map".
+
+    Raises:
+        ValueError: the bytes end too early, or a text is not UTF-8.
     """
-    return payload[:4] == _SEQ_CANCEL_IF_LOST and payload[12:16] != _NO_FRAME
+    return payload[:4] == _SEQ_CANCEL_IF_LOST and unpack_frame(payload) == own_key
 
 
 def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
@@ -656,7 +660,7 @@ class ActionServerPort:
             self._report_unreadable("a goal", sample, error)
             return
         age = unpack_age(sample.payload, stamp_ns)
-        lost = unpack_cancel_if_lost(sample.payload)
+        lost = unpack_cancel_if_lost(sample.payload, self._own_key)
         self._listener.on_goal(goal_id, stamp_ns, content, sample.source, age, cancel_if_lost=lost)
 
     def _is_of_another(self, frame: str) -> bool:

@@ -43,14 +43,20 @@ def test_goal(sent, goal_id, stamp, number, server):
 
 @pytest.mark.parametrize(
     ("seq", "frame", "wanted"),
-    [(1, "token", True), (0, "token", False), (2, "token", False), (1, "", False)],
+    [
+        (1, "token", True),
+        (0, "token", False),
+        (2, "token", False),
+        (1, "", False),
+        (1, "map", False),
+    ],
 )
 def test_a_goal_says_that_it_is_to_be_cancelled_with_its_client(seq, frame, wanted):
-    """Programs for ROS 1 count their messages in `seq`, and leave the frame of goals empty."""
+    """Programs for ROS 1 count their messages in `seq`, and may fill in a frame."""
     message = msg.TestActionGoal(header=Header(seq=seq, frame_id=frame))
-    assert wire.unpack_cancel_if_lost(message.to_bytes()) is wanted
+    assert wire.unpack_cancel_if_lost(message.to_bytes(), "token") is wanted
     packed = wire.pack_goal(0, "", 0, msg.TestGoal().to_bytes(), frame, cancel_if_lost=seq == 1)
-    assert wire.unpack_cancel_if_lost(packed) is wanted
+    assert wire.unpack_cancel_if_lost(packed, "token") is wanted
 
 
 @given(stamps, texts, stamps)
