@@ -43,6 +43,7 @@ _STEPS = client_life_cycle().steps
 _NAMES: Final = [status.name for status in Status]
 STATUSES: Final = {int(status): status for status in Status}
 _AWAITED: Final = frozenset({CommState.WAITING_FOR_RESULT, CommState.WAITING_FOR_CANCEL_ACK})
+_UNCANCELLED: Final = frozenset({Status.PENDING, Status.ACTIVE})
 
 Path = tuple[CommState, ...]
 
@@ -192,8 +193,10 @@ class ClientGoal:
             self.acknowledged = True
         self._unlisted_since = self._ack_by = None
         # While a result or the answer to a cancel is awaited, `_due` is the next repetition: the
-        # status lists of every second must not put it off.
-        if self.acknowledged and self.comm not in _AWAITED:
+        # status lists of every second must not put it off. A server without the goal may have
+        # listed the cancel, while another has the goal and not the cancel.
+        uncancelled = self._cancelled and status in _UNCANCELLED
+        if self.acknowledged and self.comm not in _AWAITED and not uncancelled:
             self._due = now + SILENCE_S
         if (self.comm, _NAMES[status]) not in _STEPS:
             return ()
@@ -314,9 +317,8 @@ class ClientGoal:
         if not self.acknowledged:
             # The cancel is sent first, so that the server recalls the goal instead of starting it.
             return Duty.CANCEL | Duty.GOAL if self._cancelled else Duty.GOAL
-        if self._cancelled and self.comm is CommState.WAITING_FOR_CANCEL_ACK:
-            return Duty.CANCEL | Duty.ASK
-        return Duty.ASK
+        waits = self.comm is CommState.WAITING_FOR_CANCEL_ACK or self.status in _UNCANCELLED
+        return Duty.CANCEL | Duty.ASK if self._cancelled and waits else Duty.ASK
 
     def _go(self, event: str) -> Path:
         path = _STEPS[self.comm, event]

@@ -82,6 +82,22 @@ def test_cancel_of_a_goal_no_server_took_goes_before_the_goal():
     assert Duty.GOAL in goal.tick(goal.due)[1]
 
 
+@pytest.mark.parametrize("status", [Status.PENDING, Status.ACTIVE])
+def test_cancel_that_was_listed_but_has_not_reached_the_goal_is_sent_again(status):
+    """The server that has listed the cancel may have left, and the next one have got the goal."""
+    goal = started()
+    goal.cancel(0.1)
+    goal.on_status(Status.RECALLING, "", 0.2)
+    again = []
+    for now in range(1, 9):  # a list every second
+        goal.on_status(status, "", now)
+        again += [duty for _, duty in duties(goal, now + 0.9)]
+    assert set(again) == {Duty.CANCEL | Duty.ASK}
+    assert len(again) >= 4
+    goal.on_status(Status.PREEMPTING, "", 9.0)
+    assert Duty.CANCEL not in goal.tick(goal.due)[1]
+
+
 def test_cancel_of_a_goal_that_reached_nobody_recalls_it():
     goal = ClientGoal("g")
     goal.begin(0.0)
