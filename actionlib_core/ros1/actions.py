@@ -677,15 +677,17 @@ class ServerHere:
 
     def on_goal(self, typed: Typed, payload: bytes) -> None:
         """Pass on a goal; blocks while a link of our network is full."""
-        goal_id, _, _ = unpack_goal(payload)
+        goal_id, stamp_ns, _ = unpack_goal(payload)
         with self._lock:
             self._goal_encoding = typed.encoding
-            self._goals.on_goal(goal_id, payload, self._clock.now())
+            self._goals.on_goal(goal_id, payload, stamp_ns, self._clock.now())
             self._arm()
         self._publisher(self._keys.goal, typed.encoding, GOAL).put(payload)
 
     def on_cancel(self, typed: Typed, payload: bytes) -> None:
         """Pass on a cancel; blocks as `on_goal`."""
+        with self._lock:
+            self._goals.on_cancel(*unpack_goal_id(payload))
         self._publisher(self._keys.cancel, typed.encoding, GOAL).put(payload)
 
     def report(self, about: str, error: ValueError) -> None:
@@ -783,6 +785,9 @@ class ServerHere:
             encoding = self._goal_encoding
             self._arm()
         with contextlib.suppress(TransportError):  # closed meanwhile
+            for goal_id in due.cancel:
+                cancels = self._publisher(self._keys.cancel, GOAL_ID.encoding, AGAIN)
+                cancels.put(pack_goal_id(goal_id, 0))
             for message in due.again:
                 self._publisher(self._keys.goal, encoding, AGAIN).put(message)
             for goal_id in due.ask:

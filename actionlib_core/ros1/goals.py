@@ -140,10 +140,13 @@ class Due(NamedTuple):
     """What is to be sent now for the goals of clients in ROS 1.
 
     Attributes:
+        cancel: Ids of goals in `again` that were cancelled. To be sent first, so that the server
+            recalls these goals instead of starting them.
         again: Messages of goals that our server has not acknowledged.
         ask: Ids of goals that have ended and whose results have not arrived.
     """
 
+    cancel: list[str]
     again: list[bytes]
     ask: list[str]
 
@@ -151,11 +154,13 @@ class Due(NamedTuple):
 class _Sent(Backoff):
     """A goal of a client in ROS 1 that waits for its acknowledgement or result."""
 
-    __slots__ = ("message",)
+    __slots__ = ("cancelled", "message", "stamp_ns")
 
-    def __init__(self, message: bytes, now: float, first: float) -> None:
+    def __init__(self, message: bytes, now: float, first: float, stamp_ns: int = 0) -> None:
         super().__init__(now, first, MAX_RESEND_DELAY_S)
         self.message = message
+        self.stamp_ns = stamp_ns
+        self.cancelled = False
 
 
 class GoalsOfClients:
@@ -167,11 +172,18 @@ class GoalsOfClients:
         self._unacknowledged: dict[str, _Sent] = {}
         self._without_result: dict[str, _Sent] = {}
 
-    def on_goal(self, goal_id: str, message: bytes, now: float) -> None:
+    def on_goal(self, goal_id: str, message: bytes, stamp_ns: int, now: float) -> None:
         """Note a goal that is being sent to the server."""
         if goal_id and goal_id not in self._ours:  # the server makes an id for one that has none
             self._ours.add(goal_id)
-            self._unacknowledged[goal_id] = _Sent(message, now, RESEND_FIRST_S)
+            self._unacknowledged[goal_id] = _Sent(message, now, RESEND_FIRST_S, stamp_ns)
+
+    def on_cancel(self, goal_id: str, stamp_ns: int) -> None:
+        """Note a cancel that is being sent: it may be lost like the goals that it is about."""
+        everything = not goal_id and not stamp_ns
+        for each, sent in self._unacknowledged.items():
+            if everything or each == goal_id or 0 < sent.stamp_ns <= stamp_ns:
+                sent.cancelled = True
 
     def on_status(self, entry: StatusEntry, now: float) -> None:
         """Handle the status of a goal in a list of the server."""
@@ -210,7 +222,9 @@ class GoalsOfClients:
 
     def take_due(self, now: float) -> Due:
         """Return what is to be sent now, and begin the next pauses."""
+        again = [each for each in self._unacknowledged.items() if each[1].is_due(now)]
         return Due(
-            [sent.message for sent in self._unacknowledged.values() if sent.is_due(now)],
+            [goal_id for goal_id, sent in again if sent.cancelled],
+            [sent.message for _, sent in again],
             [goal_id for goal_id, sent in self._without_result.items() if sent.is_due(now)],
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given
@@ -12,8 +13,10 @@ from actionlib_core.exceptions import Ros1Error
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import get_action, get_message
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestActionGoal
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
 from actionlib_core.ros1 import answers, frames
-from actionlib_core.ros1.actions import action_type
+from actionlib_core.ros1.actions import GOAL_ID, ServerHere, action_type
 from actionlib_core.ros1.answers import Names, SystemState
 from actionlib_core.ros1.goals import Admission, GoalsOfClients, GoalsOfServer
 from actionlib_core.ros1.node import check_master
@@ -21,6 +24,7 @@ from actionlib_core.ros1.plan import BridgePlan, Wanted, make_plan, without
 from actionlib_core.ros1.publishers import Publishers
 from actionlib_core.ros1.sides import Sides, Typed, type_of
 from actionlib_core.transport.tokens import Endpoint, Kind
+from tests.two_nodes import TwoNodes
 
 TEXT = st.text(st.characters(codec="utf-8"), min_size=1).filter(lambda text: "=" not in text)
 
@@ -203,8 +207,8 @@ def test_an_idle_servers_status_is_news_once():
 
 def test_goals_of_clients_are_sent_again_until_the_server_speaks_of_them():
     goals = GoalsOfClients()
-    goals.on_goal("g", b"goal", now=0.0)
-    goals.on_goal("", b"without id", now=0.0)
+    goals.on_goal("g", b"goal", 0, now=0.0)
+    goals.on_goal("", b"without id", 0, now=0.0)
     assert goals.take_due(0.4).again == []
     assert goals.take_due(0.5).again == [b"goal"]
     assert goals.take_due(1.4).again == []
@@ -213,18 +217,55 @@ def test_goals_of_clients_are_sent_again_until_the_server_speaks_of_them():
     goals.on_status(entry("stranger", Status.SUCCEEDED), now=2.0)
     assert goals.next_due() is None
     goals.on_status(entry("g", Status.SUCCEEDED), now=3.0)
-    assert goals.take_due(3.2) == ([], ["g"])
+    assert goals.take_due(3.2) == ([], [], ["g"])
     assert goals.on_result("g")
     assert not goals.on_result("g")  # the answer came beside the message
     assert goals.next_due() is None
     assert goals.on_result("stranger")
 
 
+@pytest.mark.parametrize(
+    ("goal_id", "stamp_ns", "cancelled"),
+    [
+        ("b", 0, ["b"]),
+        ("", 0, ["a", "b", "c"]),
+        ("", 2, ["a", "b"]),
+        ("c", 1, ["a", "c"]),
+        ("stranger", 0, []),
+    ],
+)
+def test_cancels_are_sent_again_with_the_goals_that_they_are_about(goal_id, stamp_ns, cancelled):
+    goals = GoalsOfClients()
+    for stamp, name in ((1, "a"), (2, "b"), (0, "c")):
+        goals.on_goal(name, name.encode(), stamp, now=0.0)
+    goals.on_cancel(goal_id, stamp_ns)
+    assert goals.take_due(0.5) == (cancelled, [b"a", b"b", b"c"], [])
+    goals.on_status(entry("b", Status.RECALLED), now=0.6)
+    assert "b" not in goals.take_due(1.5).cancel
+
+
+def test_a_cancelled_goal_that_no_server_has_is_sent_again_behind_its_cancel():
+    ros = Mock()
+    with TwoNodes() as world:
+        sides, log = Sides(world.mission, ros, ""), []
+        typed = TestAction._type, TestAction._md5sum
+        server = world.robot.endpoint(Kind.ACTION_SERVER, "a", *typed)
+        for word in ("goal", "cancel"):
+            world.robot.transport.subscribe(f"a/{word}", lambda it: log.append(it.key))
+        here = ServerHere(sides, "/a", server, Mock())
+        goal = TestActionGoal(goal_id=GoalID(id="g"))
+        here.on_goal(Typed(TestActionGoal._type, TestActionGoal._md5sum), goal.to_bytes())
+        here.on_cancel(GOAL_ID, goal.goal_id.to_bytes())
+        world.clock.sleep(0.6)
+        here.close()
+    assert log == ["a/goal", "a/cancel", "a/cancel", "a/goal"]
+
+
 def test_goals_that_a_dead_server_may_have_taken_are_not_sent_to_the_next():
     goals = GoalsOfClients()
-    goals.on_goal("g", b"goal", now=0.0)
+    goals.on_goal("g", b"goal", 0, now=0.0)
     goals.drop_unacknowledged()
-    goals.on_goal("g", b"goal", now=0.0)  # a repetition
+    goals.on_goal("g", b"goal", 0, now=0.0)  # a repetition
     assert goals.next_due() is None
 
 
