@@ -505,13 +505,20 @@ def _request_of(state: Child) -> Any:
     return getattr(found, "fget", None) or found
 
 
-def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool:
+def ask(
+    frame: Frame,
+    step: Any = None,
+    *,
+    timeout: float | None = None,
+    override: Override | None = None,
+) -> bool:
     """Ask the child that `frame` runs to stop; with the run's lock held.
 
     Args:
         frame: Where the child runs.
         step: The child to ask; None: the one that runs.
         timeout: The child's own timeout [s], if that is what asks.
+        override: As for `ask_child`.
 
     Returns:
         Whether the child was running, or about to start.
@@ -526,6 +533,9 @@ def ask(frame: Frame, step: Any = None, *, timeout: float | None = None) -> bool
     elif not visit.is_asked():
         visit.by_timeout = True
     visit.timeout = timeout
+    if override is not None:
+        # Before the child hears of it: one that ends at once looks at it without the lock.
+        visit.override = override.instead_of(visit.override)
     if frame.run.control is not None:
         frame.run.control.release(f"{frame.path}/{meant.label}")
     visit.happen(Event.ASK if timeout is None else Event.TIME_OVER)
@@ -542,9 +552,7 @@ def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool
             cancels the child (`if_stopped`) replaces none. None if it is no operator who asks.
     """
     with frame.run.lock:
-        asked, visit = ask(frame, step), frame.visit
-        if asked and visit is not None and override is not None:
-            visit.override = override.instead_of(visit.override)
+        asked = ask(frame, step, override=override)
     frame.run.flush_soon()
     return asked
 

@@ -12,7 +12,8 @@ import smachpy
 from actionlib_core.clock import current_clock
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from smachpy.engine.control import ControlError
-from smachpy.engine.preempt import ask_child
+from smachpy.engine.preempt import ask_child, on_preempt
+from smachpy.engine.visit import Override
 from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed
 
 
@@ -211,6 +212,38 @@ def test_what_an_operator_has_chosen_outlasts_a_pause_and_a_taker_of_the_resourc
     after = {"preempt": "/P/B", "force": "/P/C", "jump": "/P/D"}[chosen]
     assert entered(sm) == ["/P/A", after]
     assert drive.runs == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "choice"),
+    [
+        (lambda control: control.preempt("/P/A"), Override()),
+        (lambda control: control.force_outcome("/P/A", "failed"), Override(outcome="failed")),
+        (lambda control: control.jump("/P/B"), Override(label="B")),
+        (lambda control: control.pause(running="cancel"), Override(label="A", if_stopped=True)),
+    ],
+)
+def test_what_an_operator_has_chosen_is_known_when_the_state_hears_that_it_is_asked(
+    clock, command, choice
+):
+    """A durable state that ended at once wrote 'preempted', and a kill then lost the choice."""
+    seen = []
+
+    class Hears(Work):
+        def execute(self, userdata):
+            frame = sm._smachpy.live.frame
+            forget = on_preempt(self, lambda: seen.append(frame.visit.override))
+            try:
+                return super().execute(userdata)
+            finally:
+                forget()
+
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    sm.add("A", Hears(), {"ok": "B"})
+    sm.add("B", Work())
+    at(clock, (0.5, lambda: command(sm.control)), (5.0, sm.control.resume))
+    sm.execute()
+    assert seen == [choice]
 
 
 def test_jump_preempts_what_runs_and_goes_there(clock):
