@@ -111,6 +111,7 @@ class Journal:
         self._queue: list[bytes] = []
         self._put = 0
         self._written = 0
+        self._failed: Exception | None = None  # that of the store: later entries need the lost ones
         self._since_snapshot = 0
         self._new_bytes = 0  # of large values since then
         self._now_ns = now_ns
@@ -173,6 +174,8 @@ class Journal:
         with self._writing:
             if self._written >= number:
                 return  # another thread has written it with its own
+            if self._failed is not None:  # perhaps one that had taken this entry with its own
+                raise self._failed
             # All that is queued by now. `lock` is released before the store is called, so that
             # other threads can queue the next entries while this one waits for the disk.
             with self.lock:
@@ -189,16 +192,20 @@ class Journal:
                     snapshot = self.position.to_bytes()
                     self._since_snapshot = self._new_bytes = 0
                     kept = self._stored = self.position.digests()
-            self._store.append(
-                self._lease,
-                entries,
-                snapshot=snapshot,
-                status=ENDED if finished else None,
-                outcome=self.position.data["outcome"],
-                blobs=blobs,
-                kept=frozenset(kept),
-                # The lease is renewed every few seconds; before that, the first entry tells.
-                beat_ns=None if self._has_begun else self._now_ns(),
-            )
+            try:
+                self._store.append(
+                    self._lease,
+                    entries,
+                    snapshot=snapshot,
+                    status=ENDED if finished else None,
+                    outcome=self.position.data["outcome"],
+                    blobs=blobs,
+                    kept=frozenset(kept),
+                    # The lease is renewed every few seconds; before that, the first entry tells.
+                    beat_ns=None if self._has_begun else self._now_ns(),
+                )
+            except Exception as error:
+                self._failed = error
+                raise
             self._has_begun = True
             self._written = upto
