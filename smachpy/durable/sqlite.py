@@ -291,10 +291,10 @@ class SQLiteStore(SqlStore):
         with self._lock:
             self._deadline = self._clock_now() + DEADLINE_S
             try:
-                # IMMEDIATE waits for other writers now. A transaction that reads first and then
-                # writes would fail at once, without waiting, if another one wrote in between.
-                self._connection.execute("BEGIN" if reads else "BEGIN IMMEDIATE")
                 try:
+                    # IMMEDIATE waits for other writers now. A transaction that reads first and then
+                    # writes would fail at once, without waiting, if another one wrote in between.
+                    self._connection.execute("BEGIN" if reads else "BEGIN IMMEDIATE")
                     self._deadline = self._clock_now() + DEADLINE_S
                     result = work(self._connection.cursor(), False)  # noqa: FBT003
                     self._connection.execute("COMMIT")

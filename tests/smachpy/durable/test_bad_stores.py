@@ -15,6 +15,7 @@ import pytest
 import smachpy
 from smachpy.durable.processes import this_runner
 from smachpy.durable.store import StoreError, digest_of, open_store
+from smachpy.engine.interrupt import Interruption
 from smachpy.exceptions import MissionError
 from tests.free_port import free_port
 from tests.smachpy.durable.test_stores import LONG_S, ROW
@@ -300,6 +301,35 @@ def test_another_kind_of_url_is_refused(url):
 def test_less_than_durable_is_not_offered(place, synchronous):
     with pytest.raises(ValueError, match="synchronous"):
         open_store(place, synchronous=synchronous)
+
+
+class Interrupted:
+    """A connection whose next BEGIN is interrupted, as Python does it: just after the call."""
+
+    def __init__(self, connection):
+        self.connection = connection
+        self.over = False
+
+    def execute(self, statement, *arguments):
+        result = self.connection.execute(statement, *arguments)
+        if statement.startswith("BEGIN") and not self.over:
+            self.over = True
+            raise Interruption
+        return result
+
+    def __getattr__(self, name):
+        return getattr(self.connection, name)
+
+
+def test_a_transaction_whose_begin_is_interrupted_does_not_stay_open(place):
+    """All later writes failed, as SQLite begins no transaction within another."""
+    store, lease, written = fill(place, 2)
+    store._connection = Interrupted(store._connection)
+    with pytest.raises(Interruption):
+        store.append(lease, [b"lost"])
+    store.append(lease, [b"next"])
+    assert store.read("m1")[1] == [*written, b"next"]
+    store.close()
 
 
 def test_the_stores_of_a_process_see_one_another(place):
