@@ -164,13 +164,16 @@ class GoalKeeper:
         """
         for handle in handles:
             record = handle.record
-            if record.status is Status.RECALLING:
+            with self.lock:
+                status = record.status
+                ends = status is Status.PREEMPTING or (handle.resumed and not self._resumes)
+                if status is not Status.RECALLING and not ends:
+                    record.status = Status.PENDING  # so that the server's code can accept it again
+            if status is Status.RECALLING:
                 self.step(handle, "cancel", "the restart of its server", None, TEXT_RESTARTED)
-            elif record.status is Status.PREEMPTING or (handle.resumed and not self._resumes):
+            elif ends:
                 self.give_up(handle, TEXT_RESTARTED)
             else:
-                with self.lock:
-                    record.status = Status.PENDING  # so that the server's code can accept it again
                 self._deliver_goal(handle)
         if handles:
             self.status.on_change()

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.action.goal_keeper import TEXT_STOPPED, OnClientLost
 from actionlib_core.action.server import ActionServer, OnRestart
-from actionlib_core.exceptions import ActionException, InvalidNameError, text_of
+from actionlib_core.exceptions import (
+    ActionException,
+    IllegalTransitionError,
+    InvalidNameError,
+    text_of,
+)
 from actionlib_core.goal.server import RESULT_TIMEOUT_S
-from actionlib_core.goal.single import ANNOUNCE, Policy, SingleGoal
+from actionlib_core.goal.single import ANNOUNCE, Decision, Policy, SingleGoal
 from actionlib_core.goal.states import TERMINAL, Status
 from actionlib_core.inputs.arguments import check_delay, check_function
 from actionlib_core.names import check_name
@@ -30,7 +36,6 @@ if TYPE_CHECKING:
     from actionlib_core.action._action_spec import ActionSpec as Spec
     from actionlib_core.action.server import ServerGoalHandle
     from actionlib_core.clock import Event, Task
-    from actionlib_core.goal.single import Decision
     from actionlib_core.node import Node
     from actionlib_core.resources import Policy as ResourcePolicy
     from actionlib_core.time import Duration
@@ -156,6 +161,7 @@ class SimpleActionServer:
         )
         self._come: Event = self._clock.event(f"a goal for {self._name}")
         self._preempted: Event = self._clock.event()
+        self._heard: Event = self._clock.event()  # the preempt callback, of a stop
         node = self.action_server.node
         self._resource = needed and (node.resolve(needed[0], "resource"), needed[1])
         self._claim: Claim | None = None  # of the current goal
@@ -188,18 +194,23 @@ class SimpleActionServer:
         A second call does nothing, nor does one before `start`. A stopped server cannot be started
         again.
 
-        Blocks: until `execute_cb` has returned, 0.4 s at most (then its goal is ABORTED), and then
-            until the clients have acknowledged the ends of all goals, 0.7 s at most.
+        Blocks: until `execute_cb`, or else the preempt callback, has returned, 0.4 s at most (then
+            a goal that has not ended is ABORTED), and then until the clients have acknowledged the
+            ends of all goals, 0.7 s at most.
         """
         forget, self._forget = self._forget, None
         if forget is None:
             return
         forget()
         task = self._task  # read before it is asked to stop: it then resets `_task`
-        grace_ends = self._begin_to_stop()
-        if task is not None:
-            task.join(max(0.0, grace_ends - self._clock.now()))
-        self.action_server.stop()
+        try:
+            grace_ends = self._begin_to_stop()
+            if task is not None:
+                task.join(max(0.0, grace_ends - self._clock.now()))
+            elif self._policy.preempt_requested and self.preempt_callback is not None:
+                self._heard.wait(max(0.0, grace_ends - self._clock.now()))
+        finally:
+            self.action_server.stop()
 
     def _begin_to_stop(self) -> float:
         """Ask all goals to end; return the end of their grace [s, clock].
@@ -231,7 +242,8 @@ class SimpleActionServer:
             waiting = self._policy.on_stop()
             if self._idle:
                 self._come.set()
-        self._tell_preempt()  # also wakes code that waits for a preempt without a running goal
+            self._tell_preempt()  # also wakes code that waits for a preempt without a running goal
+        self._carry_out(Decision(preempt=self._policy.preempt_requested), TEXT_STOPPED)
         for handle in waiting:
             self._keeper.give_up(handle, TEXT_STOPPED)
 
@@ -281,8 +293,9 @@ class SimpleActionServer:
             elif asked:
                 self._preempted.clear()
         # Without the lock: sending the result blocks while a link is full.
-        if replaced is not None and replaced.record.status not in TERMINAL:
-            replaced.set_canceled(None, TEXT_NEWER)
+        if replaced is not None:
+            with contextlib.suppress(IllegalTransitionError):  # its own code has just ended it
+                replaced.set_canceled(None, TEXT_NEWER)
         return new
 
     def is_new_goal_available(self) -> bool:
@@ -419,27 +432,34 @@ class SimpleActionServer:
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
         """Handle a new goal; called by the `ActionServer` beneath."""
-        if self._stopping:
+        with self.lock:
+            stopping = self._stopping
+            if not stopping:
+                decision = self._admit(goal)
+                waits = self._policy.running or self.execute_callback is None
+        if stopping:
             self._turn_away(goal, "reject", TEXT_STOPPED)
             return
-        with self.lock:
-            decision = self._policy.on_goal(goal)
-            if decision.preempt:  # under the lock, as `_take_next` clears it for the next goal
-                self._tell_preempt()
-            if self._making:
-                self._early.add(goal.record.id)
-            # Wake the thread that runs goals, or start one. A busy thread looks for the next goal
-            # by itself.
-            if decision.announce and self._idle:
-                self._come.set()
-            elif decision.announce and self.execute_callback is not None and self._task is None:
-                self._task = self._start()
-            waits = self._policy.running or self.execute_callback is None
         if waits:  # else its acceptance, which follows at once, tells the client that it has come
             self._keeper.status.on_arrival()
         # Without the lock, as this sends results. The usual decision needs nothing more.
         if decision is not ANNOUNCE or self.goal_callback is not None:
             self._carry_out(decision, TEXT_NEWER)
+
+    def _admit(self, goal: ServerGoalHandle) -> Decision[ServerGoalHandle]:
+        """Decide about a new goal, and see to it that it runs; with the lock held."""
+        decision = self._policy.on_goal(goal, recall_waiting=self.execute_callback is not None)
+        if decision.preempt:  # under the lock, as `_take_next` clears it for the next goal
+            self._tell_preempt()
+        if self._making:
+            self._early.add(goal.record.id)
+        # Wake the thread that runs goals, or start one. A busy thread looks for the next goal by
+        # itself.
+        if decision.announce and self._idle:
+            self._come.set()
+        elif decision.announce and self.execute_callback is not None and self._task is None:
+            self._task = self._start()
+        return decision
 
     def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
         """Handle a cancel; called by the `ActionServer` beneath."""
@@ -480,8 +500,12 @@ class SimpleActionServer:
     def _call_preempt_callback(self) -> None:
         callback, goal = self.preempt_callback, self._policy.current
         over = goal is None or goal.record.status in TERMINAL
-        if callback is not None and self._policy.preempt_requested and not over:
-            callback()
+        try:
+            if callback is not None and self._policy.preempt_requested and not over:
+                callback()
+        finally:
+            if self._stopping:
+                self._heard.set()
 
     def _call_goal_callback(self) -> None:
         callback = self.goal_callback

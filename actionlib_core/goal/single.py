@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar
 
-from actionlib_core.goal.states import TERMINAL
+from actionlib_core.goal.states import TERMINAL, Status
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,13 +122,21 @@ class SingleGoal(Generic[G]):
         self.waiting.clear()
         return waiting
 
-    def on_goal(self, goal: G) -> Decision[G]:
-        """Decide about a goal that arrived."""
+    def on_goal(self, goal: G, *, recall_waiting: bool = False) -> Decision[G]:
+        """Decide about a goal that arrived.
+
+        Args:
+            goal: The goal. It may have been cancelled already, by a cancel of all goals.
+            recall_waiting: As in `on_cancel`.
+        """
         busy = self.running or bool(self.waiting)
         if self.policy == "reject" and busy:
             return Decision(reject=goal)
+        cancelled = goal.record.status is Status.RECALLING
+        if cancelled and recall_waiting:
+            return Decision(recall=(goal,))
         if self.policy == "queue" or not busy:
-            self.waiting.append(_Waiting(goal))
+            self.waiting.append(_Waiting(goal, cancelled))
             return ANNOUNCE
         # "preempt": an older goal that comes late must not stop a newer one.
         if any(goal.record.is_older_than(other.record) for other in self._unended()):
@@ -137,7 +145,7 @@ class SingleGoal(Generic[G]):
         # the new goal, or ends.
         older = tuple(waiting.goal for waiting in self.waiting)
         self.waiting.clear()
-        self.waiting.append(_Waiting(goal))
+        self.waiting.append(_Waiting(goal, cancelled))
         self.preempt_requested = self.preempt_requested or self.running
         return Decision(recall=older, preempt=self.running, announce=True)
 

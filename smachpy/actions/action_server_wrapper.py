@@ -7,6 +7,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.action.simple_server import SimpleActionServer
+from actionlib_core.goal.states import Status
 from actionlib_core.wire.action_types import ActionTypes
 from smachpy.base import log
 from smachpy.base.problems import Problems
@@ -123,7 +124,7 @@ class ActionServerWrapper:
         problems.add(*self.__slot_problems())
         problems.raise_all()
         self.__lock = threading.Lock()
-        self.__executing = False
+        self.__executing = self.__stopped = False
         self.__feedback_sent = b""
         self.__before: list[tuple[UserData, dict[str, Any]]] = []
         self.__unsubscribe: Callable[[], None] | None = None
@@ -193,8 +194,8 @@ class ActionServerWrapper:
 
         Blocks: as `SimpleActionServer.stop`.
         """
-        with self.__lock:
-            executing = self.__executing
+        with self.__lock:  # asked once: a second request would end what the first has led to
+            executing, self.__stopped = self.__executing and not self.__stopped, True
         if executing:
             with asking("action", self.__server_name, "the server stops"):
                 request_soon(self.wrapped_container)
@@ -300,19 +301,22 @@ class ActionServerWrapper:
     def preempt_cb(self) -> None:
         """Preempt the container; the action server calls it."""
         with self.__lock:  # so that it never preempts the run of the next goal; nothing blocks here
-            if self.__executing and self.__action_server.is_preempt_requested():
+            asked = self.__action_server.is_preempt_requested() and not self.__stopped
+            if self.__executing and asked:
                 with asking("action", self.__server_name, self.__why()):
                     request_soon(self.wrapped_container)
 
     def __why(self) -> str:
-        """Return the reason of the preempt: a cancel or a newer goal.
+        """Return the reason of the preempt: a cancel, a newer goal, or the end of the server.
 
         Its goal id begins with the client's name, so it also tells who asked.
         """
         newer, current = self.__action_server.next_goal, self.__action_server.current_goal
         if newer is not None:
             return f"newer goal {newer.get_goal_id().id}"
-        return "cancel" if current is None else f"cancel of goal {current.get_goal_id().id}"
+        if current is None or current.record.status is Status.ACTIVE:
+            return "the server stops"
+        return f"cancel of goal {current.get_goal_id().id}"
 
     # -- feedback ------------------------------------------------------------------------------
 

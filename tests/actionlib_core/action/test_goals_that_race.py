@@ -1,0 +1,200 @@
+"""Goals, cancels and stops of a simple server that come at the same moment, forced."""
+
+from __future__ import annotations
+
+import pytest
+
+from actionlib_core import SimpleActionClient, SimpleActionServer, server
+from actionlib_core.exceptions import ServerConflictError
+from actionlib_core.goal.states import Status
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
+from smachpy import ActionServerWrapper, State, StateMachine
+from smachpy.events import PreemptRequested
+from tests.two_nodes import TwoNodes
+
+
+@pytest.fixture
+def world():
+    with TwoNodes() as world:
+        yield world
+
+
+def client(world):
+    made = SimpleActionClient("a", TestAction, node=world.mission)
+    made.wait_for_server()
+    return made
+
+
+def first(function, before):
+    """Return `function`, which calls `before` with its arguments once, first."""
+    left = [before]
+
+    def wrapped(*arguments, **options):
+        if left:
+            left.pop()(*arguments)
+        return function(*arguments, **options)
+
+    return wrapped
+
+
+@pytest.mark.parametrize("runs_goals", [True, False])
+def test_a_cancel_of_all_that_comes_as_a_goal_is_delivered_is_not_lost(world, runs_goals):
+    """The goal ran to its end, and every later cancel was ignored."""
+    asked, ran = [], []
+
+    def execute(_goal):
+        ran.append(True)
+
+    def take():
+        simple.accept_new_goal()
+        asked.append(simple.is_preempt_requested())
+        simple.set_preempted(TestResult(1))
+
+    simple = SimpleActionServer(
+        "a", TestAction, execute if runs_goals else None, False, node=world.robot
+    )
+    if not runs_goals:
+        simple.register_goal_callback(take)
+    keeper = simple.action_server.keeper
+    keeper._deliver_goal = first(keeper._deliver_goal, lambda _: keeper.on_cancel("", 0))
+    simple.start()
+
+    sender = client(world)
+    sender.send_goal(TestGoal(1))
+    assert sender.wait_for_result(60.0)
+
+    assert sender.get_state() == (Status.RECALLED if runs_goals else Status.PREEMPTED)
+    assert (ran, asked) == ([], [] if runs_goals else [True])
+
+
+@pytest.mark.parametrize("how", ["stop", "close", "conflict"])
+def test_a_server_that_stops_calls_its_preempt_callback(world, how):
+    """Its code drove on: it was told of cancels and of newer goals only."""
+    heard = []
+    simple = SimpleActionServer("a", TestAction, None, False, node=world.robot)
+    simple.register_goal_callback(simple.accept_new_goal)
+    simple.register_preempt_callback(lambda: heard.append(simple.is_preempt_requested()))
+    simple.start()
+    sender = client(world)
+    sender.send_goal(TestGoal(1))
+    world.clock.sleep(1.0)
+    assert simple.is_active()
+
+    end(world, simple.action_server, simple.stop, how)
+    world.clock.sleep(1.0)
+
+    assert heard == [True]
+
+
+def end(world, action_server, stop, how):
+    if how == "stop":
+        stop()
+    elif how == "close":
+        world.robot.close()
+    else:
+        action_server.keeper.on_conflict(ServerConflictError("a", ("robot", "2"), ("robot", "1")))
+
+
+@pytest.mark.parametrize("how", ["stop", "close", "conflict"])
+def test_the_machine_of_a_server_that_stops_is_preempted(world, how):
+    class Drives(State):
+        def __init__(self):
+            super().__init__(["done", "preempted"])
+
+        def execute(self, userdata):
+            return "preempted" if self.sleep(30.0) else "done"
+
+    ended, asked = [], []
+    machine = StateMachine(["done", "preempted"])
+    machine.add("DRIVE", Drives())
+    machine.register_termination_cb(lambda _userdata, _labels, outcome: ended.append(outcome))
+    machine.subscribe(lambda e: asked.append(e.why) if isinstance(e, PreemptRequested) else None)
+    wrapper = ActionServerWrapper(
+        "a", TestAction, machine, ["done"], [], ["preempted"], node=world.robot
+    )
+    wrapper.run_server()
+    client(world).send_goal(TestGoal(1))
+    world.clock.sleep(1.0)
+
+    end(world, wrapper._ActionServerWrapper__action_server.action_server, wrapper.stop, how)
+    world.clock.sleep(1.0)
+
+    assert ended == ["preempted"]
+    assert set(asked) == {"the server stops"}
+    assert len(asked) == 2  # once for the machine, and once for its state
+
+
+def test_a_goal_that_comes_as_the_server_begins_to_stop_is_rejected(world):
+    """It ran on after stop() had returned, and nobody had asked it to stop."""
+    ran = []
+    simple = SimpleActionServer("a", TestAction, ran.append, False, node=world.robot)
+    simple.start()
+    sender = client(world)
+    lock = simple.lock
+
+    class Late:
+        """The lock, which another thread has first, to stop the server."""
+
+        def __enter__(self):
+            simple.lock = lock
+            simple._begin_to_stop()
+            return lock.__enter__()
+
+        def __exit__(self, *error):
+            return lock.__exit__(*error)
+
+    simple.lock = Late()
+    sender.send_goal(TestGoal(1))
+    assert sender.wait_for_result(60.0)
+    simple.stop()
+
+    assert sender.get_state() == Status.REJECTED
+    assert not ran
+
+
+def test_a_new_goal_is_accepted_although_the_old_one_ends_at_that_moment(world):
+    """It stayed pending for ever."""
+    simple = SimpleActionServer("a", TestAction, None, False, node=world.robot)
+    simple.register_goal_callback(simple.accept_new_goal)
+    simple.start()
+    one, two = client(world), client(world)
+    one.send_goal(TestGoal(1))
+    world.clock.sleep(1.0)
+    keeper, real = simple.action_server.keeper, simple.action_server.keeper.step
+
+    def step(handle, event, *arguments, **options):
+        if event == "cancel":  # another thread ends it just before
+            keeper.step = real
+            real(handle, "succeed", "set_succeeded()", TestResult(1), "")
+        return real(handle, event, *arguments, **options)
+
+    keeper.step = step
+    two.send_goal(TestGoal(2))
+    world.clock.sleep(1.0)
+
+    assert one.get_state() == Status.SUCCEEDED
+    assert two.get_state() == Status.ACTIVE
+    simple.set_succeeded(TestResult(2))
+    assert two.wait_for_result(60.0)
+
+
+def test_a_server_whose_preempt_cannot_be_told_leaves_the_network_all_the_same(world):
+    """It stayed on the network, and took goals that nobody answered."""
+
+    @server("a", TestAction)
+    def drive(goal, context):
+        context.sleep(30.0)
+        return TestResult(1)
+
+    running = drive.start(node=world.robot)
+    client(world).send_goal(TestGoal(1))
+    world.clock.sleep(1.0)
+
+    def closed():
+        raise RuntimeError("Event loop is closed")
+
+    running._runner._cancel_task = closed
+    with pytest.raises(RuntimeError):
+        running.stop()
+
+    assert running.wait(0.0)
