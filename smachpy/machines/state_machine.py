@@ -276,6 +276,8 @@ class StateMachine(Container):
                 problem += did_you_mean(unknown[0], known)
             if not accepts(problem):
                 raise InvalidStateError(problem)
+        if userdata is not None:
+            self.userdata.update(userdata)  # first, as typed keys may refuse a value
         if labels:
             labels = [plain(label) for label in labels]
             if not self.is_opened() and self._smachpy.initial is not None:
@@ -284,8 +286,6 @@ class StateMachine(Container):
                 self._smachpy.initial = labels[0]
             self._smachpy.restructured()
             EPOCH.value = object()
-        if userdata is not None:
-            self.userdata.update(userdata)
 
     def get_initial_states(self) -> list[str]:
         """Return the label of the state in which the next run begins."""

@@ -82,9 +82,14 @@ class UserData:
         object.__setattr__(self, "_smachpy", _VisitKeys())
 
     def update(self, other_userdata: UserData | Remapper | Mapping[str, Any]) -> None:
-        """Set all values of `other_userdata` here."""
-        for key in other_userdata.keys():  # noqa: SIM118  UserData is no mapping
-            self[key] = other_userdata[key]
+        """Set all values of `other_userdata` here; none, if a typed key refuses one."""
+        keys = other_userdata.keys()  # UserData is no mapping
+        values = {key: other_userdata[key] for key in keys}
+        if isinstance(self._data, CheckedDict):
+            for key, value in values.items():
+                self._data.check(key, value)
+        for key, value in values.items():
+            self[key] = value
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
         """Return shallow copies of the values of `keys`, under the left names in `remapping`."""
@@ -294,9 +299,13 @@ class CheckedDict(dict[str, Any]):
         self.fields = fields
         super().__init__(fields.defaults())
 
-    def __setitem__(self, key: str, value: Any) -> None:
+    def check(self, key: str, value: Any) -> None:
+        """Check a value as `Fields.check` does; constants may be anything."""
         if type(key) is not ConstantKey:
             self.fields.check(key, value)
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.check(key, value)
         super().__setitem__(key, value)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 
 import pytest
 
@@ -18,6 +19,7 @@ from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.presence import list_endpoints
 from smachpy import (
+    CBState,
     Concurrence,
     InvalidStateError,
     SmachError,
@@ -49,6 +51,12 @@ class Wait(State):
         ud.count = self.seconds
         self.sleep(self.seconds)
         return "done"
+
+
+@dataclass
+class Trip:
+    goal: str = ""
+    speed: float = 0.5
 
 
 class World(TwoNodes):
@@ -269,6 +277,19 @@ def test_a_state_that_is_not_there_is_refused(world, caplog):
     assert world.clock.now() - start < 0.5
     assert "REMOTE_INIT_REFUSED: " in caplog.text
     assert "Did you mean 'LAST'?" in caplog.text
+
+
+def test_a_start_with_a_value_that_is_refused_changes_nothing(world):
+    machine = StateMachine(["done"], userdata_type=Trip)
+    machine.add("FIRST", CBState(lambda _: "done", outcomes=["done"]))
+    machine.add("LAST", CBState(lambda _: "done", outcomes=["done"]))
+    world.serve(machine)
+    client = IntrospectionClient(node=world.mission)
+    userdata = UserData()
+    userdata.goal, userdata.speed = "dock", "fast"
+    assert client.set_initial_state("robot", "/SM_ROOT", ["LAST"], userdata, timeout=3.0) is False
+    assert machine.get_initial_states() == ["FIRST"]
+    assert (machine.userdata.goal, machine.userdata.speed) == ("", 0.5)
 
 
 def test_refused_then_accepted(world):
