@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from smachpy.base import log
 from smachpy.engine.described import EPOCH, ContainerData, walk
-from smachpy.engine.preempt import ask_child, asking, on_preempt, request_soon
+from smachpy.engine.preempt import ask_child, asking, frame_of, on_preempt, request_soon
 from smachpy.engine.visit import Override
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean, error_text
@@ -228,7 +228,10 @@ class Control:
         """
         with asking("operator", "", f"preempt of {path}"):
             if path == self._path():
-                request_soon(self._machine)
+                running = frame_of(self._machine)
+                if running is None:  # `request_preempt` would end the next run
+                    raise ControlError(path, "it does not run", ())
+                request_soon(self._machine, running)
                 return
             frame, step = self._step_at(path)
             self._stop_at(frame, step, path, Override())

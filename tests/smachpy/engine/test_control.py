@@ -282,6 +282,18 @@ def test_preempt_of_a_sub_machine_follows_its_transition(clock):
     assert sm.execute() == "preempted"
 
 
+def test_preempt_of_a_machine_that_does_not_run_is_an_error_and_its_next_run_goes_on(clock):
+    sm = mission()
+    with pytest.raises(ControlError, match="/P: it does not run"):
+        sm.control.preempt("/P")
+    assert sm.execute() == "ok"
+    with pytest.raises(ControlError, match="/P: it does not run"):
+        sm.control.preempt("/P")
+    assert sm.execute() == "ok"
+    sm.request_preempt()  # this is for the next run
+    assert sm.execute() == "preempted"
+
+
 def test_commands_in_a_concurrence_and_an_iterator(clock):
     loop = smachpy.Iterator(["ok", "preempted"], [], [], it=range(3), exhausted_outcome="ok")
     loop.set_contained_state("EACH", Work(), loop_outcomes=["ok", "failed"])
