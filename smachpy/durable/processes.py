@@ -34,6 +34,15 @@ def process_lives(pid: int, mark: str) -> bool | None:
     return _start_of(pid) == start
 
 
+def is_of_other_boot(mark: str) -> bool:
+    """Return whether a `process_mark()` is of another boot than this process.
+
+    On one computer nothing of that boot can still be alive.
+    """
+    boot, mine = mark.partition(" ")[0], _boot_and_namespace().partition(" ")[0]
+    return bool(boot) and "unknown" not in {boot, mine} and boot != mine
+
+
 def boot_clock() -> str:
     """Return a name of this computer's monotonic clock, the same for all that read it.
 

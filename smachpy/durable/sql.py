@@ -22,7 +22,12 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 from actionlib_core.clock.forks import is_copy
 from actionlib_core.names import clean_namespace
 from smachpy.durable.position import VERSION as FORMAT
-from smachpy.durable.processes import process_lives, process_mark, this_runner
+from smachpy.durable.processes import (
+    is_of_other_boot,
+    process_lives,
+    process_mark,
+    this_runner,
+)
 from smachpy.durable.store import (
     INTERRUPTED,
     OVER,
@@ -1019,11 +1024,12 @@ class SqlStore(ABC):
         except ValueError:
             return True  # nobody, or nobody can be it
         left = -self._since(lease_end, lease_clock, now) if _is_time(lease_end) else 0.0
+        mark = mark if isinstance(mark, str) else ""
         return may_take(
-            process_lives(pid, mark if isinstance(mark, str) else ""),
+            process_lives(pid, mark),
             left,
             by_lease=self.by_lease,
-            same_host=host == self._host,
+            restarted=host == self._host and is_of_other_boot(mark),
         )
 
     def _refuse_held(self, mission: str, held: Sequence[Any], now: float) -> None:

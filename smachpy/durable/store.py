@@ -643,7 +643,7 @@ def check_lease_seconds(seconds: float) -> None:
 
 
 def may_take(
-    holder_lives: bool | None, lease_left: float, *, by_lease: bool, same_host: bool
+    holder_lives: bool | None, lease_left: float, *, by_lease: bool, restarted: bool
 ) -> bool:
     """Return whether a mission may be taken from the process that holds it.
 
@@ -652,13 +652,13 @@ def may_take(
         lease_left: Time until its lease ends [s].
         by_lease: Whether computers share the store. Then a living process that has stopped renewing
             loses its mission; otherwise it keeps the mission until it ends.
-        same_host: Whether its host has the name of this one.
+        restarted: Whether its host has the name of this one, which has been restarted since.
     """
     if holder_lives is False:
         return True
     if not by_lease and holder_lives:
         return False
-    # Unknown on a computer of the same name: it has been restarted since, see `process_lives`.
-    if not by_lease and same_host:
+    # One in another container of this computer may be alive, and go on renewing its lease.
+    if not by_lease and restarted:
         return True
     return lease_left <= 0

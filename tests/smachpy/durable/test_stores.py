@@ -452,7 +452,7 @@ def test_in_a_file_a_suspended_process_keeps_its_mission(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("lives", "left", "by_lease", "same_host", "expected"),
+    ("lives", "left", "by_lease", "restarted", "expected"),
     [
         (False, 100.0, True, True, True),
         (False, 100.0, False, True, True),
@@ -466,8 +466,8 @@ def test_in_a_file_a_suspended_process_keeps_its_mission(tmp_path):
         (None, -1.0, False, False, True),
     ],
 )
-def test_who_may_take_a_mission(lives, left, by_lease, same_host, expected):
-    assert may_take(lives, left, by_lease=by_lease, same_host=same_host) is expected
+def test_who_may_take_a_mission(lives, left, by_lease, restarted, expected):
+    assert may_take(lives, left, by_lease=by_lease, restarted=restarted) is expected
 
 
 def test_a_pid_that_is_used_again_is_another_process():
@@ -477,3 +477,22 @@ def test_a_pid_that_is_used_again_is_another_process():
     assert process_lives(os.getpid(), f"{boot_and_namespace} 1") is False
     assert process_lives(os.getpid(), "other boot 1") is None
     assert process_lives(os.getpid(), "") is None
+
+
+@pytest.mark.parametrize("restarted", [False, True])
+def test_a_mission_in_another_container_of_this_computer_is_not_taken_before_its_lease_ends(
+    store_place, restarted
+):
+    """Two containers with one host name and one file: both ran the mission at once."""
+    boot = "0-1-2" if restarted else process_mark().partition(" ")[0]
+    store, other = open_store(store_place), open_store(store_place)
+    store._mark = f"{boot} pid:[1] 123"
+    store.create(ROW)
+    store.claim("m1", this_runner(), seconds=LONG_S)
+    if restarted and not store.by_lease:
+        other.claim("m1", this_runner(), seconds=LONG_S)
+    else:
+        with pytest.raises(MissionInUseError):
+            other.claim("m1", this_runner(), seconds=LONG_S)
+    store.close()
+    other.close()
