@@ -69,6 +69,9 @@ class Graph:
     start: int = 0
     ends: dict[str, int] = field(default_factory=dict)
     _begins: dict[str, set[int]] = field(default_factory=dict)  # by path
+    # Each moment that a run can come to -> its place in a search from the start, and the one before
+    # it; empty until it is needed. Nothing is added to the graph after that.
+    _came: dict[int, tuple[int, int | None]] = field(default_factory=dict)
 
     def add(self, record: StateRecord, outcome: str | None) -> GraphNode:
         """Add a moment, without successors."""
@@ -132,6 +135,8 @@ class Graph:
         framework: bool = True,
     ) -> list[GraphNode] | None:
         """Return a shortest run from `start` to one of `goals` that avoids all of `avoid`."""
+        if [*start] == [self.start] and not avoid and preempt and framework:
+            return self._path_from_start(goals)
         came: dict[int, int | None] = {number: None for number in start if number not in avoid}
         queue = deque(came)
         while queue:
@@ -146,6 +151,24 @@ class Graph:
                     came[after] = number
                     queue.append(after)
         return None
+
+    def _path_from_start(self, goals: Collection[int]) -> list[GraphNode] | None:
+        """Return the same for any run: one search finds those for all problems of a check."""
+        if not self._came:
+            self._came = {self.start: (0, None)}
+            queue = deque(self._came)
+            while queue:
+                for after in self.after(number := queue.popleft()):
+                    if after not in self._came:
+                        self._came[after] = (len(self._came), number)
+                        queue.append(after)
+        reached = [number for number in goals if number in self._came]
+        if not reached:
+            return None
+        steps = [min(reached, key=self._came.__getitem__)]
+        while (before := self._came[steps[-1]][1]) is not None:
+            steps.append(before)
+        return [self.nodes[step] for step in reversed(steps)]
 
     def closed_loops(self, among: Collection[int]) -> Iterator[set[int]]:
         """Yield each set of moments that only lead to each other.

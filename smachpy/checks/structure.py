@@ -9,9 +9,10 @@ from smachpy.checks import graph as runs
 from smachpy.checks.graph import PREEMPTED
 from smachpy.checks.model import Problem
 from smachpy.events.outcome_classes import outcome_class
+from smachpy.events.run_state import paths_above
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from smachpy.checks.graph import Graph
     from smachpy.checks.model import Severity, Subject
@@ -21,10 +22,11 @@ if TYPE_CHECKING:
 def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
     """Yield the problems of the structure."""
     reached = graph.reachable([graph.start])
+    known = {record.path: record for record in subject.root.walk()}
     made: dict[str, set[str | None]] = {}  # path of a reached state -> its outcomes there
     for node in map(graph.nodes.__getitem__, reached):
         made.setdefault(node.record.path, set()).add(node.outcome)
-    for record in subject.root.walk():
+    for record in known.values():
         if record.path not in made:
             continue
         for child in record.children:
@@ -36,10 +38,10 @@ def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
         yield from _leaf(subject, record)
         yield from _cases(subject, record)
         if record.kind == "concurrence":
-            yield from _concurrence(subject, record)
+            yield from _concurrence(subject, known, record)
         if record.is_container and record is not subject.root:  # after the root, nothing can go on
             yield from _preempts(subject, record)
-    yield from _loops(subject, graph, reached)
+    yield from _loops(subject, known, graph, reached)
     yield from _waits(subject, subject.root, limited=False)
     yield from _resources(subject)
 
@@ -161,7 +163,9 @@ def _way(inside: dict[str, dict[str, str]], start: str, end: str) -> tuple[str, 
     return ()
 
 
-def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Problem]:
+def _loops(
+    subject: Subject, known: Mapping[str, StateRecord], graph: Graph, reached: set[int]
+) -> Iterator[Problem]:
     """Yield the loops of states that lead only to each other: only a preempt can end them."""
     can_end = {*graph.ends.values(), *graph.loose}
     before: dict[int, list[int]] = {}
@@ -174,27 +178,30 @@ def _loops(subject: Subject, graph: Graph, reached: set[int]) -> Iterator[Proble
         can_end |= new
         queue += new
     reported: set[tuple[str, ...]] = set()
+    only_fails = _only_fails(graph)
     for loop in graph.closed_loops(reached - can_end):
         records = [graph.nodes[number].record for number in loop]
         # The states of the loop itself; the other records are inside them.
         outermost = min(record.path.count("/") for record in records)
         paths = tuple(sorted({r.path for r in records if r.path.count("/") == outermost}))
         parent = paths[0].rpartition("/")[0]
-        if paths not in reported and not _is_ended_from_outside(subject, parent):
+        if paths not in reported and not _is_ended_from_outside(subject, known, parent):
             reported.add(paths)
             instant = all(subject.facts_of(r).instant for r in records if not r.is_container)
-            yield _endless(graph, parent, paths, instant=instant)
+            yield _endless(graph, parent, paths, instant=instant, only_fails=only_fails)
 
 
-def _is_ended_from_outside(subject: Subject, path: str) -> bool:
+def _is_ended_from_outside(subject: Subject, known: Mapping[str, StateRecord], path: str) -> bool:
     """Return whether a timeout, or a callback of a concurrence, ends the container at some time."""
-    around = [r for r in subject.root.walk() if f"{path}/".startswith(f"{r.path}/")]
+    around = [known[one] for one in (path, *paths_above([path])) if one in known]
     return any("timeout" in dict(record.details) for record in around) or any(
         subject.facts_of(record).cuts for record in around if record.path != path
     )
 
 
-def _endless(graph: Graph, parent: str, paths: tuple[str, ...], *, instant: bool) -> Problem:
+def _endless(
+    graph: Graph, parent: str, paths: tuple[str, ...], *, instant: bool, only_fails: bool
+) -> Problem:
     """Return the problem of a loop; only a note if the mission is meant to run for ever.
 
     If none of its states takes time, a processor is busy for ever and virtual time stands still.
@@ -205,7 +212,7 @@ def _endless(graph: Graph, parent: str, paths: tuple[str, ...], *, instant: bool
     text += f" and take{'' if many else 's'} no time" if instant else ""
     begins = {number for path in paths for number in graph.begins(path)}
     steps = runs.moments(graph.path([graph.start], begins) or [])
-    if _only_fails(graph):
+    if only_fails:
         text += "; the mission runs until it is preempted."
         severity: Severity = "warning" if instant else "note"
         hint = "Let a state of it wait, for instance with self.sleep(...)." if instant else ""
@@ -223,7 +230,9 @@ def _only_fails(graph: Graph) -> bool:
     return all(outcome_class(outcome) in {"failure", "preempted"} for outcome in ends)
 
 
-def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
+def _concurrence(
+    subject: Subject, known: Mapping[str, StateRecord], record: StateRecord
+) -> Iterator[Problem]:
     facts = subject.facts_of(record)
     # An outcome callback may decide before the rules are evaluated.
     combined = [] if facts.any_outcome else runs.combinations(record, subject) or []
@@ -242,7 +251,7 @@ def _concurrence(subject: Subject, record: StateRecord) -> Iterator[Problem]:
     if (
         facts.cuts
         or len(waiting) == len(record.others)  # it is meant to run as long as the mission
-        or _is_ended_from_outside(subject, record.path)
+        or _is_ended_from_outside(subject, known, record.path)
     ):
         return
     for child in waiting:

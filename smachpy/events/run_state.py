@@ -15,7 +15,7 @@ from actionlib_core.inputs.checked_data import Count, Number, Stamp  # noqa: TC0
 from smachpy.events import resource_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterable
 
 RAISED = "exception"
 """The outcome shown for a state that raised."""
@@ -34,6 +34,21 @@ NOT_RECORDED = "its end was not recorded"
 
 ENDED_GOALS = 20
 """Number of ended goals that are kept."""
+
+
+def paths_above(paths: Iterable[str]) -> set[str]:
+    """Return the paths of all that contains one of `paths`, whether it is among them or not."""
+    above: set[str] = set()
+    for path in paths:
+        while (path := path.rpartition("/")[0]) and path not in above:
+            above.add(path)
+    return above
+
+
+def innermost(paths: Collection[str]) -> list[str]:
+    """Return the paths that contain no other one of `paths`."""
+    above = paths_above(paths)
+    return [path for path in paths if path not in above]
 
 
 class PreemptFacts(TypedDict):
@@ -312,12 +327,13 @@ class RunState:
     def holding_up(self) -> list[str]:
         """Return the paths of the leaves that were asked to stop and are still running."""
         # A container waits for its children, so only the innermost ones delay the preempt.
-        asked = [
-            path
-            for path, state in self.data["states"].items()
-            if state["since"] is not None and state.get("preempt")
-        ]
-        return [path for path in asked if not any(one.startswith(f"{path}/") for one in asked)]
+        return innermost(
+            [
+                path
+                for path, state in self.data["states"].items()
+                if state["since"] is not None and state.get("preempt")
+            ]
+        )
 
     def _on_fired(self, record: dict[str, Any]) -> None:
         self._set(record, marking=list(record["marking"]), fired=record["transition"])

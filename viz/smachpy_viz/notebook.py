@@ -17,10 +17,10 @@ import threading
 from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.clock import RealClock, SerialExecutor
-from smachpy.events.run_state import RAISED
+from smachpy.events.run_state import RAISED, innermost
 from smachpy.exceptions import SmachError
 from smachpy_viz.model.history import History
-from smachpy_viz.model.labels import innermost, shorten
+from smachpy_viz.model.labels import shorten
 from smachpy_viz.pictures.drawing import PictureError, picture
 
 try:

@@ -11,6 +11,7 @@ import pytest
 import smachpy
 from smachpy import CBState, Concurrence, StateMachine
 from smachpy.checks import graph
+from smachpy.events.run_state import innermost, paths_above
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -97,7 +98,14 @@ def test_where_a_state_begins_is_found_without_a_walk(monkeypatch: pytest.Monkey
     assert found.begins("/BIG/OTHER") == set()
 
 
-@pytest.mark.parametrize("make", [chain, ring, unset, wide])
+def rings(size: int) -> Concurrence:
+    both = Concurrence(["done"], "done", name="RINGS")
+    for number in range(size):
+        both.add(f"R{number}", ring(2))
+    return both
+
+
+@pytest.mark.parametrize("make", [chain, ring, unset, wide, rings])
 def test_check_grows_with_the_machine(make: Callable[[int], Any]) -> None:
     assert slope(make, smachpy.check) < 1.2
 
@@ -141,6 +149,16 @@ def test_a_walk_over_nested_machines_visits_each_once() -> None:
         return calls[0]
 
     assert turns(80) < 2.5 * turns(40)
+
+
+def test_the_innermost_of_many_active_states_are_found_in_one_walk() -> None:
+    assert innermost(["/A", "/A/B", "/A/BC", "/A/B/C"]) == ["/A/BC", "/A/B/C"]
+    assert paths_above(["/A/B/C", "/A/D"]) == {"/A/B", "/A"}
+
+    def active(size: int) -> list[str]:
+        return ["/BOTH", *(f"/BOTH/S{number}" for number in range(size))]
+
+    assert slope(active, innermost) < 1.2
 
 
 def test_drawing_as_text_grows_with_the_machine(tmp_path: Path) -> None:

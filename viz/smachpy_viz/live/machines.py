@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.inputs.checked_data import checked
 from smachpy.events import record_text
 from smachpy.events.introspection import StateRecord
-from smachpy.events.run_state import RunState
-from smachpy_viz.model.labels import innermost, shorten
+from smachpy.events.run_state import RunState, innermost
+from smachpy_viz.model.labels import shorten
 from smachpy_viz.model.progress import progress_of
 from smachpy_viz.model.why import newest_run
 from smachpy_viz.runs.listing import RowFold, first_cause

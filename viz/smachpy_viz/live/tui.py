@@ -15,11 +15,11 @@ from textual.widgets import DataTable, Footer, Input, RichLog, Static, Tree
 
 from smachpy.events import answered_text, asker_text, recovered_text, resource_text
 from smachpy.events.outcome_classes import outcome_class
-from smachpy.events.run_state import RunState
+from smachpy.events.run_state import RunState, innermost
 from smachpy.exceptions import SmachError
 from smachpy.userdata.shown import literal
 from smachpy_viz.model.destination import destination
-from smachpy_viz.model.labels import GLYPHS, cleanups, innermost, shorten, tidies, visible
+from smachpy_viz.model.labels import GLYPHS, cleanups, shorten, tidies, visible
 from smachpy_viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING
 
 if TYPE_CHECKING:

@@ -49,11 +49,6 @@ def end_class(kind: str, outcome: str, success: Collection[str] | None = None) -
     return outcome_class(outcome, success)
 
 
-def innermost(paths: Collection[str]) -> list[str]:
-    """Return the paths that contain no other one of `paths`."""
-    return [path for path in paths if not any(other.startswith(f"{path}/") for other in paths)]
-
-
 def cleanups(record: StateRecord) -> tuple[str, ...]:
     """Return the paths of the states that run at every end of what they are in."""
     return tuple(f"{one.path}/{one.cleanup}" for one in record.walk() if one.cleanup)

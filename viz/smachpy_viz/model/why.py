@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from smachpy.events import answered_text, asker_text, resource_text
 from smachpy.events.outcome_classes import is_good, outcome_class
-from smachpy.events.run_state import RAISED
+from smachpy.events.run_state import RAISED, innermost
 from smachpy.userdata.shown import literal
-from smachpy_viz.model.labels import cleanups, innermost, shorten, tidies
+from smachpy_viz.model.labels import cleanups, shorten, tidies
 from smachpy_viz.model.reads import BEGINS, begin_of, values_read
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smachpy.events.introspection import StateRecord, describe
+from smachpy.events.run_state import paths_above
 from smachpy.exceptions import SmachError
 from smachpy_viz.model import extract
 from smachpy_viz.model.history import History
@@ -253,11 +254,8 @@ def _marks(
 ) -> Marks:
     marks = run if isinstance(run, Marks) else _history(run).marks()
     named = {extract.find(record, path).path for path in active}
-    paths = {
-        state.path
-        for state in record.walk()
-        if any(path == state.path or path.startswith(state.path + "/") for path in named)
-    }
+    inside = named | paths_above(named)
+    paths = {state.path for state in record.walk() if state.path in inside}
     return replace(marks, active=marks.active | paths)
 
 

@@ -9,8 +9,8 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from smachpy.events import resource_text
-from smachpy.events.run_state import RAISED
-from smachpy_viz.model.labels import cleanups, end_class, innermost, shorten, tidies
+from smachpy.events.run_state import RAISED, innermost
+from smachpy_viz.model.labels import cleanups, end_class, shorten, tidies
 from smachpy_viz.model.why import newest_run, why
 
 if TYPE_CHECKING:

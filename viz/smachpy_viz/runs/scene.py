@@ -26,7 +26,7 @@ from actionlib_core.interfaces.std_msgs.msg import ColorRGBA, Float64, Header, S
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.interfaces.visualization_msgs.msg import Marker, MarkerArray
 from actionlib_core.time import Time
-from smachpy_viz.model.labels import innermost
+from smachpy.events.run_state import innermost
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

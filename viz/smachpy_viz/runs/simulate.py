@@ -27,11 +27,11 @@ from smachpy.engine.preempt import asking
 from smachpy.events import Entered, Failed, Left
 from smachpy.events.introspection import describe
 from smachpy.events.recording import Recorder, RecordingError
+from smachpy.events.run_state import innermost
 from smachpy.exceptions import MissionError
 from smachpy.machines.mission_info import mission_info
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.places.robot_file import load_config
-from smachpy_viz.model.labels import innermost
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -33,10 +33,11 @@ from rich.table import Table
 from rich.text import Text
 
 from actionlib_core.clock import current_clock
+from smachpy.events.run_state import innermost
 from smachpy.userdata.secret import masked
 from smachpy.userdata.shown import is_shown, literal
 from smachpy_viz.model.history import History
-from smachpy_viz.model.labels import GLYPHS, cleanups, innermost, shorten, tidies
+from smachpy_viz.model.labels import GLYPHS, cleanups, shorten, tidies
 from smachpy_viz.model.progress import progress_of, seconds_left, written_progress
 from smachpy_viz.terminal.lines import NARROW, RUNNING, STYLES, EventLines
 
