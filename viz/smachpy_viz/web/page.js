@@ -1838,7 +1838,14 @@ function countWhile(list, holds) {
   }
   return low;
 }
-var innermost = (list, pathOf2) => list.filter((one) => !list.some((other) => pathOf2(other).startsWith(`${pathOf2(one)}/`)));
+function innermost(list, pathOf2) {
+  const above = /* @__PURE__ */ new Set();
+  for (const entry of list) {
+    let path = pathOf2(entry);
+    while ((path = path.slice(0, Math.max(0, path.lastIndexOf("/")))) && !above.has(path)) above.add(path);
+  }
+  return list.filter((one) => !above.has(pathOf2(one)));
+}
 
 // src/core/outcomes.ts
 var words = (text2) => text2.split(" ");

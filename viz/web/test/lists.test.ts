@@ -19,3 +19,14 @@ test("innermost entries contain no other, and names that only begin alike do not
     ["/A/BC", "/A/B/C", "/D"],
   );
 });
+
+test("the innermost of many entries are found without comparing each with each", () => {
+  const paths = ["/A", ...Array.from({ length: 1000 }, (_, number) => `/A/S${number}`)];
+  let looks = 0;
+  const found = innermost(paths, (path) => {
+    looks += 1;
+    return path;
+  });
+  assert.equal(found.length, 1000);
+  assert.ok(looks <= 2 * paths.length);
+});

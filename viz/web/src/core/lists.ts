@@ -16,5 +16,11 @@ export function countWhile<T>(list: T[], holds: (entry: T) => boolean) {
 }
 
 /** The entries whose path contains the path of no other entry. */
-export const innermost = <T>(list: T[], pathOf: (entry: T) => string) =>
-  list.filter((one) => !list.some((other) => pathOf(other).startsWith(`${pathOf(one)}/`)));
+export function innermost<T>(list: T[], pathOf: (entry: T) => string) {
+  const above = new Set<string>();
+  for (const entry of list) {
+    let path = pathOf(entry);
+    while ((path = path.slice(0, Math.max(0, path.lastIndexOf("/")))) && !above.has(path)) above.add(path);
+  }
+  return list.filter((one) => !above.has(pathOf(one)));
+}
