@@ -403,9 +403,15 @@ class RosServerPort:
             return
         # Before looking whether it has ended: if it ends in between, `send_result` finds this.
         with self._lock:
-            if not self._closed:
+            closed = self._closed
+            if not closed:
                 self._waiting.setdefault(goal_id, []).append(request)
-        self._answer_ended(goal_id)
+        if not closed:
+            self._answer_ended(goal_id)
+            return
+        # `close` has answered those that waited, and nobody will end the goal any more.
+        entry, body = self._listener.find_end(goal_id)
+        self._reply(request, self._unknown if body is None else self._response(entry, body))
 
     def _answer_ended(self, goal_id: str) -> None:
         """Answer the requests for the result of a goal that has ended or is unknown."""

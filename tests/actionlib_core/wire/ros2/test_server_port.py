@@ -474,6 +474,27 @@ def test_a_server_that_stops_answers_everybody(world: World) -> None:
         world.goals[0].publish_feedback(Fibonacci.Feedback())
 
 
+@pytest.mark.parametrize(("ended", "code"), [(True, GoalCode.SUCCEEDED), (False, 0)])
+def test_a_request_for_a_result_is_answered_while_the_server_closes(
+    world: World, monkeypatch: pytest.MonkeyPatch, ended: bool, code: int
+) -> None:
+    action_server, client = world.serve(), world.client()
+    uuid, late = world.send(client), []
+    if ended:
+        world.goals[0].set_succeeded()
+    port = action_server.keeper.port
+
+    def close() -> None:  # the tokens are being withdrawn
+        late.append(client.result(uuid))
+        world.clock.sleep(0.05)
+
+    first = next(iter(port._ends.values()))
+    withdraw = first.close
+    monkeypatch.setattr(first, "close", lambda: (withdraw(), close()))
+    port.close()
+    assert client.end_of(late[0])[0] == code
+
+
 def test_a_client_that_waits_for_no_token_is_answered_in_full(world: World) -> None:
     """Its goal comes as soon as a server can be asked: one that was there before has the key."""
     gone = world.serve()
