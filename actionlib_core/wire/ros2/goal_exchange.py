@@ -134,6 +134,9 @@ class GoalExchange:
         if self.phase is ExchangePhase.HERE:
             self.phase = ExchangePhase.QUEUED
             return Duty.QUEUE
+        # A cancel that came before the goal has made this object, as if for an attached goal.
+        if self._attached and self._cancel_wanted and not self.code:
+            return Duty.RECALLED
         if self.phase is ExchangePhase.TAKEN:
             # The state may have arrived before the server's tokens, when it could not be reported.
             return Duty.NOTIFY if self.code else Duty.NOTHING

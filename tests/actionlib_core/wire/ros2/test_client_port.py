@@ -362,6 +362,25 @@ def test_cancel_of_a_goal_that_waits_for_its_answer_follows_the_acceptance(world
     assert server.sent == [uuid]
 
 
+def test_cancel_that_comes_just_before_its_goal_recalls_it(world, monkeypatch):
+    """Another thread cancels when the goal is followed already and not sent yet."""
+    server, client = world.server(), world.client()
+    port = client.manager.port
+    send = port.send_goal
+
+    def send_goal(*args, **options):
+        monkeypatch.undo()
+        client.cancel_all_goals()
+        world.clock.sleep(0.01)
+        send(*args, **options)
+
+    monkeypatch.setattr(port, "send_goal", send_goal)
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    assert handle.wait(60.0)
+    assert handle.get_goal_status() == Status.RECALLED
+    assert server.sent == []
+
+
 def test_cancel_of_all_goals(world):
     server, client = world.server(), world.client()
     first, one, _ = begin(server, client)
