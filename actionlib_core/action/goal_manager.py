@@ -146,7 +146,9 @@ class GoalManager:
         self._servers = KnownServers(status_list_timeout)
         self._gone: dict[Server, str] = {}  # servers that are away -> what has happened to them
         self._goals: dict[str, ClientGoalHandle] = {}  # by id, those that are not over
-        self._ended: dict[str, None] = {}  # ids of ended ones: a `Recent`, written out for speed
+        # Ids of ended ones, a `Recent`, written out for speed; with the handle if the server was to
+        # keep the result.
+        self._ended: dict[str, ClientGoalHandle | None] = {}
         self._strangers = Recent(REMEMBERED)  # sessions that were reported
         self._acks: list[str] = []  # goal ids for the next acknowledgement message
         self._ack_timer: Timer | None = None
@@ -656,8 +658,7 @@ class GoalManager:
         """Handle a result. `answered`: it is the reply to a query; `body` None: no longer kept."""
         handle = self._goals.get(entry.id)
         if handle is None:
-            if entry.id in self._ended:  # sent again, as our acknowledgement was lost
-                self.acknowledge(entry.id)
+            self._on_repeated_result(entry.id)
             return
         if not (answered or self._believes(session, handle)):
             return
@@ -679,6 +680,13 @@ class GoalManager:
                 path = goal.on_result(status, entry.text, result, now)
             if path:
                 self._finish(handle, path)
+
+    def _on_repeated_result(self, goal_id: str) -> None:
+        """Acknowledge the result of an ended goal again, as our acknowledgement was lost."""
+        if goal_id in self._ended:
+            ended = self._ended.get(goal_id)
+            if ended is None or not ended.keeps_result:
+                self.acknowledge(goal_id)
 
     def follows(self, goal_id: str) -> bool:
         """Return whether a goal is followed and has not ended."""
@@ -705,6 +713,8 @@ class GoalManager:
             if self._closed:
                 return
             self._acks.append(goal_id)
+            if goal_id in self._ended:
+                self._ended[goal_id] = None
             count = len(self._acks)
             if count == 1:
                 self._ack_timer = self.clock.call_later(TICK_S, self._send_acks)
@@ -748,7 +758,7 @@ class GoalManager:
             self._tell("end", goal.id, goal.result, goal.status.name, goal.text)
         if self._goals.pop(handle.goal.id, None) is not None:  # else it was never sent
             self._count(handle.owner, -1)
-        self._ended[handle.goal.id] = None
+        self._ended[handle.goal.id] = handle if handle.keeps_result else None
         if len(self._ended) > REMEMBERED:
             del self._ended[next(iter(self._ended))]
         handle.ended_at = now

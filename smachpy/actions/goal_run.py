@@ -419,15 +419,15 @@ class GoalFollower:
 
         If this process ends in between, the next one gets the result from the server again.
         """
-        handle.keeps_result = False
         run = self.run
-        if run.status == "LOST" and self.unanswered:
-            return  # a resumed process must decide again what to do about it
-        if self._frame is not None:
+        # Of an unanswered one, a resumed process must decide again what to do about it.
+        kept = self._frame is not None and not (run.status == "LOST" and self.unanswered)
+        if self._frame is not None and kept:
             facts = (self.goal_id, run.status, run.text, self.result)
             self._journal.goal_done(self._frame, *facts, preempted=run.preempted)
-            if handle.goal.over and run.status != "LOST":
-                handle.acknowledge()
+        handle.keeps_result = False  # from now on, it is acknowledged whenever it comes
+        if kept and handle.goal.over and run.status != "LOST":
+            handle.acknowledge()
 
     def cancel(self) -> None:
         """Cancel the goal, if it was sent and has not ended."""

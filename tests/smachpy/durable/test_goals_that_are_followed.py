@@ -19,6 +19,7 @@ from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node
 from smachpy import CBState, Concurrence, SimpleActionState, StateMachine, events
 from smachpy.durable.journal import read_position
+from smachpy.durable.recorder import Recorder
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 from tests.two_nodes import TwoNodes
 
@@ -150,6 +151,27 @@ def test_the_result_of_one_that_has_ended_is_taken(world: World) -> None:
     assert world.run(machine) == "succeeded"
     assert machine.userdata.result == Result(7)
     assert len(world.ids) == 1
+
+
+def test_the_server_keeps_a_result_that_comes_twice_until_it_is_in_the_journal(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process that dies while it writes must get it from the server again."""
+    keeper, kept = world.serve().keeper, []
+    goal_done = Recorder.goal_done
+
+    def result_comes_again(*args: Any, **options: Any) -> None:
+        entry, body = keeper.find_end(world.ids[0])
+        assert body is not None
+        keeper.port.send_result(entry, body)
+        world.clock.sleep(1.0)
+        kept.append(keeper.find_end(world.ids[0])[1] is not None)
+        goal_done(*args, **options)
+
+    monkeypatch.setattr(Recorder, "goal_done", result_comes_again)
+    world.end_soon()
+    assert world.run(world.machine()) == "succeeded"
+    assert kept == [True]
 
 
 def test_one_that_was_cancelled_as_its_mission_died_is_sent_again(
