@@ -301,6 +301,32 @@ def fewer_fields(line: Line) -> list[tuple[Line, Line]]:
     return [(made(less), made(other)) for less, other in _less(fields)]
 
 
+def rounder_fields(line: Line) -> list[tuple[Line]]:
+    """Return the lines that publish the message with rounder numbers, the roundest first.
+
+    They stay near: a test of a battery just below a limit must see when the limit is lowered.
+    """
+    if line.method != "publish_at":
+        return []
+    named = dict(line.named)
+    latch = bool(named.pop("latch", False))
+    fields = line.values[1] if len(line.values) > 1 else named
+    found = (_rounded(fields, digits) for digits in (DIGITS, DIGITS + 1))
+    return [
+        (message_line(line.word, line.values[0], one, latch=latch),)
+        for one in found
+        if one != fields
+    ]
+
+
+def _rounded(value: Any, digits: int) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(one, digits) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_rounded(one, digits) for one in value]
+    return float(f"{value:.{digits}g}") if isinstance(value, float) else value
+
+
 def _less(fields: dict[str, Any]) -> list[tuple[dict[str, Any], dict[str, Any]]]:
     found = [
         ({key: one for key, one in fields.items() if key != gone}, {**fields, gone: _other(value)})

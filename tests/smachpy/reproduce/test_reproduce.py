@@ -594,7 +594,7 @@ def test_round_aborted(mission, action_server, topic):
     move_base.never_finish()
     move_base.reply(status="aborted", duration=31)
     battery = topic("battery", BatteryState)
-    battery.publish_at(32, percentage=0.28999999165534973)
+    battery.publish_at(32, percentage=0.29)
     run = mission(make_mission())
     run.assert_path(["DRIVE", "WATCH", "HOME"])
     assert run.outcomes("DRIVE") == ("preempted",)
@@ -939,3 +939,29 @@ def test_code_that_computed_for_long_takes_no_time_and_what_follows_comes_earlie
     found = reproduce(read_recording(path), make=computing)
     assert found.is_same, lines_of(found)
     assert found.events[-1]["t"] - found.events[0]["t"] < 4.0
+
+
+def test_a_world_of_too_many_lines_stays_in_the_recording(tmp_path, monkeypatch, capsys):
+    path = tmp_path / "many.jsonl"
+    monkeypatch.setattr("smachpy.reproduce.written.MOST_LINES", 2)
+    with mission_kit() as kit:
+        battery = kit.topic("battery", BatteryState)
+        for number in range(3):
+            battery.publish_at(1.0 + number, percentage=0.4)
+        machine = three_lows()
+        with Recorder(path, machine):
+            assert kit(machine).outcome == "valid"
+    written = tmp_path / "test_many.py"
+    command = ["runs", "reproduce", str(path), "--mission", f"{__name__}:three_lows"]
+    assert main([*command, "-o", str(written)]) == 0
+    assert "would be 3 lines: the test reads the recording" in capsys.readouterr().out
+    assert 'read_recording(HERE / "many.jsonl")' in written.read_text()
+
+
+def three_lows():
+    sm = StateMachine(["valid", "invalid", "aborted", "preempted"], name="LOWS")
+    look = smachpy.MonitorState(
+        "battery", BatteryState, lambda _, message: message.percentage < 0.5, 3, timeout=5.0
+    )
+    sm.add("LOOK", look)
+    return sm
