@@ -51,6 +51,7 @@ class _Meetings:
     def __init__(self, group: Group) -> None:
         self._group = group
         self._open: dict[str, _Meeting] = {}
+        self._last: dict[ChildBranch, _Meeting] = {}  # the branch that came last tells the others
 
     def join(
         self, name: str, parties: int, branch: ChildBranch, frame: Frame, wake: Event
@@ -66,6 +67,7 @@ class _Meetings:
         meeting.waiting[branch] = frame, wake
         if len(meeting.waiting) == parties:
             meeting.outcome = "done"
+            self._last[branch] = meeting
             del self._open[name]
         else:
             self.branch_ended()
@@ -73,6 +75,9 @@ class _Meetings:
 
     def leave(self, branch: ChildBranch) -> None:
         """Let a branch no longer wait at a meeting that has no outcome."""
+        last = self._last.pop(branch, None)
+        if last is not None and not last.is_told:  # it was interrupted before it could tell
+            last.tell()
         for name, meeting in list(self._open.items()):
             meeting.waiting.pop(branch, None)
             if not meeting.waiting:

@@ -9,7 +9,8 @@ import pytest
 import smachpy
 from actionlib_core.clock import VirtualClock, use_clock
 from smachpy import Concurrence, InvalidStateError, InvalidUserCodeError, State, StateMachine
-from smachpy.states import Barrier, Wait
+from smachpy.engine.interrupt import Interruption
+from smachpy.states import Barrier, Wait, barrier
 from smachpy.testing import explore, mission_kit
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 
@@ -107,6 +108,23 @@ def test_a_timeout_ends_the_wait_and_the_others_may_still_meet():
         run = mission(together(machine, loader(4.0)))
     assert (run.outcome, run.duration) == ("done", 4.0)
     assert run.visits("LOAD") == 2
+
+
+def test_the_last_one_that_is_interrupted_as_it_comes_lets_the_others_go(monkeypatch):
+    """They waited for ever, and no request to stop reached them."""
+    real = barrier._Meetings.join
+
+    def join(self, *arguments: Any) -> Any:
+        meeting = real(self, *arguments)
+        if meeting.outcome:
+            raise Interruption  # its grace is over
+        return meeting
+
+    monkeypatch.setattr(barrier._Meetings, "join", join)
+    clock = VirtualClock()
+    with use_clock(clock):
+        assert together(loader(2.0), loader(5.0)).execute() == "done"
+    assert clock.now() == 5.0
 
 
 def test_the_nearest_concurrence_counts():
