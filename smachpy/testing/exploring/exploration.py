@@ -23,7 +23,7 @@ from smachpy.machines.container import Container, below
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.ahead import Ahead
-from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions
+from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions, begins
 from smachpy.testing.exploring.search import Search
 from smachpy.testing.exploring.verdicts import judge
 from smachpy.testing.kit import MissionKit, check_machine
@@ -421,11 +421,12 @@ class RepeatedRun:
             self.explorer = Explorer(machine, self.options, self._places, merges=self._merges)
         else:
             self.explorer.go_on(machine, self._places, journal.active())
+        containers = [each for each in below(machine) if isinstance(each, Container)]
         self._userdata = [
             (c.userdata, {key: c.userdata[key] for key in c.userdata.keys()})  # noqa: SIM118
-            for c in below(machine)
-            if isinstance(c, Container)
+            for c in containers
         ]
+        self._begins = [(each, begins(each)) for each in containers]
         self._scripts = [
             (path, state, state.script)
             for path, state in walk(machine, f"/{machine.name or 'SM_ROOT'}")
@@ -437,13 +438,18 @@ class RepeatedRun:
                 double.script = script[min(journal.ends(path), len(script) - 1) :]
 
     def _restore(self) -> None:
-        """Reset the userdata and the test's doubles."""
+        """Reset the userdata, where the machines begin, and the test's doubles."""
         for _, double, script in self._scripts:
             double.script = script
         for userdata, values in self._userdata:
             for key in userdata.keys():  # noqa: SIM118
                 del userdata[key]
             userdata.update(_copied(values))
+        for container, (goes_on, stopped_at, initial) in self._begins:
+            live = container._smachpy.live
+            live.goes_on, live.stopped_at = goes_on, stopped_at
+            if hasattr(container._smachpy, "next_initial"):
+                container._smachpy.next_initial = initial
 
     def run(
         self,

@@ -713,11 +713,18 @@ def _kept_in(container: Container) -> Hashable:
     """
     data = container.userdata
     own = tuple((key, _text(writable(data[key]))) for key in sorted(data.keys()))
-    live = container._smachpy.live
-    begins = live.goes_on, live.stopped_at, getattr(container._smachpy, "next_initial", None)
     children = container.get_children().values()
     inner = [_kept_in(child) for child in children if isinstance(child, Container)]
-    return (own, begins, container._smachpy_situation(), *inner)
+    return (own, begins(container), container._smachpy_situation(), *inner)
+
+
+def begins(container: Container) -> tuple[str, str, str | None]:
+    """Return what decides where the next run of a container begins.
+
+    The child in which it goes on, the one in which it was stopped, and its next initial one.
+    """
+    live = container._smachpy.live
+    return live.goes_on, live.stopped_at, getattr(container._smachpy, "next_initial", None)
 
 
 def _text(value: object) -> str:

@@ -1199,3 +1199,20 @@ def test_what_follows_a_value_that_cannot_be_copied_is_copied():
     explore(machine, keep=["A"], userdata=values).assert_ok()
     assert not any(marks)
     assert not any(sighting.seen for sighting in sightings)
+
+
+def test_a_machine_that_goes_on_is_explored_from_its_begin_each_time():
+    """Given as an object, it went on in each run where the one before had been interrupted."""
+
+    def make():
+        sm = StateMachine(["done", "preempted"], name="M", reenter="last")
+        for label, target in [("A", "B"), ("B", "C"), ("C", "done")]:
+            sm.add(label, Leaf("ok", "preempted"), {"ok": target})
+        return sm
+
+    def ways(machine):
+        runs = []
+        assert explore(machine, on_run=runs.append).exhaustive
+        return {(run.outcome, *run.path) for run in runs}
+
+    assert ways(make()) == ways(make)
