@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import threading
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from actionlib_core.inputs.json_text import check_depth
 from smachpy.durable.position import VERSION, Position
@@ -83,6 +83,15 @@ def _load(data: bytes) -> Any:
     return found
 
 
+class _Write(NamedTuple):
+    """What one call of the store writes: entries up to number `upto`, and large values."""
+
+    entries: list[bytes]
+    blobs: dict[str, bytes]
+    snapshot: bytes | None
+    upto: int
+
+
 class Journal:
     """Writes the entries of one run.
 
@@ -111,6 +120,7 @@ class Journal:
         self._queue: list[bytes] = []
         self._put = 0
         self._written = 0
+        self._begun: _Write | None = None  # not None later: it was interrupted, and may be stored
         self._failed: Exception | None = None  # that of the store: later entries need the lost ones
         self._since_snapshot = 0
         self._new_bytes = 0  # of large values since then
@@ -176,11 +186,15 @@ class Journal:
                 return  # another thread has written it with its own
             if self._failed is not None:  # perhaps one that had taken this entry with its own
                 raise self._failed
+            if self._begun is not None and self._is_stored(self._begun):
+                self._note_written(self._begun)
+                if self._written >= number:
+                    return
             # All that is queued by now. `lock` is released before the store is called, so that
-            # other threads can queue the next entries while this one waits for the disk.
+            # other threads can queue the next entries while this one waits for the disk. They stay
+            # queued until they are written: a state may be interrupted anywhere in here.
             with self.lock:
-                entries, self._queue = self._queue, []
-                blobs, self._blobs = self._blobs, {}
+                entries, blobs = self._queue.copy(), self._blobs.copy()
                 upto = self._put
                 finished = self.position.data["finished"]
                 self._since_snapshot += len(entries)
@@ -192,6 +206,7 @@ class Journal:
                     snapshot = self.position.to_bytes()
                     self._since_snapshot = self._new_bytes = 0
                     kept = self._stored = self.position.digests()
+            self._begun = begun = _Write(entries, blobs, snapshot, upto)
             try:
                 self._store.append(
                     self._lease,
@@ -208,4 +223,18 @@ class Journal:
                 self._failed = error
                 raise
             self._has_begun = True
-            self._written = upto
+            self._note_written(begun)
+
+    def _is_stored(self, write: _Write) -> bool:
+        """Return whether a write that was interrupted had come to its end in the store."""
+        snapshot, entries = self._store.read(self._lease.mission)
+        if write.snapshot is not None:
+            return snapshot == write.snapshot
+        return entries[-len(write.entries) :] == write.entries
+
+    def _note_written(self, write: _Write) -> None:
+        with self.lock:
+            queue = self._queue[len(write.entries) :]
+            blobs = {name: data for name, data in self._blobs.items() if name not in write.blobs}
+            # No call and no loop in between: so an interruption comes before all of it or after it.
+            self._queue, self._blobs, self._written, self._begun = queue, blobs, write.upto, None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from smachpy.durable.journal import Journal
 from smachpy.durable.position import Position
 from smachpy.durable.store import Lease, StoreError
+from smachpy.engine.interrupt import Interruption
 
 LEASE = Lease("m", 1, "robot:1")
 
@@ -20,13 +23,23 @@ class Store:
 
     def __init__(self):
         self.written = []
+        self.blobs = []
+        self.writes = []
+        self.snapshot = None
         self.fail = lambda written: None
 
-    def append(self, lease, entries, **_):
+    def append(self, lease, entries, *, snapshot=None, blobs=(), **_):
         fail, self.fail = self.fail, lambda written: None
         fail(False)
+        self.writes.append(entries)
         self.written += entries
+        self.blobs += blobs
+        if snapshot is not None:
+            self.snapshot, self.written = snapshot, []
         fail(True)
+
+    def read(self, mission):
+        return self.snapshot, list(self.written)
 
 
 def begun():
@@ -56,3 +69,30 @@ def test_an_entry_that_was_lost_with_that_of_another_thread_is_not_told_to_be_wr
             journal.commit(number)
     assert len(store.written) == 1
     journal.commit(1)  # written long before
+
+
+@pytest.mark.parametrize("was_written", [False, True])
+@pytest.mark.parametrize("last", ["Stopped", "Finished"])
+def test_an_entry_whose_write_is_interrupted_is_written_once(was_written, last):
+    """It was lost. SQLite is interrupted after its COMMIT, as a rule: then it is written."""
+    journal, store, put = begun()
+
+    def fail(written):
+        if written is was_written:
+            raise Interruption
+
+    with journal.lock:
+        journal.compact("a" * 5000, "a" * 5000)
+        interrupted = put(last, "/M", outcome="done")
+    store.fail = fail
+    with pytest.raises(Interruption):
+        journal.commit(interrupted)
+    journal.commit(interrupted)
+    kinds = [json.loads(entry)["kind"] for entry in store.written]
+    if last == "Stopped":
+        assert kinds == ["Started", "Stopped"]
+    else:  # a snapshot takes the place of all entries
+        assert (kinds, json.loads(store.snapshot)["finished"]) == ([], True)
+    journal.commit(put("Noted", "/M"))
+    assert len(store.writes) == 3
+    assert len(store.blobs) == 1
