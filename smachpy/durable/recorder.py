@@ -246,11 +246,15 @@ class Recorder(RunJournal):
             entry = {"kind": kind, "path": path, "stamp_ns": self.time.now_ns(), **facts}
             if value:
                 entry[value] = journal.compact(facts[value], json.dumps(facts[value]))
+            learn: Callable[[], None] | None = None
             if frame is not None:
-                entry.update(self._changes(frame, step, path))
+                changes, learn = self._changes(frame, step, path)
+                entry.update(changes)
             if entry.pop("only_changes", False) and "userdata" not in entry:
                 return True
             number = journal.put(entry)
+            if learn is not None:
+                learn()
         # Without the lock: other branches queue their entries meanwhile, see `Journal`.
         try:
             journal.commit(number)
@@ -270,8 +274,12 @@ class Recorder(RunJournal):
         with asking("program", "journal", str(error)):
             request_soon(self._machine)
 
-    def _changes(self, frame: Frame, step: Step | None, child: str) -> dict[str, Any]:
+    def _changes(
+        self, frame: Frame, step: Step | None, child: str
+    ) -> tuple[dict[str, Any], Callable[[], None] | None]:
         """Return the changes in the userdata of the container of `frame`, for an entry of `child`.
+
+        The second one is to be called once the entry is put: then they are known as written.
 
         A state may change a list or message in place, so identity proves nothing for the values
         that `step` can write, or for all without a `step`: their JSON is compared.
@@ -282,11 +290,12 @@ class Recorder(RunJournal):
         userdata = frame.container.userdata
         path = self._homes.get(id(userdata))
         if path is None:
-            return {}
+            return {}, None
         written = None if step is None else set(getattr(step.userdata, "_output", {}).values())
         data = dict(data_of(userdata))  # a copy, as other branches may write at the same time
         known = self._known.setdefault(path, {})
         changed: dict[str, Any] = {}
+        seen: dict[str, tuple[Any, str]] = {}
         for key, value in data.items():
             if self._is_written_by_others(frame.path, key, child):
                 continue
@@ -301,16 +310,20 @@ class Recorder(RunJournal):
             short = _shortened(text)
             if before is None or before[1] != short:
                 changed[key] = self._journal.compact(encoded, text)
-            known[key] = (value, short)
+            seen[key] = (value, short)
         gone = [
             key
             for key in known
             if key not in data and not self._is_written_by_others(frame.path, key, child)
         ]
-        for key in gone:
-            del known[key]
+
+        def learn() -> None:
+            known.update(seen)
+            for key in gone:
+                del known[key]
+
         found: dict[str, Any] = {"userdata": {path: changed}} if changed else {}
-        return {**found, "deleted": {path: gone}} if gone else found
+        return {**found, "deleted": {path: gone}} if gone else found, learn
 
     def _is_written_by_others(self, container: str, key: str, child: str) -> bool:
         """Return whether only siblings of a child write a key that run now."""

@@ -12,10 +12,12 @@ import smachpy
 from actionlib_core.clock import VirtualClock, current_clock, use_clock
 from actionlib_core.node import use_node
 from smachpy import Concurrence, InvalidStateError, NotDurableError, State, StateMachine, events
+from smachpy.durable import recorder
 from smachpy.durable.journal import read_position
 from smachpy.durable.mission import MachineChangedError, OutageError
 from smachpy.durable.position import VERSION
 from smachpy.durable.store import FencedError, StoreError
+from smachpy.engine.interrupt import Interruption
 from smachpy.engine.preempt import asking
 from smachpy.exceptions import MissionError
 from smachpy.states.questions import AnswerRefusedError, find_questions, give_answer
@@ -231,6 +233,36 @@ def test_a_value_that_cannot_be_kept_is_an_error_when_it_is_set(store: KillingSt
     error = caught.value if isinstance(caught.value, NotDurableError) else caught.value.__cause__
     assert isinstance(error, NotDurableError)
     assert (error.key, error.path) == ("value", "/M/S0")
+
+
+def test_a_value_is_written_with_the_next_entry_if_its_own_is_not(
+    store: KillingStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A state was interrupted as it wrote its end; the value was taken for written."""
+
+    encoded = recorder._encoded
+
+    def interrupted(value: Any, key: str, path: str) -> Any:
+        if key == "other":
+            monkeypatch.setattr(recorder, "_encoded", encoded)
+            raise Interruption
+        return encoded(value, key, path)
+
+    def fill(state: State, userdata: Any) -> str:
+        userdata.value = "full"
+        monkeypatch.setattr(recorder, "_encoded", interrupted)
+        return "ok"
+
+    first = Doing(fill)
+    first.register_io_keys(["other"])
+    first.register_outcomes(["preempted"])
+    machine = StateMachine(["ok", "skipped", "late"], name="M")
+    machine.userdata.value, machine.userdata.other = 0, []
+    machine.add("S0", first, {"preempted": "S1"})
+    machine.add("S1", Doing(killed))
+    kill(store, machine)
+    assert recorder._encoded is encoded
+    assert read_position(store, "m").userdata["/M"]["value"] == "full"
 
 
 def test_a_transient_key_is_not_kept(store: KillingStore) -> None:
