@@ -331,6 +331,31 @@ def test_a_value_is_not_fetched_while_two_machines_of_the_name_would_answer(cloc
         server.stop()
 
 
+def test_events_of_a_new_program_are_not_put_into_the_run_before_it(clock):
+    """Those that come before its history, on a slow link."""
+    network = MemoryNetwork(clock)
+    slow = FaultyTransport(network.session(), lambda key, _: (0.5 if "history" in key else 0.0,))
+    machines = Machines()
+    with Node("desk", transport=slow, clock=clock) as desk:
+        viewer = Network(desk, machines)
+        for rounds in (1, 20):
+            with Node("robot", transport=network.session(), clock=clock) as robot:
+                job = spinning(rounds)
+                server = IntrospectionServer("robot", job, "/JOB", node=robot)
+                server.start()
+                clock.sleep(3.0 if rounds == 1 else 0.1)
+                assert job.execute() == "done"
+                clock.sleep(3.0)
+                server.stop()
+            clock.sleep(3.0)
+        seen = machines.get("robot")
+        assert (seen.seq, seen.summary()["outcome"]) == (44, "done")
+        assert [event["seq"] for event in seen.events()] == list(range(1, 45))
+        before = machines.get(seen.before)
+        assert (before.seq, before.summary()["outcome"]) == (6, "done")
+        viewer.close()
+
+
 def test_the_end_of_a_run_that_arrives_after_its_program_has_gone_is_shown(clock):
     """A machine whose program ended with it stayed "stale": the end of its token came first."""
     network = MemoryNetwork(clock)

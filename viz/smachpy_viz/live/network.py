@@ -319,6 +319,7 @@ class Link:
     ) -> None:
         self.server = server
         self.session = ""
+        self._shown = ""  # session of the newest history, to which the machine's events belong
         self.machine = machine
         self.node = node
         self._on_gone = on_gone
@@ -474,7 +475,7 @@ class Link:
         events: list[dict[str, Any]] = []
         observed: list[dict[str, Any]] = []
         wrong: list[str] = []
-        for sample in samples:
+        for sample in self._of_shown(samples):
             topic = "/smach/" + sample.key.rpartition("/")[2]
             try:
                 text = _text(sample.payload, MAX_LENGTHS[topic])
@@ -496,6 +497,16 @@ class Link:
         missed, self._missed = self._missed, False
         if not self.machine.add(events) or begins or missed:
             self._read_history()
+
+    def _of_shown(self, samples: list[Sample]) -> list[Sample]:
+        """Leave out what a new program says before its history, which has that, too.
+
+        Its events do not belong to the run that is shown.
+        """
+        found = [sample for sample in samples if self._shown in {"", sample.source}]
+        if len(found) < len(samples) and self._query is not None:
+            self._again = True  # that history was perhaps asked for before these events
+        return found
 
     def _sender(self) -> str:
         return f"node {self.machine.node!r} in session {self.session}"
@@ -548,6 +559,7 @@ class Link:
         Of several servers of the name, only this link's answer counts.
         """
         wrong: list[str] = []
+        session = self.session
         for reply in replies:
             if reply.error:
                 continue
@@ -557,12 +569,13 @@ class Link:
             except (ValueError, ActionlibError) as error:
                 wrong.append(f"history: {error}")
                 continue
-            if history.get("session", self.session) == self.session:
+            if history.get("session", session) == session:
                 self.machine.refuse(self._sender(), [f"history: {one}" for one in problems])
                 if "now" in history:
                     # It is taken for that in the middle between request and answer, as in NTP.
                     self.machine.behind = sum(times) // 2 - history["now"]
                 self._show({**history, "description": record})
+                self._shown = session
                 return True
         self.machine.refuse(self._sender(), wrong)
         return False
