@@ -49,7 +49,7 @@ from smachpy.events.inputs import (
 from smachpy.events.introspection import MAX_NESTING, Described, StateRecord, describe
 from smachpy.events.reading import OBSERVED, read_crossed, read_event, read_facts, read_observed
 from smachpy.events.run_state import RAISED
-from smachpy.events.steady import SteadyStamps
+from smachpy.events.steady import SteadyStamps, begun_root
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
@@ -415,8 +415,8 @@ class _Facts:
         self._last_ns = record["stamp_ns"]
         if self._first_ns is None:
             self._first_ns = self._last_ns
-        if kind in {"Started", "Recovered"} and record["path"].count("/") == 1:
-            self._root, self._outcome = record["path"], None
+        if root := begun_root(record, self._root):
+            self._root, self._outcome = root, None
             self._outages = record.get("outages", [])
         elif kind == "Finished" and record["path"] == self._root:
             self._outcome = record["outcome"] or RAISED

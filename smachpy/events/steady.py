@@ -14,6 +14,20 @@ TOLERANCE_NS: Final = 50_000_000  # the clocks are read one after the other, on 
 PROCESS_S: Final = 1.0  # by a greater step back of `t`, another process has gone on with the run
 
 
+def begun_root(record: dict[str, Any], root: str) -> str:
+    """Return the path of the machine whose run begins with a record; "" if none does.
+
+    Args:
+        record: The record.
+        root: Path of the machine that has begun before, "" for none. What begins below it is no
+            run. The name of a machine may have slashes, so they are not counted.
+    """
+    if record["kind"] not in {"Started", "Recovered"}:
+        return ""
+    path = str(record["path"])
+    return "" if root and path.startswith(f"{root}/") else path
+
+
 class SteadyStamps:
     """Replaces the stamps of one run's records, in their order.
 
@@ -22,13 +36,14 @@ class SteadyStamps:
     Threads: not thread-safe.
     """
 
-    __slots__ = ("_begin_ns", "_begun_at", "_last_at", "_last_ns")
+    __slots__ = ("_begin_ns", "_begun_at", "_last_at", "_last_ns", "_root")
 
     def __init__(self) -> None:
         self._begun_at: float | None = None
         self._begin_ns = 0
         self._last_at = 0.0
         self._last_ns = 0
+        self._root = ""
 
     def fix(self, record: dict[str, Any]) -> dict[str, Any]:
         """Give a record a steady stamp, and return it; one without `t` stays as it is."""
@@ -46,10 +61,9 @@ class SteadyStamps:
         return record
 
     def _begins(self, record: dict[str, Any], at: float) -> bool:
-        if self._begun_at is None or at < self._last_at - PROCESS_S:
-            return True
-        kind, path = record["kind"], str(record["path"])
-        return kind == "Recovered" or (kind == "Started" and path.count("/") == 1)
+        path = begun_root(record, self._root)
+        self._root = path or self._root
+        return bool(path) or self._begun_at is None or at < self._last_at - PROCESS_S
 
     def at(self, at: float) -> int:
         """Return the stamp of a time of this process [ns]; 0 before the first record."""

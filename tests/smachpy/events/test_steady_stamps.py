@@ -135,6 +135,19 @@ def test_durations_of_a_recorded_run_are_those_that_passed(computer, tmp_path, s
     assert [record.levelno for record in warned] == [logging.WARNING]
 
 
+def test_the_name_of_a_machine_may_have_a_slash(computer, tmp_path):
+    """The end of its recording said no outcome, and its next run had the old date."""
+    machine = StateMachine(["done"], name="r1/patrol")
+    machine.add("A", CBState(lambda _: "done", outcomes=["done"]))
+    with Recorder(tmp_path / "run.jsonl", machine):
+        machine.execute()
+        computer.ahead = 3600.0
+        machine.execute()
+    end = json.loads((tmp_path / "run.jsonl").read_text().splitlines()[-1])
+    assert (end["kind"], end["path"], end["outcome"]) == ("End", "/r1/patrol", "done")
+    assert end["stamp_ns"] - end["first_ns"] == pytest.approx(3600 * S, abs=S)
+
+
 def test_recording_made_by_an_older_version_is_read_with_the_durations_that_passed(
     computer, tmp_path
 ):
