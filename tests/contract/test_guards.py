@@ -48,8 +48,13 @@ def test_the_first_case_that_holds_counts(value, outcome):
 
 
 @pytest.mark.parametrize("text", ["value < 1", "value >= 1", "value == value"])
-def test_no_comparison_with_nan_holds(text):
+def test_no_order_or_equality_with_nan_holds(text):
     assert machine_of([when(text, "LOW"), "NEXT"], math.nan).execute() == "done"
+
+
+@pytest.mark.parametrize("text", ["value != 1", "value != value", "value in [value]"])
+def test_nan_differs_from_everything_and_is_found_as_the_same_object(text):
+    assert machine_of([when(text, "LOW"), "NEXT"], math.nan).execute() == "low"
 
 
 def test_a_condition_of_a_preempt_decides_what_tidies_up():
