@@ -13,6 +13,7 @@ from actionlib_core.goal.server import RESULT_TIMEOUT_S
 from actionlib_core.goal.states import TERMINAL
 from actionlib_core.inputs.arguments import check_delay, check_function, check_seconds
 from actionlib_core.node import get_node
+from actionlib_core.shutdown import exits_on_signals
 from actionlib_core.wire.action_types import ActionTypes
 from actionlib_core.wire.ports import make_server_port
 
@@ -193,11 +194,15 @@ class ActionServer:
 
         Raises:
             ServerConflictError: it stopped because an older server has the name.
+            SystemExit: SIGTERM, SIGHUP or SIGQUIT has come in the main thread, and the program
+                has no handler for it. The end of the program stops the server and its goal.
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
         """
         self.keeper.used()
-        left = self.keeper.left.wait(check_delay(f"action '{self.ns}'", "timeout", timeout))
+        limit = check_delay(f"action '{self.ns}'", "timeout", timeout)
+        with exits_on_signals():
+            left = self.keeper.left.wait(limit)
         if self.error is not None:
             raise self.error
         return left

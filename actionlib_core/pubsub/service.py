@@ -31,6 +31,7 @@ from actionlib_core.exceptions import (
 from actionlib_core.inputs.arguments import check_function
 from actionlib_core.pubsub._ends import NameWatch
 from actionlib_core.pubsub.service_proxy import ServiceEnd, handler_raised, is_from
+from actionlib_core.shutdown import exits_on_signals
 from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire.arrivals import Readable
 from actionlib_core.wire.encoding import parse_encoding
@@ -134,11 +135,13 @@ class Service(ServiceEnd):
 
         Raises:
             ServiceConflictError: it stopped because an older server has the name.
+            SystemExit: as `ActionServer.wait`.
 
         Blocks: until then.
         """
         self._used()
-        self._ends.wait(lambda: self._closed, None)
+        with exits_on_signals():
+            self._ends.wait(lambda: self._closed, None)
         if self.error is not None:
             raise self.error
 

@@ -593,3 +593,20 @@ def terminable() -> Iterator[None]:
     finally:
         restore()
         restorers.remove(restore)
+
+
+@contextlib.contextmanager
+def exits_on_signals() -> Iterator[None]:
+    """Leave the program by `SystemExit` on the signals that end it by default, in a `with` block.
+
+    By default they end Python at once, without `finally` and `atexit`: servers would not stop what
+    their goals have started. A second signal ends it at once. The exit code is that of commands.
+    """
+    if not set(default_signals()) - {signal.SIGINT}:  # another one handles them
+        yield
+        return
+    try:
+        with terminable():
+            yield
+    except Terminated as error:
+        raise SystemExit(EXIT_SIGNAL + error.number) from None

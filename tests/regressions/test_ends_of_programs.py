@@ -363,3 +363,47 @@ def test_the_end_of_a_runner_suspends_its_missions(robot, folder, number):
         assert process.wait(LONG_S) == 0
     assert missions(folder) == [("interrupted", None)]
     assert not robot.stopped.is_set()
+
+
+DEVICE = """
+import signal
+import sys
+from actionlib_core import Service, SimpleActionClient, server
+from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
+from actionlib_core.interfaces.std_srvs.srv import Trigger
+
+way, number = sys.argv[1], int(sys.argv[2])
+
+@server("lift", TestAction)
+def lift(goal, ctx):
+    try:
+        while signal.getsignal(number) is signal.SIG_DFL:  # until the main thread waits
+            ctx.sleep(0.01)
+        print("moves", flush=True)
+        while not ctx.sleep(0.05):
+            pass
+        return TestResult(1)
+    finally:
+        print("stands", flush=True)
+
+running = lift.start()
+client = SimpleActionClient("lift", TestAction)
+client.wait_for_server()
+client.send_goal(TestGoal(1))
+if way == "wait":
+    running.wait()
+else:
+    Service("ready", Trigger, lambda request: (True, "")).spin()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+@pytest.mark.parametrize("way", ["wait", "spin"])
+def test_a_signal_stops_the_device_of_a_server(folder, way, number):
+    """The process died at once: `finally` did not run, and the device moved on."""
+    (folder / "device.py").write_text(DEVICE)
+    with started([sys.executable, "device.py", way, str(int(number))], folder) as device:
+        assert device.stdout.readline() == "moves\n"
+        device.send_signal(number)
+        assert device.communicate(timeout=LONG_S)[0] == "stands\n"
+        assert device.returncode == 128 + number
