@@ -40,6 +40,7 @@ class Claim:
         who: Returns who makes it, for people.
         stop: Asks who makes it to stop, for the claim that is given; it must not block.
         wake: Set when it holds the resource.
+        give: Gives the resource back to other processes, from which the claim has it; or None.
     """
 
     resource: str
@@ -48,6 +49,7 @@ class Claim:
     who: Callable[[], str]
     stop: Callable[[Claim], object]
     wake: Event
+    give: Callable[[], object] | None = None
 
     def is_inside(self, other: Claim) -> bool:
         """Return whether the claim is made inside of `other`, or is it."""
@@ -89,6 +91,11 @@ class Resources:
     def holds(self, claim: Claim) -> bool:
         """Return whether the claim holds its resource."""
         return claim in self._holders.get(claim.resource, ())
+
+    def others(self, claim: Claim) -> list[Claim]:
+        """Return the other holders of what a claim holds: all are around it, or inside of it."""
+        with self._lock:
+            return [one for one in self._holders.get(claim.resource, ()) if one is not claim]
 
     def release(self, claim: Claim) -> None:
         """Hold the resource no longer, or wait no longer; it may be called again."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -191,11 +192,17 @@ def _show(args: argparse.Namespace) -> int:
         row = store.mission(args.mission)
         position = read_position(store, row.id)
         facts = overview(store, row)
+        uses = store.resources()
+    own = {one.resource for one in uses if one.mission == row.id}
+    uses = [one for one in uses if one.resource in own]
     if args.json:
-        print(json.dumps({**facts, "position": masked(position.data)}))
+        resources = [asdict(one) for one in uses]
+        print(json.dumps({**facts, "resources": resources, "position": masked(position.data)}))
         return 0
     for line in _lines(row, position):
         print(printable(line))
+    for one in uses:
+        print(printable(f"resource  {one.resource}: {'held by' if one.holds else 'waits:'} {one}"))
     return 0
 
 

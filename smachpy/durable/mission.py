@@ -13,6 +13,7 @@ from actionlib_core.clock import current_clock
 from actionlib_core.shutdown import AT_EXIT
 from smachpy.base.problems import Problems
 from smachpy.durable import structure
+from smachpy.durable.held import Held
 from smachpy.durable.journal import Journal, read_position
 from smachpy.durable.position import VERSION, Position
 from smachpy.durable.processes import this_runner
@@ -232,6 +233,7 @@ def kept_mission(
         recorder = Recorder(
             machine,
             Journal(store, lease, position, time.now_ns),
+            Held(store, lease, row.held_robot),
             row=row,
             resumed=resumed,
             time=time,
@@ -381,6 +383,7 @@ def _renewing(
         while not over.wait(lease_s / 3):
             try:
                 wanted = store.renew(lease, seconds=lease_s, beat_ns=recorder.time.now_ns())
+                recorder.held.pass_on()
             except MissionError as error:
                 recorder.stop(error)
                 return

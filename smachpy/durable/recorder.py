@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from actionlib_core.clock import Clock
+    from actionlib_core.resources import Policy
+    from smachpy.durable.held import Held
     from smachpy.durable.journal import Journal
     from smachpy.durable.position import Position
     from smachpy.durable.store import MissionRow
@@ -93,6 +95,7 @@ class Recorder(RunJournal):
     Args:
         machine: The root.
         journal: Its journal.
+        held: The resources that it holds.
         resumed: Whether the position comes from an earlier process.
         time: Its time.
         shift_ns: How far deadlines move because no process ran the mission [ns].
@@ -101,6 +104,7 @@ class Recorder(RunJournal):
 
     Attributes:
         mission: The mission's id.
+        held: The resources that it holds.
         time: Its time.
         run: The name of this run in recordings and viewers. It differs when a mission of the same
             id is started anew.
@@ -119,6 +123,7 @@ class Recorder(RunJournal):
         self,
         machine: Container,
         journal: Journal,
+        held: Held,
         *,
         row: MissionRow,
         resumed: bool,
@@ -135,6 +140,7 @@ class Recorder(RunJournal):
         self._pid = os.getpid()
         self._machine = machine
         self._journal = journal
+        self.held = held
         self._is_resumed = resumed
         self._shift_ns = shift_ns
         self._gone_ns = gone_ns
@@ -212,6 +218,7 @@ class Recorder(RunJournal):
         for path, conditions in self._journal.position.conditions.items():
             if path in self._knowledge:
                 self._knowledge[path].restore(conditions, shift_ns)
+        self.held.restore(self._journal.position.visits)
 
     # -- writing -------------------------------------------------------------------------------
 
@@ -258,6 +265,7 @@ class Recorder(RunJournal):
         # Without the lock: other branches queue their entries meanwhile, see `Journal`.
         try:
             journal.commit(number)
+            self.held.give_ended(journal.position.visits)
         except (StoreError, FencedError) as error:
             self.stop(error)
             return False
@@ -625,6 +633,28 @@ class Recorder(RunJournal):
                 for key in getattr(step.userdata, "_output", {}).values():
                     self._writers[frame.path].get(key, set()).discard(path)
         return outcome
+
+    def take(
+        self, resource: str, path: str, policy: Policy, stop: Callable[[str], object]
+    ) -> str | None:
+        if is_copy(self._pid):
+            return None
+        try:
+            return self.held.take(resource, path, policy, stop)
+        except (StoreError, FencedError) as error:
+            self.stop(error)
+            raise
+
+    def give(self, resource: str) -> None:
+        # A suspended mission keeps what it holds for the process that resumes it, and so does one
+        # whose store is gone. A thread that was left behind may end after the mission.
+        is_over = self._machine._smachpy.live.journal is not self
+        if is_copy(self._pid) or self._is_suspended or is_over or self.broken is not None:
+            return
+        try:
+            self.held.give(resource)
+        except (StoreError, FencedError) as error:
+            self.stop(error)
 
     # -- the position before the resume --------------------------------------------------------
 

@@ -40,6 +40,7 @@ from smachpy.durable.store import (
     MissionOverError,
     MissionRow,
     QueueNews,
+    ResourceUse,
     StoreError,
     UnknownMissionError,
     check_lease_seconds,
@@ -52,13 +53,15 @@ from smachpy.exceptions import MissionError
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
+    from actionlib_core.resources import Policy
+
 T = TypeVar("T")
 
-VERSION: Final = 2
+VERSION: Final = 3
 """Version of the tables; a store with a higher one was written by a newer smachpy.
 
-Version 2 only adds columns, tables and indexes, and each new column has a default: a process of
-version 1 that has the store open goes on, and one that opens it is refused.
+Versions 2 and 3 only add columns, tables and indexes, and each new column has a default: a process
+of an older version that has the store open goes on, and one that opens it is refused.
 """
 
 _COLUMNS: Final = (
@@ -148,17 +151,32 @@ class Dialect:
         }
 
     def additions(self) -> tuple[str, ...]:
-        """Return the statements of version 2 that follow its columns; they may be repeated."""
+        """Return the statements of newer versions that follow the columns; they may be repeated."""
         blobs = (
             f"mission TEXT NOT NULL, digest TEXT NOT NULL, data {self.blob} NOT NULL, "
             "PRIMARY KEY (mission, digest)"
         )
         table = f"CREATE TABLE IF NOT EXISTS smachpy_blobs ({blobs}){self.clustered}"
+        resources = (
+            "resource TEXT NOT NULL, mission TEXT NOT NULL, state TEXT NOT NULL, "
+            "place INTEGER NOT NULL, holds INTEGER NOT NULL, urgent INTEGER NOT NULL, "
+            "PRIMARY KEY (resource, mission)"
+        )
+        # This is what keeps a resource from two missions.
+        one_holder = (
+            "CREATE UNIQUE INDEX IF NOT EXISTS smachpy_holders "
+            "ON smachpy_resources (resource) WHERE holds = 1"
+        )
+        held = (
+            f"CREATE TABLE IF NOT EXISTS smachpy_resources ({resources}){self.clustered}",
+            one_holder,
+        )
         indexes = (
             f"CREATE {kind} IF NOT EXISTS smachpy_{name} ON smachpy_missions {columns}{where}"
             for name, kind, columns, where in _INDEXES
         )
-        return (table, *(f"UPDATE smachpy_missions {change}" for change in _CHANGES), *indexes)
+        changes = (f"UPDATE smachpy_missions {change}" for change in _CHANGES)
+        return (table, *changes, *indexes, *held)
 
 
 _OPEN: Final = "status <> 'ended' AND status <> 'cancelled'"
@@ -187,7 +205,7 @@ _INDEXES: Final = (
 """
 
 TABLES: Final = frozenset(
-    {"smachpy_missions", "smachpy_entries", "smachpy_snapshots", "smachpy_blobs"}
+    f"smachpy_{name}" for name in ("missions", "entries", "snapshots", "blobs", "resources")
 )
 
 
@@ -781,6 +799,70 @@ class SqlStore(ABC):
         self._transact(work)
         self._written.pop(lease, None)
 
+    # -- resources -----------------------------------------------------------------------------
+
+    def hold(self, lease: Lease, resource: str, state: str, policy: Policy) -> ResourceUse | None:
+        mission, urgent = lease.mission, policy == "preempt"
+
+        def work(cursor: Cursor, _: bool) -> ResourceUse | None:
+            self._fenced(cursor, lease)
+            over = f"mission NOT IN (SELECT id FROM smachpy_missions WHERE {_OPEN})"
+            delete = f"DELETE FROM smachpy_resources WHERE resource = ? AND {over}"
+            self._do(cursor, delete, resource)
+            users = self._users(cursor, resource)
+            known = [one.mission for one in users]
+            if mission in known:
+                ahead = users[: known.index(mission)]
+            else:
+                ahead = [one for one in users if one.holds or one.urgent or not urgent]
+            if ahead and (policy == "refuse" or mission in known):
+                return ahead[0]
+            place = "(SELECT COALESCE(MAX(place), 0) + 1 FROM smachpy_resources WHERE resource = ?)"
+            self._do(
+                cursor,
+                "INSERT INTO smachpy_resources (resource, mission, state, place, holds, urgent) "
+                f"VALUES (?, ?, ?, {place}, ?, ?) ON CONFLICT (resource, mission) DO UPDATE "
+                "SET state = excluded.state, holds = excluded.holds, urgent = excluded.urgent",
+                *(resource, mission, state, resource, int(not ahead), int(urgent)),
+            )
+            return ahead[0] if ahead else None
+
+        return self._transact(work)
+
+    def _users(self, cursor: Cursor, resource: str | None = None) -> list[ResourceUse]:
+        """Return who holds resources and who waits; of those without a process only holders."""
+        self._do(
+            cursor,
+            f"SELECT r.resource, r.mission, r.state, r.holds, r.urgent, {_HELD} "
+            "FROM smachpy_resources AS r JOIN smachpy_missions AS m ON m.id = r.mission "
+            f"WHERE {_OPEN}{'' if resource is None else ' AND r.resource = ?'} "
+            "ORDER BY r.resource, r.holds DESC, r.urgent DESC, r.place, r.mission",
+            *(() if resource is None else (resource,)),
+        )
+        rows, now = cursor.fetchall(), self._now(cursor)
+        users = []
+        for name, mission, state, holds, urgent, *held in rows:
+            runner = None if self._may_take(held, now) else held[0]
+            if holds or runner is not None:
+                use = ResourceUse(name, mission, state, bool(holds), bool(urgent), runner)
+                users.append(use)
+        return users
+
+    def let_go(self, lease: Lease, resource: str) -> None:
+
+        def work(cursor: Cursor, _: bool) -> None:
+            self._fenced(cursor, lease)
+            self._do(
+                cursor,
+                "DELETE FROM smachpy_resources WHERE resource = ? AND mission = ?",
+                *(resource, lease.mission),
+            )
+
+        self._transact(work)
+
+    def resources(self) -> list[ResourceUse]:
+        return self._transact(lambda cursor, _: self._users(cursor), reads=True)
+
     # -- at the end ----------------------------------------------------------------------------
 
     def forget(self, id: str) -> None:  # noqa: A002
@@ -836,6 +918,7 @@ class SqlStore(ABC):
             ("entries", "mission"),
             ("snapshots", "mission"),
             ("blobs", "mission"),
+            ("resources", "mission"),
             ("missions", "id"),
         ):
             self._do_many(

@@ -351,7 +351,7 @@ class SQLiteStore(SqlStore):
         # A page that is missing from the tree of a table would only look like fewer entries.
         self._deadline = self._clock_now() + CHECK_S
         try:
-            problem = self._one(cursor, "PRAGMA quick_check(1)")[0]
+            problem = self._one(cursor, "PRAGMA integrity_check(1)")[0]
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode == sqlite3.SQLITE_INTERRUPT:
                 return  # a large file: what is read has its checksums

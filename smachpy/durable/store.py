@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from actionlib_core.resources import Policy
+
 QUEUED: Final = "queued"
 RUNNING: Final = "running"
 INTERRUPTED: Final = "interrupted"
@@ -140,6 +142,31 @@ class MissionRow:
     def run(self) -> str:
         """A unique name of this run: when a mission has ended, its id may be used again."""
         return f"{self.id} {round(self.created * 1e6)}"
+
+
+@dataclass(frozen=True)
+class ResourceUse:
+    """A mission that holds a resource, or waits for it.
+
+    Attributes:
+        resource: Its full name.
+        mission: The mission's id.
+        state: The path of the state that holds or waits.
+        holds: Whether it holds the resource; otherwise it waits.
+        urgent: Whether it asks the holder to stop, and waits in front of others.
+        runner: The process that runs the mission, "host:pid"; None if it was interrupted.
+    """
+
+    resource: str
+    mission: str
+    state: str
+    holds: bool
+    urgent: bool
+    runner: str | None
+
+    def __str__(self) -> str:
+        by = f"in process {self.runner}" if self.runner else "interrupted"
+        return f"{self.state} of mission {self.mission}, {by}"
 
 
 @dataclass(frozen=True)
@@ -364,6 +391,39 @@ class Store(Protocol):
         Raises:
             FencedError: another runner has taken the mission over.
         """
+        ...
+
+    def hold(self, lease: Lease, resource: str, state: str, policy: Policy) -> ResourceUse | None:
+        """Let a mission hold a resource, or else wait for it, unless the policy is "refuse".
+
+        Who waits calls it again. A mission that was interrupted keeps what it holds, as its goals
+        may still use that, until it has ended or is deleted; one whose process has died waits no
+        longer.
+
+        Args:
+            lease: The mission's lease.
+            resource: Its full name.
+            state: The path of the state that needs it.
+            policy: What to do while another mission holds it.
+
+        Returns:
+            Who is in the way; None if the mission holds the resource now.
+
+        Raises:
+            FencedError: another runner has taken the mission over.
+        """
+        ...
+
+    def let_go(self, lease: Lease, resource: str) -> None:
+        """Hold a resource no longer, or wait no longer; it may be called again.
+
+        Raises:
+            FencedError: another runner has taken the mission over.
+        """
+        ...
+
+    def resources(self) -> list[ResourceUse]:
+        """Return who holds a resource and who waits, by resource, the holder and the next first."""
         ...
 
     def forget(self, id: str) -> None:  # noqa: A002

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from actionlib_core.resources import Policy
     from smachpy.engine.frame import Frame
     from smachpy.engine.visit import Origin, Override
 
@@ -101,6 +102,32 @@ class RunJournal:
 
     def released(self) -> None:
         """Write that no emergency stop holds the machine any more."""
+
+    # -- resources -----------------------------------------------------------------------------
+
+    def take(
+        self,
+        resource: str,
+        path: str,
+        policy: Policy,
+        stop: Callable[[str], object],
+    ) -> str | None:
+        """Take a resource from the missions of other processes, or wait for it.
+
+        Who waits calls it again, or `give`.
+
+        Args:
+            resource: Its full name.
+            path: The state that needs it; it has it from the states of this process already.
+            policy: What to do while another mission holds it.
+            stop: Asks the state to stop, for the one that is given as text; it does not block.
+
+        Returns:
+            Who is in the way, for people; None if the mission holds the resource.
+        """
+
+    def give(self, resource: str) -> None:
+        """Give a resource back to the missions of other processes, or wait no longer."""
 
     # -- the position before the resume --------------------------------------------------------
 

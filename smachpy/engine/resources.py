@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.node import known_node
 from actionlib_core.resources import CircleError, Claim, around_here, inside, resources_on
@@ -18,10 +19,15 @@ from smachpy.exceptions import InvalidStateError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.clock import Event
     from actionlib_core.resources import Resources
     from smachpy.engine.described import Child
     from smachpy.engine.frame import Frame
     from smachpy.engine.options import Resource
+
+
+LOOK_S: Final = 0.5
+"""How often a state that waits for a mission of another process looks whether it has ended [s]."""
 
 
 def holding(
@@ -78,26 +84,23 @@ def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | 
 
     Blocks: until it is free, or a preempt.
     """
-    forget = on_preempt(state, claim.wake.set)
+    asked = frame.run.clock.event(f"a request to {frame.here()}")
+
+    def wake() -> None:
+        asked.set()
+        claim.wake.set()
+
+    forget = on_preempt(state, wake)
     try:
-        try:
-            holder = all_of.claim(claim)
-        except CircleError as error:
-            raise InvalidStateError(f"{frame.here()}: resource: {error}") from error
-        if holder is not None:
-            by = holder.who()
-            if claim.policy == "refuse":
-                frame.emit(ResourceUse, claim.resource, REFUSED, by)
-                log.loginfo(f"{frame.here()}: resource {claim.resource}: {by} holds it; refused")
-                return REFUSED
-            frame.emit(ResourceUse, claim.resource, "waits", by)
-            log.loginfo(f"{frame.here()}: waits for resource {claim.resource}, held by {by}")
-            if claim.policy == "preempt":
-                holder.stop(claim)
-            claim.wake.wait()
-            control = frame.run.control
-            if control is not None and control.is_paused():  # nothing starts meanwhile
-                control.pass_gate(frame, frame.step)
+        waited = _wait_here(frame, all_of, claim)
+        # The missions of this process come first: others see one holder in all of it.
+        if waited is not None and not asked.is_set() and frame.run.journal.is_durable:
+            waited = _wait_outside(frame, all_of, claim, asked, waited=waited)
+        if waited is None:
+            return REFUSED
+        control = frame.run.control
+        if waited and control is not None and control.is_paused():  # nothing starts meanwhile
+            control.pass_gate(frame, frame.step)
     finally:
         forget()
     if state._preempt_requested or not all_of.holds(claim):
@@ -108,10 +111,70 @@ def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | 
     return None
 
 
+def _wait_here(frame: Frame, all_of: Resources, claim: Claim) -> bool | None:
+    """Wait for the states of this process; return whether it did, None if the claim refuses to."""
+    try:
+        holder = all_of.claim(claim)
+    except CircleError as error:
+        raise InvalidStateError(f"{frame.here()}: resource: {error}") from error
+    if holder is None:
+        return False
+    if _must_not_wait(frame, claim, holder.who()):
+        return None
+    if claim.policy == "preempt":
+        holder.stop(claim)
+    claim.wake.wait()
+    return True
+
+
+def _wait_outside(
+    frame: Frame, all_of: Resources, claim: Claim, asked: Event, *, waited: bool
+) -> bool | None:
+    """Wait for the missions of other processes, too; return as `_wait_here`."""
+    by = _take_outside(frame, all_of, claim)
+    if by is None:
+        return waited
+    if _must_not_wait(frame, claim, by):
+        return None
+    while by is not None and not asked.wait(LOOK_S):
+        by = _take_outside(frame, all_of, claim)
+    return True
+
+
+def _must_not_wait(frame: Frame, claim: Claim, by: str) -> bool:
+    """Tell that `by` holds the resource; return whether the claim refuses to wait for it."""
+    refuses = claim.policy == "refuse"
+    frame.emit(ResourceUse, claim.resource, REFUSED if refuses else "waits", by)
+    what = f"{by} holds it; refused" if refuses else f"waits, held by {by}"
+    log.loginfo(f"{frame.here()}: resource {claim.resource}: {what}")
+    return refuses
+
+
+def _take_outside(frame: Frame, all_of: Resources, claim: Claim) -> str | None:
+    """Take the resource from the missions of other processes; return who is in the way."""
+    journal = frame.run.journal
+    others = all_of.others(claim)
+    if claim.give is None and any(one.give is not None for one in others):
+        return None  # what is around the claim has it from them
+    claim.give = partial(journal.give, claim.resource)
+
+    def stop(by: str) -> None:
+        claim.stop(replace(claim, who=lambda: by))
+
+    return journal.take(claim.resource, frame.here(), claim.policy, stop)
+
+
 def _release(frame: Frame, all_of: Resources, claim: Claim) -> None:
     """Release the resource; a pending interruption of the state does not prevent it."""
     while True:
         try:
+            if claim.give is not None:
+                # Before others here get it, who would take it from the other processes meanwhile.
+                left = all_of.others(claim)  # inside of it, in a thread that was left behind
+                if left:
+                    left[0].give = claim.give
+                else:
+                    claim.give()
             all_of.release(claim)
             break
         except Interruption:

@@ -18,7 +18,7 @@ from smachpy.testing.servers import ScriptedActionServer
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from smachpy.durable.store import MissionRow, Store
+    from smachpy.durable.store import MissionRow, ResourceUse, Store
     from smachpy.machines.container import Container
     from smachpy.testing.servers import ScriptedEnd
 
@@ -128,6 +128,15 @@ class MemoryJournal:
 
     def renew(self, lease: Lease, **_: Any) -> bool:  # noqa: ARG002
         return False
+
+    def hold(self, *_: Any) -> None:
+        """There is no other mission."""
+
+    def let_go(self, *_: Any) -> None:
+        """There is no other mission."""
+
+    def resources(self) -> list[ResourceUse]:
+        return []
 
     def append(
         self,

@@ -61,6 +61,9 @@ class KillingStore:
         del lease, seconds, beat_ns
         return False
 
+    def resources(self) -> list[object]:
+        return []  # it has no other missions
+
     def append(
         self, lease, entries, *, snapshot=None, status=None, outcome=None, blobs=(), **_
     ) -> None:

@@ -496,3 +496,66 @@ def test_a_mission_in_another_container_of_this_computer_is_not_taken_before_its
             other.claim("m1", this_runner(), seconds=LONG_S)
     store.close()
     other.close()
+
+
+def test_one_mission_at_a_time_holds_a_resource(store, store_place):
+    leases = {}
+    for id_ in ("m1", "m2", "m3"):
+        store.create(replace(ROW, id=id_))
+        leases[id_] = store.claim(id_, this_runner(), seconds=LONG_S)
+
+    def take(id_, policy="wait"):
+        found = store.hold(leases[id_], "base", f"/{id_}", policy)
+        return found and (found.mission, found.state, found.holds, found.runner)
+
+    def uses():
+        return [(one.mission, one.holds) for one in store.resources()]
+
+    assert take("m1") is None
+    assert take("m1") is None  # the answer was lost
+    assert take("m2", "refuse") == ("m1", "/m1", True, this_runner())
+    assert take("m2") == ("m1", "/m1", True, this_runner())
+    assert take("m3", "preempt") == ("m1", "/m1", True, this_runner())
+    assert uses() == [("m1", True), ("m3", False), ("m2", False)]
+    assert store.hold(leases["m2"], "arm", "/m2", "wait") is None
+    store.let_go(leases["m1"], "base")
+    store.let_go(leases["m1"], "base")
+    assert take("m1") == ("m3", "/m3", False, this_runner())  # behind those that wait
+    assert take("m2") == ("m3", "/m3", False, this_runner())
+    assert take("m3") is None
+    store.append(leases["m3"], [], status="ended")
+    assert uses() == [("m2", True), ("m2", False), ("m1", False)]
+    assert take("m1") == ("m2", "/m2", False, this_runner())
+    assert take("m2") is None
+    with contextlib.closing(open_store(store_place)) as other:
+        assert other.resources() == store.resources()
+    for id_ in ("m1", "m2"):
+        store.release(leases[id_], "interrupted")
+    assert uses() == [("m2", True), ("m2", True)]  # its goals may run on; who waits is gone
+    with pytest.raises(FencedError):
+        take("m1")
+    with pytest.raises(FencedError):
+        store.let_go(leases["m2"], "base")
+    leases["m1"] = store.claim("m1", this_runner(), seconds=LONG_S)
+    assert take("m1") == ("m2", "/m2", True, None)
+    store.forget("m2")
+    assert take("m1") is None
+
+
+def test_missions_that_take_a_resource_at_once_have_one_holder(store, store_place):
+    for number in range(6):
+        store.create(replace(ROW, id=f"m{number}"))
+    got = []
+
+    def take(id_):
+        with contextlib.closing(open_store(store_place)) as own:
+            lease = own.claim(id_, this_runner(), seconds=LONG_S)
+            got.append(own.hold(lease, "base", "/M", "wait") is None)
+
+    threads = [threading.Thread(target=take, args=(f"m{number}",)) for number in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(got) == [False] * 5 + [True]
+    assert [one.holds for one in store.resources()] == [True] + [False] * 5
