@@ -142,6 +142,7 @@ class Observer:
         self._poses: dict[str, Pose] = {}
         self._recorded: dict[tuple[str, str], tuple[int, Any]] = {}  # by `what` and robot
         self._localized: set[str] = set()
+        self._late_maps: dict[str, dict[str, Any]] = {}  # robot -> a map that came too soon
 
     def take(self, role: str, robot: str, message: Any, stamp_ns: int) -> list[dict[str, Any]]:
         """Return the records of a message; none if it has invalid numbers.
@@ -154,20 +155,25 @@ class Observer:
         """
         make = getattr(self, f"_take_{role}")
         try:
-            records: list[dict[str, Any]] = [
-                {
-                    "kind": KIND,
-                    "path": "",
-                    "stamp_ns": stamp_ns,
-                    "what": what,
-                    "robot": robot,
-                    **facts,
-                }
-                for what, facts in make(robot, message, stamp_ns)
-            ]
+            found = [(what, robot, facts) for what, facts in make(robot, message, stamp_ns)]
         except (ArithmeticError, ValueError):  # NaN or infinity
-            return []
-        return records
+            found = []
+        if self._late_maps:
+            found += self._due_maps(stamp_ns)
+        return [
+            {"kind": KIND, "path": "", "stamp_ns": stamp_ns, "what": what, "robot": whose, **facts}
+            for what, whose, facts in found
+        ]
+
+    def _due_maps(self, stamp_ns: int) -> Iterator[tuple[str, str, dict[str, Any]]]:
+        """Yield the maps that came soon after the ones before, once their time has come.
+
+        A map is published when it changes: there may be no later one.
+        """
+        for robot in [one for one in self._late_maps if self._is_due("map", one, stamp_ns, MAP_S)]:
+            facts = self._late_maps.pop(robot)
+            self._recorded["map", robot] = stamp_ns, facts
+            yield "map", robot, facts
 
     # -- one method for each role: they yield `what` and the fields of the record ----------------
 
@@ -248,9 +254,14 @@ class Observer:
         info = message.info
         facts = grid_facts(message.data, info.width, info.resolution, _pose_of(info.origin))
         told_ns, told = self._recorded.get(("map", robot), (0, None))
-        if facts != told and (told is None or stamp_ns - told_ns >= MAP_S * 1e9):
-            self._recorded["map", robot] = stamp_ns, facts
-            yield "map", facts
+        self._late_maps.pop(robot, None)
+        if facts == told:
+            return
+        if told is not None and stamp_ns - told_ns < MAP_S * 1e9:
+            self._late_maps[robot] = facts
+            return
+        self._recorded["map", robot] = stamp_ns, facts
+        yield "map", facts
 
     def _take_numbers(self, topic: str, message: Any, stamp_ns: int) -> Iterator[Any]:
         if not self._is_due("numbers", topic, stamp_ns, NUMBERS_S):

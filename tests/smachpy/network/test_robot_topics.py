@@ -147,6 +147,26 @@ def test_poses_come_at_five_a_second_and_where_it_stops_at_once():
     assert not observer.take("odometry", "r", odometry(5.0, 0.0, speed=0.0), 200 * S)
 
 
+def test_a_map_that_changes_soon_is_told_later():
+    """A map is published once; the second one was never shown."""
+    observer = Observer()
+    first, second, third = (grid([0, 100, cell, 20, 50, 0], 3, 2) for cell in (0, 50, 100))
+
+    def maps(role, message, at):
+        told = observer.take(role, "", message, round(at * 1e9))
+        return [(one["robot"], one["stamp_ns"] / 1e9) for one in told if one["what"] == "map"]
+
+    def pose(at):
+        return maps("odometry", odometry(0.0, 0.0, 0.0), at)
+
+    assert maps("map", first, 0.0) == [("", 0.0)]
+    assert maps("map", second, 0.5) == maps("map", third, 1.0) == pose(1.5) == []
+    assert pose(2.5) == [("", 2.5)]
+    assert pose(9.0) == maps("map", third, 9.0) == []
+    assert maps("map", first, 20.0) == [("", 20.0)]
+    assert maps("map", second, 20.5) == maps("map", first, 21.0) == pose(30.0) == []  # as before
+
+
 def test_frames_lead_to_the_map():
     observer = Observer()
     observer.take("tf", "", transform("map", "/odom", 10.0, 0.0, math.pi / 2), 0)
