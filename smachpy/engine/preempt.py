@@ -871,6 +871,8 @@ def end_visit(frame: Frame, outcome: Any) -> Decision:
             raise unknown_outcome(step.path_in(frame), state._smachpy.outcomes, outcome) from None
         if decision.why is Why.FORCED:
             frame.emit(OutcomeForced, decision.outcome)
+            if frame.run.control is not None:  # there may be a breakpoint on what was chosen
+                frame.run.control.note_outcome(frame, step, decision.outcome)
     return decision
 
 

@@ -159,6 +159,21 @@ def test_breakpoint_on_a_state_and_on_an_edge(clock):
     assert clock.now() - before == 4.0
 
 
+def test_breakpoint_on_an_outcome_holds_also_if_it_is_forced(clock):
+    sm = mission()
+    sm.control.add_breakpoint("/P/A", "ok")
+    seen = []
+    at(
+        clock,
+        (0.5, lambda: sm.control.force_outcome("/P/A", "ok")),
+        (3.0, lambda: seen.append(sm.control.waiting())),
+        (3.0, sm.control.resume),
+    )
+    assert sm.execute() == "ok"
+    assert seen == [("/P/INNER",)]
+    assert clock.now() == 6.0
+
+
 def test_preempt_while_paused_ends_the_mission(clock):
     sm = mission()
     at(clock, (0.5, sm.control.pause), (3.0, sm.request_preempt))
