@@ -213,7 +213,7 @@ class SimpleActionClient(Generic[A_co]):
         feedback_cb: Callable[[Any], object] | None,
         ack_timeout: float | Duration | None,
         **options: bool,
-    ) -> None:
+    ) -> ClientGoalHandle:
         """Send a goal, or query the server for it, and follow it instead of the previous one."""
         where = f"action '{self.action_client.ns}'"
         if done_cb is not None or active_cb is not None or feedback_cb is not None:
@@ -238,6 +238,7 @@ class SimpleActionClient(Generic[A_co]):
                 self._handle = former
             handle.manager.give_up(handle)
             raise
+        return handle
 
     def _make_on_state(
         self,
@@ -289,15 +290,15 @@ class SimpleActionClient(Generic[A_co]):
         # Both are checked first: a wrong argument must not leave a robot moving.
         execute = self._check_wait("execute_timeout", execute_timeout)
         preempt = self._check_wait("preempt_timeout", preempt_timeout)
-        self.send_goal(goal)
-        handle = self._handle
+        # This goal, not the client's: another thread may already have sent the next one.
+        handle = self._begin(self.action_client.make_goal, goal, None, None, None, None)
         try:
             # It also ends when another thread has sent the next goal: that one is not cancelled.
-            if not self.wait_for_result(execute) and handle is not None and not handle.forgotten:
+            if not self._wait(handle, execute) and not handle.forgotten:
                 handle.cancel()
-                self.wait_for_result(preempt)
+                self._wait(handle, preempt)
         except BaseException:  # for example Ctrl-C
-            if handle is not None and not handle.forgotten:
+            if not handle.forgotten:
                 handle.cancel()
             raise
         return self._state_of(handle)
@@ -329,6 +330,10 @@ class SimpleActionClient(Generic[A_co]):
         handle = self._handle
         if handle is None:
             return False
+        return self._wait(handle, limit)
+
+    def _wait(self, handle: ClientGoalHandle, limit: float | None) -> bool:
+        """Wait for the end of a goal [s]; return whether it is over."""
         return handle.manager.wait(handle, limit)
 
     def _check_wait(self, argument: str, timeout: float | Duration | None) -> float | None:

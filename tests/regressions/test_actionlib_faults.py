@@ -222,6 +222,30 @@ def test_goal_sent_from_done_cb_is_not_marked_done(pair):
     assert client.get_result().result == 2
 
 
+def test_send_goal_and_wait_leaves_the_goal_of_another_thread_alone(pair, monkeypatch):
+    """actionlib: it waited for the goal that was sent last, and cancelled that."""
+
+    def execute(goal):
+        stopped = server.wait_preempt(goal.goal)
+        (server.set_preempted if stopped else server.set_succeeded)()
+
+    server = pair.serve(execute)
+    client = pair.client()
+    manager = client.action_client.manager
+    begin = manager.begin
+
+    def begin_and_let_another_thread_send(handle):
+        monkeypatch.undo()
+        begin(handle)
+        client.send_goal(msg.TestGoal(10))
+
+    monkeypatch.setattr(manager, "begin", begin_and_let_another_thread_send)
+    status = client.send_goal_and_wait(msg.TestGoal(1), 3.0, 3.0)
+    assert status in {GoalStatus.PENDING, GoalStatus.ACTIVE}
+    assert client.wait_for_result(LONG_S)
+    assert client.get_state() == GoalStatus.SUCCEEDED
+
+
 def test_falsy_results_are_sent_as_they_are(pair):
     """actionlib: `if not result` replaced them."""
 

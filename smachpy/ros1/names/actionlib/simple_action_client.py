@@ -14,6 +14,8 @@ from smachpy.ros1.until_end import until_end
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.action.client_goal_handle import ClientGoalHandle
+
 
 class SimpleActionClient(_SimpleActionClient[Any]):
     """Sends one goal at a time; in a dry program goals succeed at once and are not sent."""
@@ -54,13 +56,14 @@ class SimpleActionClient(_SimpleActionClient[Any]):
     def wait_for_result(self, timeout: Any = 0.0) -> bool:
         """Wait for the end of the goal; with 0, until the program is to end."""
         session().check_time()
-        if session().dry:
-            return True
-        wait = partial(super().wait_for_result, timeout)
-        handle = self.gh
+        return session().dry or super().wait_for_result(timeout)
+
+    def _wait(self, handle: ClientGoalHandle, limit: float | None) -> bool:
+        session().check_time()
+        wait = partial(super()._wait, handle, limit)
         # Called inside a callback, it must not wait for the goal's callbacks, as those run in this
         # thread. `until_end` would wait in another thread, where this is not recognised.
-        if handle is None or handle.owner.callbacks.is_inside():
+        if handle.owner.callbacks.is_inside():
             return wait()
         return until_end(f"the result of action {self.ns!r}", wait, lambda: handle.goal.over)
 
