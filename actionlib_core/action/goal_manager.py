@@ -369,6 +369,7 @@ class GoalManager:
         ack_timeout = handle.goal.ack_timeout
         goal = handle.goal = known.goal
         handle.body, handle.asking = known.body, known.asking
+        handle.cancel_if_lost, handle.sender = known.cancel_if_lost, known.sender
         goal.limit_ack(ack_timeout, self.clock.now())
         self._goals[goal.id] = handle
         self._count(handle.owner, 1)

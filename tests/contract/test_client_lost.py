@@ -73,3 +73,15 @@ def test_a_goal_that_is_repeated_until_its_server_appears_still_wants_it(world):
     assert digger.started.wait(LONG_S)
     client.action_client.node.transport.close()
     assert digger.asked.wait(LONG_S)
+
+
+def test_a_goal_that_is_followed_again_before_its_server_appears_still_wants_it(world):
+    client = SimpleActionClient("dig", msg.TestAction, node=world.node("client"))
+    send_simple(client, cancel_on_client_lost=True)
+    goal_id = client.gh.get_goal_id()
+    client.stop_tracking_goal()
+    client.attach(goal_id)
+    digger = Digger(world)
+    assert digger.started.wait(LONG_S)
+    client.action_client.node.transport.close()
+    assert digger.asked.wait(LONG_S)
