@@ -374,6 +374,8 @@ class Recorder(RunJournal):
                 container._smachpy.live.stopped_at = stopped.get(path, "")
             self._resumed[self._root] = self._unresumed.pop(self._root)
             self._all_back = run.clock.event("the states that were active")
+            if not self._unresumed:
+                self._ask_at_start()
             if self._unresumed and self._machine._preempt_requested:
                 # Requested before the run: a state that was active must be entered again before it
                 # can stop, or its goal would run on without anybody to cancel it.
@@ -395,6 +397,15 @@ class Recorder(RunJournal):
                         known[key] = (value, _shortened(text))
         self._write("Started", self._root, **facts)
         return None
+
+    def _ask_at_start(self) -> None:
+        """Let the run end at its start if it was asked to stop before its first child began."""
+        preempts, self._preempts = self._preempts, []
+        for request in preempts:
+            if request["path"] == self._root and not self._machine._preempt_requested:
+                origin = Origin(request["source"], request["by"], request["why"])
+                self._machine._smachpy.live.origin = origin
+                self._machine._preempt_requested = True
 
     def _recovered(self) -> tuple[Any, ...]:
         """Return the fields of the event `Recovered`."""

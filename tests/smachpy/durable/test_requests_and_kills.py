@@ -269,6 +269,33 @@ def test_a_pause_does_not_void_an_operators_jump_after_a_kill_either(shape):
         assert ends[-1] == "LOOK done", (place, ends)
 
 
+def test_a_request_before_the_first_state_reaches_the_resumed_run():
+    """It waited until the states that were active had been entered again: there was none."""
+    ends, store = [], KillingStore()
+
+    def machine(request):
+        sm = StateMachine(ENDS, name="M")
+        sm.add("WORK", Work(ends, "WORK"))
+        sm.register_start_cb(lambda *_: request(sm))
+        return sm
+
+    def ask(sm):
+        store.arm(1, written=True)
+        sm.request_preempt(by="the door sensor")
+
+    def run(request):
+        with VirtualClock() as clock, use_clock(clock):
+            return smachpy.run_durable(machine(request), store, mission="m")
+
+    with pytest.raises(Kill):
+        run(ask)
+    assert is_written(store, "PreemptRequested")
+    store.arm(0, written=False)
+    assert run(lambda _: None) == "preempted"
+    assert ends == []
+    assert sum(b'"PreemptRequested"' in entry for entry in store.entries["m"]) <= 1
+
+
 # -- requests that a state withdraws ---------------------------------------------------------------
 
 
