@@ -141,6 +141,8 @@ class Control:
     def _note_release(self) -> None:
         if self._run is not None:
             self._run.journal.released()
+            if self._stop is not None:  # there was another emergency stop meanwhile
+                self._run.journal.stopped()
 
     def step(self) -> None:
         """Run one state, then pause again."""
@@ -248,6 +250,8 @@ class Control:
         self._run = run
         if self._paused or self._breakpoints:
             run.watched = run.careful = True
+        if self._stop is not None:  # before the run
+            run.journal.stopped()
 
     def detach(self, run: Run) -> None:
         """End the pause of a run that has ended: the next one would wait for somebody else."""

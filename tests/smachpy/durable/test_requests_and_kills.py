@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 
 import pytest
 
@@ -440,3 +441,56 @@ class Quick(Work):
     def end(self, *, stopped):
         assert not stopped
         return "preempted"
+
+
+# -- emergency stops -------------------------------------------------------------------------------
+
+
+def test_an_emergency_stop_before_the_run_holds_the_resumed_run():
+    began, store = [], KillingStore()
+
+    def run(*, stopped):
+        class Drive(Work):
+            def execute(self, userdata):
+                began.append(clock.now())
+                return "done"
+
+        sm = StateMachine(ENDS, name="M")
+        sm.add("DRIVE", Drive([], "DRIVE"))
+        if stopped:
+            sm.control.emergency_stop()
+        with VirtualClock() as clock, use_clock(clock):
+            clock.call_later(10.0, sm.control.resume)
+            return smachpy.run_durable(sm, store, mission="m")
+
+    store.arm(2, written=True)  # the entry after Started
+    with pytest.raises(Kill):
+        run(stopped=True)
+    store.arm(0, written=False)
+    assert run(stopped=False) == "done"
+    assert began == [10.0]
+
+
+def test_an_emergency_stop_while_another_one_is_released_is_in_the_journal():
+    store = KillingStore()
+    sm = StateMachine(ENDS, name="M")
+    sm.add("DRIVE", Work([], "DRIVE"))
+    released, kinds = sm.control._note_release, []
+
+    def stops_again():
+        sm.control._note_release = released
+        sm.control._stop, sm.control._paused = object(), True  # in another thread, just now
+        released()
+
+    def look():
+        kinds.extend(json.loads(entry)["kind"] for entry in store.entries["m"])
+
+    sm.control._note_release = stops_again
+    with VirtualClock() as clock, use_clock(clock):
+        clock.call_later(1.0, sm.control.emergency_stop)
+        clock.call_later(2.0, sm.control.resume)
+        clock.call_later(3.0, look)
+        clock.call_later(4.0, sm.control.resume)
+        smachpy.run_durable(sm, store, mission="m")
+    held = [kind for kind in kinds if kind in {"Stopped", "Released"}]
+    assert held == ["Stopped", "Released", "Stopped"]
