@@ -55,6 +55,7 @@ milliseconds at most.
 
 _MAX_REPR_LENGTH = 4 * MAX_TEXT_LENGTH  # characters in the parts of a `repr`, which is then cut
 _MAX_REPR_NESTING = 100
+_ROUNDED = 6  # digits of a number in a line of text, as on the page
 _SMALL = frozenset({type(None), bool, float, complex, range, type})
 _MAPPINGS = (dict, UserDict, MappingProxyType)
 _LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, ItemsView)
@@ -366,6 +367,24 @@ def literal(value: Any) -> str:
     if isinstance(value, list):
         return f"[{_listed(value)}]"
     return repr(value)
+
+
+def brief(value: Any) -> str:
+    """Return a value of `shown` as `literal` does, with rounded numbers, for a line of text.
+
+    Binary fractions have up to 17 digits (1.5708000000000002), which nobody reads.
+    """
+    return literal(_rounded(value))
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.{_ROUNDED}g}")
+    if isinstance(value, list):
+        return [_rounded(part) for part in value]
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    return value
 
 
 def _listed(values: Iterable[Any]) -> str:

@@ -31,7 +31,7 @@ from smachpy.events import (
     from_record,
     to_record,
 )
-from smachpy.userdata.shown import literal
+from smachpy.userdata.shown import brief, literal
 from tests.places import DATA
 
 
@@ -443,6 +443,14 @@ EXAMPLES = DATA / "values.json"  # the page has the same
 @pytest.mark.parametrize("example", json.loads(EXAMPLES.read_text(encoding="utf-8")))
 def test_text_of_an_example(example):
     assert literal(example["value"]) == example["text"]
+
+
+def test_text_of_a_line_has_rounded_numbers():
+    pose = {"$object": "Pose2D", "fields": {"x": 9.8, "yaw": 1.5708000000000002, "ids": [5, 1e300]}}
+    assert brief(pose) == "Pose2D(x=9.8, yaw=1.5708, ids=[5, 1e+300])"
+    assert brief({"$tuple": [0.1 + 0.2, True, "0.30000000000000004"]}) == (
+        "(0.3, True, '0.30000000000000004')"
+    )
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from smachpy.events import answered_text, asker_text, recovered_text, resource_t
 from smachpy.events.outcome_classes import outcome_class
 from smachpy.events.run_state import RunState, innermost
 from smachpy.exceptions import SmachError
-from smachpy.userdata.shown import literal
+from smachpy.userdata.shown import brief
 from smachpy_viz.model.destination import destination
 from smachpy_viz.model.labels import GLYPHS, cleanups, shorten, tidies, visible
 from smachpy_viz.terminal.lines import NARROW, RUNNING, STYLES, WAITING
@@ -256,7 +256,7 @@ class MissionApp(App[None]):
         for entry in entries[:MAX_VALUES]:
             words = (
                 shorten(entry["key"]),
-                shorten(literal(entry["value"]), 34),
+                shorten(brief(entry["value"]), 34),
                 _name(entry["writer"]),
             )
             table.add_row(*map(_clean, words))

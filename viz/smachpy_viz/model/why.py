@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from smachpy.events import answered_text, asker_text, resource_text
 from smachpy.events.outcome_classes import is_good, outcome_class
 from smachpy.events.run_state import RAISED, innermost
-from smachpy.userdata.shown import literal
+from smachpy.userdata.shown import brief
 from smachpy_viz.model.labels import cleanups, shorten, tidies
 from smachpy_viz.model.reads import BEGINS, begin_of, values_read
 
@@ -483,4 +483,4 @@ _EXPLAINING = ENDS | BEGINS | _CAUSES.keys() | {"Recovered"}
 
 
 def _short(value: Any) -> str:
-    return shorten(literal(value), 120)
+    return shorten(brief(value), 120)

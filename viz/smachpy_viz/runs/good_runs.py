@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.userdata.shown import literal
+from smachpy.userdata.shown import brief
 from smachpy_viz.model.labels import shorten
 from smachpy_viz.model.reads import begin_of, values_read
 from smachpy_viz.model.why import ENDS, newest_run, why
@@ -131,7 +131,7 @@ def _number(value: Any) -> float | None:
 
 
 def _text(name: str, value: Any) -> str:
-    return f"{value:.3g} s" if name == TOOK else shorten(literal(value), 60)
+    return f"{value:.3g} s" if name == TOOK else shorten(brief(value), 60)
 
 
 def _add(fact: Fact, value: Any) -> None:

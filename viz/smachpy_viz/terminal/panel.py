@@ -35,7 +35,7 @@ from rich.text import Text
 from actionlib_core.clock import current_clock
 from smachpy.events.run_state import innermost
 from smachpy.userdata.secret import masked
-from smachpy.userdata.shown import is_shown, literal
+from smachpy.userdata.shown import brief, is_shown
 from smachpy_viz.model.history import History
 from smachpy_viz.model.labels import GLYPHS, cleanups, shorten, tidies
 from smachpy_viz.model.progress import progress_of, seconds_left, written_progress
@@ -217,7 +217,7 @@ class TerminalView:
                 bars.add_row(*self._bar(key, progress))
                 continue
             # In the mission's own process the values are its objects, else those of records.
-            whole = literal(value) if is_shown(value) else _REPR.repr(masked(value, key))
+            whole = brief(value) if is_shown(value) else _REPR.repr(masked(value, key))
             text = shorten(whole, VALUE_LENGTH)
             table.add_row(Text(f"  {shorten(key, 24)}", "dim"), Text(text, no_wrap=True))
         return [part for part in (bars, table) if part.row_count]
