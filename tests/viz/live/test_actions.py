@@ -94,6 +94,23 @@ def test_action_that_a_page_has_used_is_named_when_its_server_has_gone(world):
     assert world.actions.summary()["gone"] == ["count"]
 
 
+def test_a_server_that_is_late_is_not_called_gone(world, monkeypatch):
+    server = world.serve()
+    monkeypatch.setattr(actions_module.ActionClient, "wait_for_server", lambda *_: False)
+    with pytest.raises(GoalRefusedError, match="its server is there, but was not reached"):
+        world.actions.send("count", "{goal: 1}")
+
+    def end(*_):
+        server.action_server.stop()
+        world.clock.sleep(0.5)
+        return False
+
+    monkeypatch.setattr(actions_module.ActionClient, "wait_for_server", end)
+    with pytest.raises(GoalRefusedError, match="got no server"):
+        world.actions.send("count", "{goal: 1}")
+    assert world.actions.summary()["goals"] == []
+
+
 def test_flood_of_invented_action_servers_leaves_nothing_behind(world, monkeypatch, caplog):
     monkeypatch.setattr(actions_module, "MAX_ACTIONS", 20)
     transport = world.robot.transport

@@ -253,7 +253,8 @@ class Actions:
         try:
             client = self._client(name, end)
             if not client.wait_for_server(SERVER_S):
-                raise GoalRefusedError(_gone(name))
+                self._server(name)  # raises if it is gone; on a busy network it is late
+                raise GoalRefusedError(_late(name))
             # Made before the goal is sent: callbacks may come before `send_goal` returns its id.
             sent = SentAction("", name, end.type.removesuffix("Action"), goal, self._now())
             handle = client.send_goal(
@@ -460,6 +461,13 @@ class Actions:
 
 def _gone(name: str) -> str:
     return f"action /{name}: got no server; expected one. Start it, then send again."
+
+
+def _late(name: str) -> str:
+    return (
+        f"action /{name}: its server is there, but was not reached within {SERVER_S:g} s: it or "
+        "the network is busy. Nothing was sent. Send again."
+    )
 
 
 def _shown(message: Any) -> str:
