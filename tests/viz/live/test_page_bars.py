@@ -86,7 +86,7 @@ def test_a_failure_among_thousands_of_visits_is_drawn_last_and_wide_enough(serve
 def test_the_badge_of_an_ended_run_has_the_colour_of_its_outcome(served, look, outcome, kind):
     served.add("one", events=[("Started", "/JOB"), ("Finished", "/JOB", {"outcome": outcome})])
     page = look(served.start())
-    page.wait_for_selector(f".status.{kind}:text-is('ended: {outcome}')")
+    page.wait_for_selector(f".status.{kind}:has-text('ended: {outcome}')")
 
 
 def test_follow_opens_what_runs_also_in_the_past(served, look):

@@ -216,6 +216,8 @@ def test_a_fleet_of_a_thousand_is_scrolled_through_a_few_cards(served, look):
     page.wait_for_selector(".fleet header:has-text('1 to 32 of 1,000 live runs')")
     cards = page.locator(".fleet .cards button")
     assert cards.count() == page.locator(".fleet .lanes svg").count() == 32
+    # Without a map the cards have its room, too.
+    page.wait_for_function("() => document.querySelector('.cards').clientWidth > 1300")
 
     def scroll(where):
         page.evaluate(

@@ -364,6 +364,21 @@ def test_an_outline_is_offered_where_names_are_small(served, look):
     outline.wait_for(state="detached")
 
 
+@pytest.mark.parametrize(("width", "offered"), [(1024, True), (1440, False)])
+def test_where_the_tree_is_hidden_it_is_offered_for_small_names(served, look, width, offered):
+    served.add("long", labels=[f"STATE_{i}" for i in range(120)])
+    page = look(served.start())
+    page.set_viewport_size({"width": width, "height": 700})
+    all_levels(page)
+    wait_for(page, "smachpy.store.view.namesAreSmall.value")
+    outline = page.locator(".zoom .offer")
+    outline.wait_for(state="attached")
+    assert outline.is_visible() is offered  # else the tree stands beside the machine
+    if offered:
+        outline.click()
+        page.wait_for_selector(".with-tree .panel-tree", state="visible")
+
+
 TITLES = """() => [...document.querySelectorAll('.diagram g.box')].map((box) => {
     const [frame, title] = ['.frame', '.title'].map((part) => box.querySelector(part).getBoundingClientRect());
     return [title.top + 0.2 * title.height - frame.top, frame.right - title.right]; // from the capitals

@@ -135,6 +135,33 @@ def test_a_phone_held_sideways_shows_the_whole_name_and_leaves_nothing_empty(ser
     )
 
 
+# What is cut off by the window or by its own box, by class and text. (Names may be: the tip has all of them.)
+CUT = """() => [...document.querySelectorAll(":is(.top, .operator, .play) :is(button, select, input, .status, .seal)")]
+    .filter((one) => { const { left, right, bottom, width } = one.getBoundingClientRect();
+      return width && (left < 0 || right > innerWidth || bottom > innerHeight
+        || (one.matches(".status, .seal, .play *") && one.scrollWidth > one.clientWidth)); })
+    .map((one) => `${one.className} ${one.id} ${one.textContent}`)"""
+
+
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (900, 600), (1024, 768)])
+def test_nothing_of_the_bars_is_cut_off(served, look, size):
+    facts = {"text": "evidence: valid, e.json"}, {"outcome": "succeeded", "at": 5 * 3600.0}
+    running = [
+        *RUNS,
+        ("Noted", "/JOB", facts[0]),
+        ("UserdataWritten", "/JOB/A", {"key": "place_to_go_to", "value": 1}),
+    ]
+    served.add("one", events=[*running, ("Entered", "/JOB/B", {"at": 5 * 3600.0})], control=FREE)
+    served.add("two", events=[*running, ("Finished", "/JOB", facts[1])], control=FREE)
+    address = served.start(token="t")
+    for name in ("one", "two"):
+        page = look(f"{address}?machine={name}#token=t")
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        wait_for(page, f"({CUT})().length === 0")
+        assert page.locator("[data-testid=seal]").bounding_box()["width"] >= 26
+        assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+
+
 def test_no_commands_where_no_machine_is_shown(operated, look):
     page = open_page(look, operated)
     for key, place in ("h", ".home"), ("a", ".actions-page"):

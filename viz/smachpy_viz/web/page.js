@@ -1380,6 +1380,15 @@ function holdText(row, now) {
   const limit = grace != null ? ` of ${duration(grace)}` : "";
   return `${duration((now - row.preempt) / 1e3)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
 }
+function endOfPath(path, paths) {
+  const parts = path.split("/");
+  const ends = (one, end) => `/${one}`.endsWith(`/${end}`);
+  for (let count = 1; count < parts.length; count++) {
+    const end = parts.slice(-count).join("/");
+    if (end && paths.filter((one) => ends(one, end)).length < 2) return end;
+  }
+  return path;
+}
 var lastWord = (path) => path.split("/").at(-1) || path;
 
 // src/core/model.ts
@@ -2515,6 +2524,7 @@ var Data = class {
     missions: {},
     batches: []
   });
+  simulationsKnown = y3(false);
   run = new Run(emptyState(), []);
   scene = new Scene();
   marks = new Marks();
@@ -8747,7 +8757,7 @@ function EndedGoal({ id, goal, page: page2 }) {
     /* @__PURE__ */ a4("div", { class: "line", title, onClick, children: [
       /* @__PURE__ */ a4("button", { class: `ended ${kind}`, "aria-label": status, "aria-expanded": open, children: MARKS[kind] }),
       /* @__PURE__ */ a4(StateLink, { path: goal.path, page: page2 }),
-      /* @__PURE__ */ a4("span", { class: "what", children: goal.text || status }),
+      /* @__PURE__ */ a4("span", { class: "what", children: [purposeText(id, goal), goal.text || status].filter(Boolean).join(" ") }),
       /* @__PURE__ */ a4("span", { class: "times", children: took })
     ] }),
     open && /* @__PURE__ */ a4($, { children: [
@@ -8775,7 +8785,7 @@ function Goal({ id, goal, now, page: page2 }) {
   return /* @__PURE__ */ a4("div", { ...linked(goal, `goal ${kind}`), title: id, children: [
     /* @__PURE__ */ a4("div", { class: "head", children: [
       /* @__PURE__ */ a4(StateLink, { path: goal.path, page: page2 }),
-      /* @__PURE__ */ a4("span", { class: "action", children: goal.action }),
+      /* @__PURE__ */ a4("span", { class: "action", children: [goal.action, purposeText(id, goal)].filter(Boolean).join(" ") }),
       /* @__PURE__ */ a4("span", { class: "times", children: [
         (goal.attempt ?? 1) > 1 ? `attempt ${goal.attempt} · ` : "",
         took
@@ -8794,6 +8804,10 @@ function Goal({ id, goal, now, page: page2 }) {
     /* @__PURE__ */ a4(Foldable, { label: "goal", value: goal.goal })
   ] });
 }
+var purposeText = (id, goal) => {
+  const purpose = purposeOf(id, goal);
+  return purpose && `→ ${purpose}`;
+};
 var linked = (goal, kind) => ({
   ...store.pointer.hoverHandlers(goal.path, goal.since / 1e6),
   class: `${kind} ${store.pointer.isLit(goal.path, goal.since / 1e6) ? "lit" : ""}`
@@ -9625,7 +9639,9 @@ async function askSimulation(data) {
 }
 async function refreshSimulations() {
   const answer = await ask("/api/simulations");
-  if (!isFailure(answer)) store.data.simulations.value = answer;
+  if (isFailure(answer)) return;
+  store.data.simulations.value = answer;
+  store.data.simulationsKnown.value = true;
 }
 async function commandMission({ journal, id }, what) {
   const answer = await post("/api/mission", { journal, id, command: what });
@@ -9645,14 +9661,21 @@ async function openRun(id) {
 // src/panels/fleet.tsx
 var REFRESH_MS2 = 1e3;
 var GAP2 = 8;
+var MOST_COLUMNS3 = 4;
 var CARD2 = { width: 200 + GAP2, height: 88 + GAP2 };
 var FleetPage = () => store.view.pageShown.value === "fleet" ? /* @__PURE__ */ a4(OpenFleet, {}) : null;
 function OpenFleet() {
   const [skip, setSkip] = d2(0);
   const [found, setFound] = d2(null);
+  const [width, setWidth] = d2(0);
   const heading = T2(null);
   const box = T2(null);
   A2(() => heading.current?.focus(), []);
+  A2(() => {
+    const seen2 = new ResizeObserver(() => setWidth(box.current?.clientWidth ?? 0));
+    if (box.current) seen2.observe(box.current);
+    return () => seen2.disconnect();
+  }, []);
   A2(() => {
     let open = true;
     const read = async () => {
@@ -9669,7 +9692,7 @@ function OpenFleet() {
   const { rows, total: total2, skip: before } = found ?? { rows: [], total: 0, skip: 0 };
   const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf2(rows, now);
-  const columns = Math.max(1, Math.floor(((box.current?.clientWidth ?? 0) + GAP2) / CARD2.width));
+  const columns = Math.min(MOST_COLUMNS3, Math.max(1, Math.floor((width + GAP2) / CARD2.width)));
   const line = Math.floor(before / columns);
   const onScroll = (e4) => {
     const above = Math.floor(e4.target.scrollTop / CARD2.height) - 1;
@@ -9683,7 +9706,7 @@ function OpenFleet() {
       /* @__PURE__ */ a4("button", { onClick: () => showPage("runs"), children: "Close" })
     ] }),
     found && !total2 && /* @__PURE__ */ a4("p", { class: "empty-list", children: "No mission runs now. Each one that begins gets a card here." }),
-    /* @__PURE__ */ a4("div", { class: "fleet-top", children: [
+    /* @__PURE__ */ a4("div", { class: found && scene.isEmpty ? "fleet-top without-map" : "fleet-top", children: [
       /* @__PURE__ */ a4("div", { class: "cards", ref: box, onScroll, children: /* @__PURE__ */ a4("div", { style: { height: `${Math.ceil(total2 / columns) * CARD2.height}px` }, children: /* @__PURE__ */ a4("div", { class: "in-view", style: { transform: `translateY(${line * CARD2.height}px)`, "--columns": columns }, children: rows.map((row) => /* @__PURE__ */ a4("button", { onClick: () => openRun(row.id), children: [
         /* @__PURE__ */ a4("b", { children: shorten(nameOfRow(row), 26) }),
         /* @__PURE__ */ a4("span", { class: `pill-text ${row.asks ? "waiting" : "active"}`, children: row.asks ? "? asks you" : `● ${shorten(row.strip.findLast((one) => one[3] === null)?.[1] ?? "running", 20)}` }),
@@ -10038,7 +10061,7 @@ function OpenHome() {
         /* @__PURE__ */ a4("h2", { id: "home-title", tabindex: -1, ref: heading, children: "Runs" }),
         folders.map((one) => /* @__PURE__ */ a4("span", { class: "chip", title: one, children: [
           "folder ",
-          shorten(lastWord(one), 24)
+          shorten(endOfPath(one, folders), 32)
         ] })),
         journals.map((one) => /* @__PURE__ */ a4(JournalChip, { ...one })),
         /* @__PURE__ */ a4("span", { class: "spread" }),
@@ -10249,13 +10272,17 @@ var LINES = {
   QuestionAsked: (e4) => [`asks ${e4.text}`.trim(), "waiting"],
   QuestionAnswered: (e4) => [e4.by ? `answered ${e4.answer} by ${e4.by}` : `nobody answered: ${e4.answer}`, "waiting"],
   OutcomeForced: (e4) => [`forced: ${e4.outcome}`, "waiting"],
-  GoalSent: (e4) => [`goal to ${e4.action}`, "active"],
+  GoalSent: (e4) => [goalText2(e4), "active"],
   GoalDone: (e4) => [`${e4.action}: ${e4.status.toLowerCase()} ${e4.text}`.trim(), outcomeClass(e4.status)],
   UserdataWritten: (e4) => [`${e4.key} = ${brief(e4.value).slice(0, 60)}`, "other"]
 };
 function outageText2({ outages }) {
   const [from, to] = outages?.at(-1) ?? [0, 0];
   return duration((to - from) / 1e9);
+}
+function goalText2(e4) {
+  const purpose = purposeOf(e4.goal_id, e4);
+  return `goal to ${e4.action}${purpose && ` → ${purpose}`}`;
 }
 function heldText({ guards, truths }) {
   const text2 = (guard, i4) => `[${guard}] is false${truths?.[i4] ? ` (${truths[i4]})` : ""}`;
@@ -11701,7 +11728,7 @@ function Legend() {
       /* @__PURE__ */ a4("b", { class: kind }),
       text2
     ] })),
-    store.view.overview.value && /* @__PURE__ */ a4("span", { class: "hint", children: "double-click opens one" })
+    store.view.overview.value && /* @__PURE__ */ a4("span", { class: "hint", title: "double-click opens a state with its arrows", children: "double-click opens one" })
   ] });
 }
 function Notice() {
@@ -12002,7 +12029,15 @@ function PlayBar({ page: page2 }) {
         }
       ),
       /* @__PURE__ */ a4(IconButton, { name: "forward", title: "one event forward (.)", onClick: () => store.playback.seekEvent(1) }),
-      /* @__PURE__ */ a4(IconButton, { name: "end", title: "to the end (End)", onClick: () => page2.timeline.live() })
+      /* @__PURE__ */ a4(
+        IconButton,
+        {
+          name: "end",
+          class: "icon-button to-end",
+          title: "to the end (End)",
+          onClick: () => page2.timeline.live()
+        }
+      )
     ] }),
     /* @__PURE__ */ a4(Clock2, {}),
     /* @__PURE__ */ a4("label", { class: "rate", children: [
@@ -12099,7 +12134,7 @@ function Jumps() {
     KINDS2.map(([kind, sign2, letter]) => /* @__PURE__ */ a4(Jump, { name: `kind ${kind}`, letter, children: [
       /* @__PURE__ */ a4("i", { class: `to-${kind}`, children: sign2 }),
       " ",
-      kind
+      /* @__PURE__ */ a4("span", { class: "kind", children: kind })
     ] })),
     keys2.length > 0 && /* @__PURE__ */ a4($, { children: [
       /* @__PURE__ */ a4("select", { value: key, onChange: choose2, "aria-label": "key of userdata", title: "key of userdata", children: keys2.map((one) => /* @__PURE__ */ a4("option", { value: one, children: shorten(one, 24) })) }),
@@ -16888,6 +16923,7 @@ function OpenDialog() {
   const [problems, setProblems] = d2("");
   const { missions, batches } = store.data.simulations.value;
   const names = Object.keys(missions);
+  const known2 = store.data.simulationsKnown.value;
   const mission = form.mission || names[0] || "";
   A2(() => {
     refreshSimulations();
@@ -16916,7 +16952,10 @@ function OpenDialog() {
       /* @__PURE__ */ a4("label", { children: [
         "Mission",
         " ",
-        /* @__PURE__ */ a4("select", { value: mission, onChange: change3("mission"), children: names.map((name) => /* @__PURE__ */ a4("option", { value: name, children: name })) })
+        /* @__PURE__ */ a4("select", { value: mission, onChange: change3("mission"), children: [
+          !names.length && /* @__PURE__ */ a4("option", { value: "", children: known2 ? "none installed" : "reading the missions…" }),
+          names.map((name) => /* @__PURE__ */ a4("option", { value: name, children: name }))
+        ] })
       ] }),
       /* @__PURE__ */ a4("label", { children: [
         "Runs ",
@@ -16957,7 +16996,7 @@ function OpenDialog() {
       ] }),
       problems && /* @__PURE__ */ a4("p", { class: "problem wide", children: problems }),
       /* @__PURE__ */ a4("p", { class: "wide", children: [
-        /* @__PURE__ */ a4("button", { class: "primary", type: "submit", children: "Start" }),
+        /* @__PURE__ */ a4("button", { class: "primary", type: "submit", disabled: !mission, children: "Start" }),
         /* @__PURE__ */ a4("span", { class: "hint", children: shorten(missions[mission] ?? "", 90) })
       ] })
     ] }) : /* @__PURE__ */ a4("p", { class: "hint", children: "Only a viewer with --control can start runs, at its address with the token." }),
@@ -17179,6 +17218,7 @@ function Downloads() {
 
 // src/panels/top_bar.tsx
 var MOST_FOUND = 12;
+var ENDED2 = "ended: ";
 var SEAL = "evidence: ";
 function TopBar({ page: page2 }) {
   if (store.view.pageShown.value !== "machine")
@@ -17207,7 +17247,10 @@ function TopBar({ page: page2 }) {
     ),
     /* @__PURE__ */ a4(RunsButton, {}),
     /* @__PURE__ */ a4(Chooser, {}),
-    /* @__PURE__ */ a4("span", { class: `status ${status.kind}`, role: "status", title: status.word, "data-testid": "status", children: status.word }),
+    /* @__PURE__ */ a4("span", { class: `status ${status.kind}`, role: "status", title: status.word, "data-testid": "status", children: [
+      status.word.startsWith(ENDED2) ? /* @__PURE__ */ a4("span", { class: "ended-word", children: ENDED2 }) : "",
+      status.word.startsWith(ENDED2) ? status.word.slice(ENDED2.length) : status.word
+    ] }),
     canAskWhy() && /* @__PURE__ */ a4(
       "button",
       {
@@ -17260,8 +17303,12 @@ function SealChip() {
   const note = store.data.run.now.states[root]?.note ?? "";
   if (!note.startsWith(SEAL)) return null;
   const text2 = note.slice(SEAL.length);
-  const word = text2.startsWith("valid") ? "✓ certified" : text2.startsWith("nothing") ? "⚠ not tried" : "⚠ no evidence";
-  return /* @__PURE__ */ a4("span", { class: "chip", title: note, "data-testid": "seal", children: word });
+  const [sign2, word] = text2.startsWith("valid") ? ["✓", "certified"] : ["⚠", text2.startsWith("nothing") ? "not tried" : "no evidence"];
+  return /* @__PURE__ */ a4("span", { class: "chip seal", title: note, "data-testid": "seal", children: [
+    sign2,
+    " ",
+    /* @__PURE__ */ a4("span", { class: "seal-word", children: word })
+  ] });
 }
 function Chooser() {
   const facts = store.data.facts.value;
@@ -17386,7 +17433,7 @@ var GLYPHS = {
   iterator: "↻",
   missing: "✕"
 };
-var ENDED2 = { success: "✓", failure: "✕", preempted: "■", other: "•" };
+var ENDED3 = { success: "✓", failure: "✕", preempted: "■", other: "•" };
 function Tree({ page: page2 }) {
   const [top, setTop] = d2(0);
   const [folded, setFolded] = d2(() => /* @__PURE__ */ new Map());
@@ -17508,7 +17555,7 @@ function Row4({
         isContainer ? /* @__PURE__ */ a4("button", { class: "fold", tabindex: -1, "aria-label": open ? "close" : "open", onClick: onFoldClick, children: open ? "▾" : "▸" }) : /* @__PURE__ */ a4("span", { class: "kind", children: GLYPHS[node.kind] ?? "·" }),
         /* @__PURE__ */ a4("span", { class: "name", children: node.name }),
         active && !isContainer && /* @__PURE__ */ a4("span", { class: "purpose", children: purposeOfState(node.path) }),
-        !active && kind && /* @__PURE__ */ a4("span", { class: `ended ${kind}`, children: ENDED2[kind] }),
+        !active && kind && /* @__PURE__ */ a4("span", { class: `ended ${kind}`, children: ENDED3[kind] }),
         visits > 1 && /* @__PURE__ */ a4("span", { class: "times", children: [
           "×",
           visits
@@ -17602,7 +17649,15 @@ function ZoomButtons() {
     else view2.treeOpen.value = true;
   };
   return /* @__PURE__ */ a4("span", { class: "zoom", children: [
-    view2.namesAreSmall.value && (view2.opened.value.size > 1 || view2.isPhone.value) && /* @__PURE__ */ a4("button", { title: "the names are small: show less of the machine", onClick: outline, children: "Outline" }),
+    view2.namesAreSmall.value && /* @__PURE__ */ a4(
+      "button",
+      {
+        class: view2.opened.value.size > 1 ? "offer" : "offer of-tree",
+        title: "the names are small: show less of the machine",
+        onClick: outline,
+        children: "Outline"
+      }
+    ),
     /* @__PURE__ */ a4("button", { title: "smaller (-)", "aria-label": "zoom out", onClick: () => page.view.zoom(0.8), children: "−" }),
     /* @__PURE__ */ a4("button", { title: "larger (+)", "aria-label": "zoom in", onClick: () => page.view.zoom(1.25), children: "+" }),
     /* @__PURE__ */ a4("button", { title: "show everything (0)", onClick: () => page.layouts.refit(), children: "Fit" })

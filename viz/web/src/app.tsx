@@ -120,15 +120,19 @@ function TimeTools() {
 
 function ZoomButtons() {
   const { view } = store;
-  // The outermost level, or, if no more is open, the tree, which small screens hide.
+  // The outermost level, or, if no more is open, the tree, where it is hidden (styles/narrow.css).
   const outline = () => {
     if (view.opened.value.size > 1) page.layouts.setDepth(1);
     else view.treeOpen.value = true;
   };
   return (
     <span class="zoom">
-      {view.namesAreSmall.value && (view.opened.value.size > 1 || view.isPhone.value) && (
-        <button title="the names are small: show less of the machine" onClick={outline}>
+      {view.namesAreSmall.value && (
+        <button
+          class={view.opened.value.size > 1 ? "offer" : "offer of-tree"}
+          title="the names are small: show less of the machine"
+          onClick={outline}
+        >
           Outline
         </button>
       )}

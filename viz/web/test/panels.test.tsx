@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 import type { VNode } from "preact";
 import { renderToString } from "preact-render-to-string";
+import { setToken } from "#core/requests.ts";
 import { store } from "#core/store.ts";
 import type { Cause } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
@@ -12,6 +13,7 @@ import { Inspector } from "#panels/inspector.tsx";
 import { Log } from "#panels/log.tsx";
 import { PlayBar } from "#panels/play.tsx";
 import { Preempts } from "#panels/preempts.tsx";
+import { SimulateDialog } from "#panels/simulate.tsx";
 import { TopBar } from "#panels/top_bar.tsx";
 import { Tree } from "#panels/tree.tsx";
 import { Userdata } from "#panels/userdata.tsx";
@@ -48,7 +50,7 @@ beforeEach(() => {
 
 test("the log has a line for each event, the newest first, with the time since the begin", () => {
   assert.deepEqual(lines(<Log page={page} />, "li").slice(1), [
-    "00:03.00 DRIVE goal to /drive",
+    "00:03.00 DRIVE goal to /drive \u2192 kitchen",
     "00:00.00 PATROL started",
   ]);
 });
@@ -73,7 +75,7 @@ test("the tree has a row for each state of an open container, and says what runs
 test("a running goal says its action, how long it runs and what it is", () => {
   const now = (store.data.run.last() ?? 0) + 10_000;
   const goals = lines(<Goals page={page} data={store.playback.shown()} now={now} />);
-  assert.deepEqual(goals, ["Goals", "DRIVE", "/drive 11 s", "active", "goal"]);
+  assert.deepEqual(goals, ["Goals", "DRIVE", "/drive \u2192 kitchen 11 s", "active", "goal"]);
 });
 
 test("an ended goal is one line with its text and its time", () => {
@@ -81,7 +83,7 @@ test("an ended goal is one line with its text and its time", () => {
   store.addEvents([event("GoalDone", "/PATROL/ROUND/DRIVE", done)]);
   const html = lines(<Goals page={page} data={store.playback.shown()} now={store.data.run.last() ?? 0} />);
   assert.ok(
-    html.some((one) => one.includes("no way") && one.includes("2.0 s")),
+    html.some((one) => one.includes("\u2192 kitchen no way") && one.includes("2.0 s")),
     html.join("\n"),
   );
 });
@@ -155,8 +157,25 @@ test("the inspector says what is wrong with the machine", () => {
   assert.ok(lines(<Inspector page={page} />).some((line) => line.includes("no way out")));
 });
 
+test("simulated runs start when the missions are known", () => {
+  setToken("t");
+  const { settings, simulations, simulationsKnown } = store.data;
+  settings.value = { ...settings.value, control: true };
+  store.view.simulateOpen.value = true;
+  const starts = () => /<button[^>]*type="submit"[^>]*>/.exec(renderToString(<SimulateDialog />))?.[0] ?? "";
+  assert.match(renderToString(<SimulateDialog />), /<option[^>]*>reading the missions\u2026/);
+  assert.match(starts(), /disabled/);
+  simulationsKnown.value = true;
+  assert.match(renderToString(<SimulateDialog />), /<option[^>]*>none installed/);
+  assert.match(starts(), /disabled/);
+  simulations.value = { missions: { patrol: "" }, batches: [] };
+  assert.doesNotMatch(starts(), /disabled/);
+  store.view.simulateOpen.value = false;
+});
+
 test("the bar says what evidence the run has, and whether it did what nobody has tried", () => {
-  const chip = () => /data-testid="seal">([^<]*)</.exec(renderToString(<TopBar page={page} />))?.[1];
+  const chip = () =>
+    /data-testid="seal">(.*?)<\/span><\/span>/.exec(renderToString(<TopBar page={page} />))?.[1]?.replace(/<.*>/, "");
   assert.equal(chip(), undefined);
   const said: [string, string | undefined][] = [
     ["aisle 7", undefined],

@@ -2,10 +2,18 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { KINDS_OF, lineOf } from "#core/log_lines.ts";
 import { commonClass, FAILURE, outcomeClass, PREEMPTED_PREFIXES, SUCCESS } from "#core/outcomes.ts";
-import { askerText, duration, holdText, shorten, shortenLines } from "#core/text.ts";
+import { askerText, duration, endOfPath, holdText, shorten, shortenLines } from "#core/text.ts";
 import { event, fixture } from "./fixtures.ts";
 
 const texts = fixture("texts.json");
+
+test("paths that end alike are told apart by more of them", () => {
+  const paths = ["/a/smachpy/runs", "/home/x/runs", "/y/simulated", "runs", "/b/simulated/runs"];
+  const ends = paths.map((one) => endOfPath(one, paths));
+  assert.deepEqual(ends, ["smachpy/runs", "x/runs", "simulated", "runs", "simulated/runs"]);
+  assert.equal(endOfPath("/runs", ["/runs"]), "runs");
+  assert.equal(endOfPath("/runs/", ["/runs/", "/x/runs/"]), "/runs/");
+});
 
 test("names are shortened as in Python", () => {
   for (const [text, length, short] of texts.shorten) assert.equal(shorten(text, length), short);

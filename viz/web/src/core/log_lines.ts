@@ -2,6 +2,7 @@
 
 import { RAISED, requestOf, resourceText } from "#core/fold.ts";
 import { endClass, outcomeClass } from "#core/outcomes.ts";
+import { purposeOf } from "#core/purposes.ts";
 import { askerText, duration } from "#core/text.ts";
 import type { EventKind, EventOf, RunEvent, StateNode } from "#core/types.ts";
 import { brief } from "#core/values.ts";
@@ -31,7 +32,7 @@ const LINES: Lines = {
   QuestionAsked: (e) => [`asks ${e.text}`.trim(), "waiting"],
   QuestionAnswered: (e) => [e.by ? `answered ${e.answer} by ${e.by}` : `nobody answered: ${e.answer}`, "waiting"],
   OutcomeForced: (e) => [`forced: ${e.outcome}`, "waiting"],
-  GoalSent: (e) => [`goal to ${e.action}`, "active"],
+  GoalSent: (e) => [goalText(e), "active"],
   GoalDone: (e) => [`${e.action}: ${e.status.toLowerCase()} ${e.text}`.trim(), outcomeClass(e.status)],
   UserdataWritten: (e) => [`${e.key} = ${brief(e.value).slice(0, 60)}`, "other"],
 };
@@ -39,6 +40,11 @@ const LINES: Lines = {
 function outageText({ outages }: EventOf<"Recovered">) {
   const [from, to] = outages?.at(-1) ?? [0, 0];
   return duration((to - from) / 1e9);
+}
+
+function goalText(e: EventOf<"GoalSent">) {
+  const purpose = purposeOf(e.goal_id, e);
+  return `goal to ${e.action}${purpose && ` \u2192 ${purpose}`}`;
 }
 
 function heldText({ guards, truths }: EventOf<"HeldBack">) {

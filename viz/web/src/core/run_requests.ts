@@ -45,7 +45,9 @@ export async function askSimulation(data: object) {
 /** Request the batches of simulated runs. */
 export async function refreshSimulations() {
   const answer = await ask<Answers["GET /api/simulations"]>("/api/simulations");
-  if (!isFailure(answer)) store.data.simulations.value = answer;
+  if (isFailure(answer)) return;
+  store.data.simulations.value = answer;
+  store.data.simulationsKnown.value = true;
 }
 
 /** Resume or cancel a durable mission. */

@@ -66,5 +66,16 @@ export function holdText(row: PreemptedSpan, now: number) {
   return `${duration((now - row.preempt) / 1000)}${limit}${row.serviced !== null ? ", cleaning up" : ""}`;
 }
 
+/** The end of a path that tells it from the others: its last part, with more of it if others end so. */
+export function endOfPath(path: string, paths: string[]) {
+  const parts = path.split("/");
+  const ends = (one: string, end: string) => `/${one}`.endsWith(`/${end}`);
+  for (let count = 1; count < parts.length; count++) {
+    const end = parts.slice(-count).join("/");
+    if (end && paths.filter((one) => ends(one, end)).length < 2) return end;
+  }
+  return path;
+}
+
 /** The last part of a path. */
 export const lastWord = (path: string) => path.split("/").at(-1) || path;

@@ -13,6 +13,7 @@ import { isDark } from "#drawing/theme.ts";
 
 const REFRESH_MS = 1000;
 const GAP = 8;
+const MOST_COLUMNS = 4; // an answer has 32 runs: 7 lines are in view, or next to it
 const CARD = { width: 200 + GAP, height: 88 + GAP }; // [px]; see `.cards button`
 
 export const FleetPage = () => (store.view.pageShown.value === "fleet" ? <OpenFleet /> : null);
@@ -20,9 +21,15 @@ export const FleetPage = () => (store.view.pageShown.value === "fleet" ? <OpenFl
 function OpenFleet() {
   const [skip, setSkip] = useState(0);
   const [found, setFound] = useState<FleetRuns | null>(null); // null: not answered yet
+  const [width, setWidth] = useState(0); // of the cards [px]
   const heading = useRef<HTMLHeadingElement | null>(null);
   const box = useRef<HTMLDivElement | null>(null);
   useEffect(() => heading.current?.focus(), []);
+  useEffect(() => {
+    const seen = new ResizeObserver(() => setWidth(box.current?.clientWidth ?? 0));
+    if (box.current) seen.observe(box.current);
+    return () => seen.disconnect();
+  }, []);
   useEffect(() => {
     let open = true;
     const read = async () => {
@@ -39,7 +46,7 @@ function OpenFleet() {
   const { rows, total, skip: before } = found ?? { rows: [], total: 0, skip: 0 };
   const { scene, now } = sceneOf(rows);
   const { seconds, lanes } = lanesOf(rows, now);
-  const columns = Math.max(1, Math.floor(((box.current?.clientWidth ?? 0) + GAP) / CARD.width));
+  const columns = Math.min(MOST_COLUMNS, Math.max(1, Math.floor((width + GAP) / CARD.width)));
   const line = Math.floor(before / columns);
   // A line before those in view is there, too, so that none is empty while the next answer comes.
   const onScroll = (e: Event) => {
@@ -57,7 +64,7 @@ function OpenFleet() {
         <button onClick={() => showPage("runs")}>Close</button>
       </header>
       {found && !total && <p class="empty-list">No mission runs now. Each one that begins gets a card here.</p>}
-      <div class="fleet-top">
+      <div class={found && scene.isEmpty ? "fleet-top without-map" : "fleet-top"}>
         <div class="cards" ref={box} onScroll={onScroll}>
           <div style={{ height: `${Math.ceil(total / columns) * CARD.height}px` }}>
             <div class="in-view" style={{ transform: `translateY(${line * CARD.height}px)`, "--columns": columns }}>

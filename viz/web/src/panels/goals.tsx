@@ -2,6 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { outcomeClass } from "#core/outcomes.ts";
+import { purposeOf } from "#core/purposes.ts";
 import { store } from "#core/store.ts";
 import { duration } from "#core/text.ts";
 import type { GoalRun, Progress, RunState } from "#core/types.ts";
@@ -54,7 +55,7 @@ function EndedGoal({ id, goal, page }: { id: string; goal: GoalRun; page: Page }
           {MARKS[kind]}
         </button>
         <StateLink path={goal.path} page={page} />
-        <span class="what">{goal.text || status}</span>
+        <span class="what">{[purposeText(id, goal), goal.text || status].filter(Boolean).join(" ")}</span>
         <span class="times">{took}</span>
       </div>
       {open && (
@@ -82,7 +83,7 @@ function Goal({ id, goal, now, page }: { id: string; goal: GoalRun; now: number;
     <div {...linked(goal, `goal ${kind}`)} title={id}>
       <div class="head">
         <StateLink path={goal.path} page={page} />
-        <span class="action">{goal.action}</span>
+        <span class="action">{[goal.action, purposeText(id, goal)].filter(Boolean).join(" ")}</span>
         <span class="times">
           {(goal.attempt ?? 1) > 1 ? `attempt ${goal.attempt} \u00b7 ` : ""}
           {took}
@@ -97,6 +98,12 @@ function Goal({ id, goal, now, page }: { id: string; goal: GoalRun; now: number;
     </div>
   );
 }
+
+/** Where a goal leads, or what it is about, behind another word; "" if that is not known. */
+const purposeText = (id: string, goal: GoalRun) => {
+  const purpose = purposeOf(id, goal);
+  return purpose && `\u2192 ${purpose}`;
+};
 
 /** Attributes of a row that is highlighted with the visit that sent its goal. */
 const linked = (goal: GoalRun, kind: string) => ({

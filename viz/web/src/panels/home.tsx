@@ -7,7 +7,7 @@ import { chosen, countsOf, filterText, SHOWN, SHOWN_NAMES, standing, tally } fro
 import { refreshRuns } from "#core/run_requests.ts";
 import { copyText } from "#core/share.ts";
 import { store } from "#core/store.ts";
-import { lastWord, shorten } from "#core/text.ts";
+import { endOfPath, lastWord, shorten } from "#core/text.ts";
 import type { RunRow } from "#core/types.ts";
 import { fieldValue, More } from "#panels/components.tsx";
 import { Rows } from "#panels/run_rows.tsx";
@@ -58,7 +58,7 @@ function OpenHome() {
           </h2>
           {folders.map((one) => (
             <span class="chip" title={one}>
-              folder {shorten(lastWord(one), 24)}
+              folder {shorten(endOfPath(one, folders), 32)}
             </span>
           ))}
           {journals.map((one) => (

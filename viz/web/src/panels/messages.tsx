@@ -220,7 +220,11 @@ export function Legend() {
           {text}
         </span>
       ))}
-      {store.view.overview.value && <span class="hint">double-click opens one</span>}
+      {store.view.overview.value && (
+        <span class="hint" title="double-click opens a state with its arrows">
+          double-click opens one
+        </span>
+      )}
     </div>
   );
 }

@@ -65,7 +65,12 @@ export function PlayBar({ page }: { page: Page }) {
           onClick={() => store.playback.togglePlaying()}
         />
         <IconButton name="forward" title="one event forward (.)" onClick={() => store.playback.seekEvent(1)} />
-        <IconButton name="end" title="to the end (End)" onClick={() => page.timeline.live()} />
+        <IconButton
+          name="end"
+          class="icon-button to-end"
+          title="to the end (End)"
+          onClick={() => page.timeline.live()}
+        />
       </span>
       <Clock />
       <label class="rate">
@@ -160,7 +165,7 @@ function Jumps() {
       <span class="hint">Next</span>
       {KINDS.map(([kind, sign, letter]) => (
         <Jump name={`kind ${kind}`} letter={letter}>
-          <i class={`to-${kind}`}>{sign}</i> {kind}
+          <i class={`to-${kind}`}>{sign}</i> <span class="kind">{kind}</span>
         </Jump>
       ))}
       {keys.length > 0 && (

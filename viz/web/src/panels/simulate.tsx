@@ -22,6 +22,7 @@ function OpenDialog() {
   const [problems, setProblems] = useState("");
   const { missions, batches } = store.data.simulations.value;
   const names = Object.keys(missions);
+  const known = store.data.simulationsKnown.value;
   const mission = form.mission || names[0] || "";
   useEffect(() => {
     refreshSimulations();
@@ -55,6 +56,7 @@ function OpenDialog() {
           <label>
             Mission{" "}
             <select value={mission} onChange={change("mission")}>
+              {!names.length && <option value="">{known ? "none installed" : "reading the missions\u2026"}</option>}
               {names.map((name) => (
                 <option value={name}>{name}</option>
               ))}
@@ -92,7 +94,7 @@ function OpenDialog() {
           </label>
           {problems && <p class="problem wide">{problems}</p>}
           <p class="wide">
-            <button class="primary" type="submit">
+            <button class="primary" type="submit" disabled={!mission}>
               Start
             </button>
             <span class="hint">{shorten(missions[mission] ?? "", 90)}</span>

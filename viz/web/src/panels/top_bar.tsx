@@ -17,6 +17,7 @@ import { ReproduceButtons } from "#panels/reproduction.tsx";
 import { FollowButton, toggleTree, ViewMenu } from "#panels/view_menu.tsx";
 
 const MOST_FOUND = 12;
+const ENDED = "ended: "; // left out in narrow windows, as the colour says it
 const SEAL = "evidence: "; // how the notes of a root begin that say what evidence there is
 
 export function TopBar({ page }: { page: Page }) {
@@ -49,7 +50,8 @@ export function TopBar({ page }: { page: Page }) {
       <RunsButton />
       <Chooser />
       <span class={`status ${status.kind}`} role="status" title={status.word} data-testid="status">
-        {status.word}
+        {status.word.startsWith(ENDED) ? <span class="ended-word">{ENDED}</span> : ""}
+        {status.word.startsWith(ENDED) ? status.word.slice(ENDED.length) : status.word}
       </span>
       {canAskWhy() && (
         <button
@@ -114,10 +116,12 @@ function SealChip() {
   const note = store.data.run.now.states[root]?.note ?? "";
   if (!note.startsWith(SEAL)) return null;
   const text = note.slice(SEAL.length);
-  const word = text.startsWith("valid") ? "✓ certified" : text.startsWith("nothing") ? "⚠ not tried" : "⚠ no evidence";
+  const [sign, word] = text.startsWith("valid")
+    ? ["✓", "certified"]
+    : ["⚠", text.startsWith("nothing") ? "not tried" : "no evidence"];
   return (
-    <span class="chip" title={note} data-testid="seal">
-      {word}
+    <span class="chip seal" title={note} data-testid="seal">
+      {sign} <span class="seal-word">{word}</span>
     </span>
   );
 }

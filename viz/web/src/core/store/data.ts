@@ -64,6 +64,8 @@ export class Data {
     batches: [],
   });
 
+  readonly simulationsKnown = signal(false);
+
   run = new Run(emptyState(), []);
   scene = new Scene();
   marks = new Marks(); // targets of jumps
