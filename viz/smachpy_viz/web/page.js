@@ -1847,11 +1847,11 @@ function countWhile(list, holds) {
   }
   return low;
 }
+var parentOf = (path) => path.slice(0, Math.max(0, path.lastIndexOf("/")));
 function innermost(list, pathOf2) {
   const above = /* @__PURE__ */ new Set();
   for (const entry of list) {
-    let path = pathOf2(entry);
-    while ((path = path.slice(0, Math.max(0, path.lastIndexOf("/")))) && !above.has(path)) above.add(path);
+    for (let path = parentOf(pathOf2(entry)); path && !above.has(path); path = parentOf(path)) above.add(path);
   }
   return list.filter((one) => !above.has(pathOf2(one)));
 }

@@ -15,12 +15,13 @@ export function countWhile<T>(list: T[], holds: (entry: T) => boolean) {
   return low;
 }
 
+const parentOf = (path: string) => path.slice(0, Math.max(0, path.lastIndexOf("/")));
+
 /** The entries whose path contains the path of no other entry. */
 export function innermost<T>(list: T[], pathOf: (entry: T) => string) {
   const above = new Set<string>();
   for (const entry of list) {
-    let path = pathOf(entry);
-    while ((path = path.slice(0, Math.max(0, path.lastIndexOf("/")))) && !above.has(path)) above.add(path);
+    for (let path = parentOf(pathOf(entry)); path && !above.has(path); path = parentOf(path)) above.add(path);
   }
   return list.filter((one) => !above.has(pathOf(one)));
 }
