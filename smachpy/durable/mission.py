@@ -254,7 +254,7 @@ def kept_mission(
                 yield recorder
         finally:
             data.live.journal = NO_JOURNAL
-            if position.visits:  # empty before the run begins and after it has ended
+            if position.data["started_ns"]:  # it has begun; a store keeps the status of an end
                 status = INTERRUPTED
         if recorder.broken is not None:
             raise recorder.broken  # noqa: TRY301

@@ -575,6 +575,21 @@ def test_a_journal_that_cannot_be_written_preempts_the_machine(store: KillingSto
     assert full.rows["m"].status == "interrupted"
 
 
+def test_a_mission_whose_end_cannot_be_written_is_interrupted() -> None:
+    """It waited in the queue, as if it had not begun."""
+
+    class Full(KillingStore):
+        def append(self, lease: Any, entries: list[bytes], **named: Any) -> None:
+            if any(b'"Finished"' in entry for entry in entries):
+                raise StoreError("here", "no space is left.", reason="full")
+            super().append(lease, entries, **named)
+
+    full = Full()
+    with pytest.raises(StoreError):
+        go_on(full, machine_of(Doing(fine)))
+    assert full.rows["m"].status == "interrupted"
+
+
 def test_one_that_was_taken_over_is_preempted(store: KillingStore) -> None:
     class Taken(KillingStore):
         def append(self, lease: Any, *arguments: Any, **named: Any) -> None:
