@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from smachpy.command.targets import Target
     from smachpy.durable.mission import Outage
-    from smachpy.durable.store import FencedError, MissionRow, Store
+    from smachpy.durable.store import FencedError, Lease, MissionRow, Store
     from smachpy.machines.container import Container
 
 LEASE_S: Final = 15.0  # [s] default of --lease
@@ -206,8 +206,13 @@ def journalled(
     # Give up before the lease runs out: this process must have stopped before another one may
     # take over (`open_store`).
     patience = min(8.0, options.lease_s / 2)
-    with contextlib.closing(open_store(options.journal, patience=patience)) as store:
-        row = find_or_create(store, machine, options)
+    with (
+        contextlib.closing(open_store(options.journal, patience=patience)) as store,
+        contextlib.ExitStack() as stack,
+    ):
+        row, begun = find_or_start(store, machine, options)
+        if begun is not None:
+            stack.callback(_forget_if_queued, store, row.id)
         verb = "begins" if row.status == "queued" else "is resumed"
 
         def tell_suspended(by: str) -> None:
@@ -229,6 +234,7 @@ def journalled(
             migrate=migrate,
             lease_s=options.lease_s,
             reserved=options.reserved and Lease(row.id, options.reserved[1], options.reserved[0]),
+            started=None if begun is None else (row, begun),
             on_fenced=_leave,
             on_suspended=tell_suspended,
         ):
@@ -237,14 +243,25 @@ def journalled(
             yield
 
 
-def find_or_create(store: Store, machine: Container, options: DurableOptions) -> MissionRow:
-    """Return the mission to continue, or a new one.
+def _forget_if_queued(store: Store, mission: str) -> None:
+    """Forget a mission that this process could not begin: a runner would do so, hours later."""
+    with contextlib.suppress(MissionError):
+        if store.mission(mission).status == "queued":
+            store.forget(mission)
+
+
+def find_or_start(
+    store: Store, machine: Container, options: DurableOptions
+) -> tuple[MissionRow, Lease | None]:
+    """Return the mission to continue, or a new one and the lease with which it was started.
 
     Raises:
         MissionError: the mission that has begun has other arguments.
+        MissionInUseError: another mission uses the robot of the new one, which is not added.
     """
     from actionlib_core.node import get_node
     from smachpy.durable.mission import new_mission
+    from smachpy.durable.processes import this_runner
     from smachpy.durable.store import OVER
     from smachpy.events.introspection import describe
 
@@ -264,7 +281,7 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
     alike = [row for row in alike if row.every is None]
     same = [row for row in alike if row.argv == options.argv]
     if same:
-        return same[-1]
+        return same[-1], None
     if alike:
         row = alike[-1]
         raise MissionError(
@@ -282,7 +299,10 @@ def find_or_create(store: Store, machine: Container, options: DurableOptions) ->
     )
     actions = needed_servers(describe(machine))
     names = [get_node().resolve(name, "action name") for name in actions]
-    return store.create(replace(row, drives=driven_robot(names, options.robot)))
+    row = replace(row, drives=driven_robot(names, options.robot))
+    # At once: a runner must not begin it in between.
+    started = store.start(row, this_runner(), seconds=options.lease_s)
+    return started or (store.create(row), None)  # another process has the id by now: an error
 
 
 def _reserved(text: str) -> tuple[str, int]:

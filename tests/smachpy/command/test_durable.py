@@ -286,12 +286,15 @@ def test_what_was_recorded_of_one_run_in_several_files_is_one_run(
     assert (json.loads(line)["outcome"], len(json.loads(line)["outages"])) == ("done", 1)
 
 
-def test_a_mission_that_could_not_begin_is_none_that_was_interrupted(
+def test_a_mission_that_could_not_begin_is_not_begun_by_a_runner_later(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     Path("taken.jsonl").touch()
     assert run("--record", "taken.jsonl") == 2
-    assert listed(capsys)[0]["status"] == "queued"
+    assert listed(capsys) == []
+    assert main(["submit", "errand.py", "--db", "j.db", "--mission", "waits"]) == 0
+    assert run("--mission", "waits", "--record", "taken.jsonl") == 2
+    assert [row["id"] for row in listed(capsys)] == ["waits"]  # somebody wants it to wait
     assert run("--mission", "m", "--robot", "ghost", "--record", "taken.jsonl") == 2
 
 
