@@ -10,6 +10,7 @@ from collections import Counter
 import pytest
 
 from actionlib_core import SimpleActionClient, SimpleActionServer
+from actionlib_core.goal import client as client_goal
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from actionlib_core.node import Node
@@ -59,7 +60,11 @@ def test_goals_over_a_bridge_in_another_process(ros, command, node):
         assert "beyond_worker" in client.get_goal_status_text()
 
 
-def test_over_a_bridge_in_this_process_nothing_comes_twice_and_others_hear_all(ros, bridge, node):
+def test_over_a_bridge_in_this_process_nothing_comes_twice_and_others_hear_all(
+    ros, bridge, node, monkeypatch
+):
+    # A goal that a slow server has not listed after this time is sent again, and passed on again.
+    monkeypatch.setattr(client_goal, "RESEND_FIRST_S", 10 * WAIT_S)
     recorder = ros.start("topics", "counter")
     recorder.ask("record /direct/goal")
     ros.start("action_server", "direct", "direct_worker")
