@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -727,9 +727,25 @@ def begins(container: Container) -> tuple[str, str, str | None]:
     return live.goes_on, live.stopped_at, getattr(container._smachpy, "next_initial", None)
 
 
-def _text(value: object) -> str:
-    """Return the `repr` of a value; one without counts as different from all others."""
+def _text(value: Any) -> str:
+    """Return a text that equal values share: the `repr`, and what that leaves out.
+
+    Fields of dataclasses with `repr=False`, and the middle of long arrays. A value without a `repr`
+    counts as different from all others.
+    """
     try:
+        if is_dataclass(value) and not isinstance(value, type):
+            parts = [_text(getattr(value, each.name)) for each in fields(value)]
+        elif type(value) in {list, tuple}:
+            parts = [_text(each) for each in value]
+        elif type(value) is dict:
+            parts = [f"{key!r}: {_text(each)}" for key, each in value.items()]
+        elif hasattr(value, "tobytes") and hasattr(value, "dtype"):
+            parts = [str(value.dtype), str(value.shape), str(value.tobytes())]
+        else:
+            return repr(value)
+        return f"{type(value).__qualname__}({', '.join(parts)})"
+    except RecursionError:  # it contains itself
         return repr(value)
     except Exception:  # noqa: BLE001  the value's own code
         return object.__repr__(value)

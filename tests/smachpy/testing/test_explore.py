@@ -9,7 +9,9 @@ import sys
 import threading
 import time
 import weakref
+from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 
 from actionlib_core.action.simple_client import SimpleActionClient
@@ -1216,3 +1218,35 @@ def test_a_machine_that_goes_on_is_explored_from_its_begin_each_time():
         return {(run.outcome, *run.path) for run in runs}
 
     assert ways(make()) == ways(make)
+
+
+@dataclass
+class Tally:
+    n: int = field(default=0, repr=False)
+
+
+@pytest.mark.parametrize("hidden", ["field", "in a list", "array"])
+def test_what_the_repr_of_a_value_leaves_out_makes_situations_different(hidden):
+    """The search called itself exhaustive, and never came to the third round."""
+
+    def count(userdata):
+        found = userdata.tally
+        if hidden == "array":
+            found[1000] += 1
+            return "many" if found[1000] == 3 else "more"
+        one = found[0] if hidden == "in a list" else found
+        one.n += 1
+        return "many" if one.n == 3 else "more"
+
+    def make():
+        first = {"field": Tally, "in a list": lambda: [Tally()], "array": lambda: np.zeros(2001)}
+        sm = StateMachine(["bad", "stop", "preempted"], name="M")
+        sm.userdata.tally = first[hidden]()
+        counts = CBState(count, outcomes=["more", "many"], io_keys=["tally"])
+        sm.add("COUNT", counts, {"more": "AGAIN", "many": "bad"})
+        sm.add("AGAIN", Leaf("again", "stop"), {"again": "COUNT"})
+        return sm
+
+    runs = []
+    assert explore(make, keep=["COUNT"], on_run=runs.append).exhaustive
+    assert "bad" in {run.outcome for run in runs}
