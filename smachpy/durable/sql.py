@@ -684,15 +684,17 @@ class SqlStore(ABC):
         beat_ns: int | None = None,
     ) -> None:
         mission = lease.mission
+        first_try: list[int] = []  # the number of the last entry that it found
 
         def work(cursor: Cursor, again: bool) -> int:
             _, last = self._fenced(cursor, lease)
-            if again and lease in self._written:
-                before = self._written[lease]
+            if again and (first_try or lease in self._written):
+                before = first_try[0] if first_try else self._written[lease]
                 if entries and last == before + len(entries):
                     return last  # the first try was committed; only its answer was lost
                 if last < before:
                     raise self._damaged(mission, f"the server has {last} entries of {before}")
+            first_try.append(last)
             if blobs:
                 self._do_many(
                     cursor,

@@ -245,6 +245,25 @@ def test_a_mission_begins_once_although_the_answer_was_lost(store, monkeypatch):
     store.append(lease, [b"a"])
 
 
+def test_the_first_entries_of_a_lease_are_written_once_although_the_answer_was_lost(
+    store, monkeypatch
+):
+    """Only after its first entries did a store know how many a lease had written."""
+    store.create(ROW)
+    lease = store.claim("m1", this_runner(), seconds=LONG_S)
+    transact = store._transact
+
+    def twice(work, **options):
+        transact(work, **options)
+        return transact(lambda cursor, _: work(cursor, True), **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(store, "_transact", twice)
+        store.append(lease, [b"a", b"b"])
+        store.append(lease, [b"c"])
+    assert store.read("m1") == (None, [b"a", b"b", b"c"])
+
+
 def test_a_schedule_is_not_run_itself(store):
     store.create(replace(ROW, every="* * * * *", due=1.0))
     with pytest.raises(MissionError, match="schedule"):
