@@ -373,6 +373,8 @@ class Control:
         for timeout in halted:
             timeout.halt()
         try:
+            # Its own has not begun here, but in the journal: a resumed run reads it there.
+            frame.run.journal.halted(path)
             while self._paused and not self._take_step():
                 visit = frame.visit
                 # Called off: the caller sees the same flags and does not start the state.
@@ -388,6 +390,7 @@ class Control:
             forget()
             with self._lock:
                 self._waiting.pop(path, None)
+            frame.run.journal.went_on(path)
             frame.emit(Resumed)
 
     def _watch(self) -> None:

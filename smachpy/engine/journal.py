@@ -178,7 +178,7 @@ class RunJournal:
         return seconds
 
     def halted(self, path: str) -> None:
-        """Write that the timeout of the container at `path` stops: a state in it is held."""
+        """Write that the timeout of the child at `path` stops: it, or a state in it, is held."""
 
     def went_on(self, path: str) -> None:
         """Write that it goes on."""

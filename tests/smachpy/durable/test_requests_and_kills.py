@@ -435,6 +435,34 @@ def test_time_at_the_gate_does_not_count_after_a_kill_either(shape):
         assert outcome == "cleaned", (place, ends)
 
 
+class Notes(Work):
+    """Writes an entry after half of its time."""
+
+    def execute(self, userdata):
+        self.sleep(self.seconds / 2)
+        smachpy.once("half", lambda: True)
+        self.seconds /= 2
+        return super().execute(userdata)
+
+
+def test_time_at_the_gate_does_not_count_against_the_held_states_own_timeout():
+    """LOOK takes 10 s of its 30 s; the entry of the end of DRIVE has begun it 95 s before."""
+
+    def build(ends):
+        sm = StateMachine(ENDS, name="M")
+        sm.add("DRIVE", Work(ends, "DRIVE"), {"done": "LOOK"})
+        sm.add("LOOK", Notes(ends, "LOOK"))
+        smachpy.set_options(sm["LOOK"], timeout=30.0, timeout_outcome="preempted")
+        return sm
+
+    def hold(sm, _path):
+        sm.control.pause()
+        sm._smachpy.live.frame.run.clock.call_later(HELD_S, sm.control.resume)
+
+    for place, outcome, ends in lives(build, "/M", hold):
+        assert outcome == "done", (place, ends)
+
+
 class Quick(Work):
     """Its work is done once it has ended 'preempted', so that HOME follows."""
 
