@@ -238,6 +238,8 @@ class SimpleActionServer:
 
     def _ask_to_stop(self) -> None:
         with self.lock:
+            if self._stopping:  # once: a second request would end what the first has led to
+                return
             self._stopping = True
             waiting = self._policy.on_stop()
             if self._idle:

@@ -86,6 +86,25 @@ def test_a_server_that_stops_calls_its_preempt_callback(world, how):
     assert heard == [True]
 
 
+def test_a_server_that_gives_way_and_is_stopped_then_asks_its_code_once(world):
+    """The second request would end what the first has led to, such as the way home."""
+    heard = []
+    simple = SimpleActionServer(
+        "a", TestAction, lambda _goal: world.clock.sleep(30.0), False, node=world.robot
+    )
+    simple.register_preempt_callback(lambda: heard.append(True))
+    simple.start()
+    client(world).send_goal(TestGoal(1))
+    world.clock.sleep(1.0)
+
+    end(world, simple.action_server, simple.stop, "conflict")
+    world.clock.sleep(1.0)
+    simple.stop()
+    world.clock.sleep(1.0)
+
+    assert heard == [True]
+
+
 def end(world, action_server, stop, how):
     if how == "stop":
         stop()
