@@ -13,7 +13,7 @@ WORKERS := -n 3 --dist worksteal
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test test-pythons contract-100 soak soak-durable fuzz mutants lint types web stubs format bench bench-check scale docs dist check-installed check-dependencies slow-tests clean
+.PHONY: help run test test-pythons contract-100 soak soak-durable fuzz search mutants lint types web stubs format bench bench-check scale docs dist check-installed check-dependencies slow-tests clean
 
 help:  ## Show the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /\1\t/p' Makefile | expand -t 14
@@ -57,6 +57,10 @@ fuzz:  ## Mutate the inputs of every reader for minutes, and check what others h
 	@.ci/venv dot,sim,test
 	@.ci/audit
 	$(BIN)/python tests/fuzz/fuzz.py $(if $(SECONDS),--seconds $(SECONDS)) $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
+
+search:  ## Try other examples in the property-based tests; "make test" tries the same ones each time (EXAMPLES=2000)
+	@.ci/venv dot,sim,test
+	EXAMPLES=$(or $(EXAMPLES),2000) $(BIN)/python -m pytest -q $(WORKERS) -m hypothesis --hypothesis-profile=search -o timeout=3600 tests
 
 lint:  ## Check format, style, imports and words: ruff, import-linter, .ci/words; biome and tsc for the page
 	@.ci/venv dot,sim,test

@@ -31,14 +31,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-# A busy computer is no failure: pytest's timeout is the only one. Continuous integration tries twice as much.
+# A busy computer is no failure: pytest's timeout is the only one. Each run tries the same examples, so a build fails
+# for what its change did, and `make search` looks for others. Continuous integration tries twice as many.
+ANY_SPEED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True)
 settings.register_profile(
-    "suite",
-    max_examples=100 if os.environ.get("CI") else 50,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-    print_blob=True,
+    "suite", ANY_SPEED, max_examples=100 if os.environ.get("CI") else 50, derandomize=True
 )
+settings.register_profile("search", ANY_SPEED, max_examples=int(os.environ.get("EXAMPLES", "2000")))
 settings.load_profile("suite")
 
 # Threads that a clock keeps for a few seconds, without work.
