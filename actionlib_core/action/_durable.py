@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-VERSION: Final = 1
+VERSION: Final = 2
 _APPLICATION: Final = 0x736D6767  # marks the file ("smgg", `PRAGMA application_id`)
 _PATIENCE_S: Final = 2.0  # how long SQLite waits for other servers that write to the file
 _DELETE: Final = "DELETE FROM goals WHERE action = ? AND id = ?"
@@ -40,6 +40,8 @@ _TABLE: Final = """CREATE TABLE goals (
     stamp_ns INTEGER NOT NULL, client TEXT NOT NULL, status INTEGER NOT NULL, text TEXT NOT NULL,
     begun INTEGER NOT NULL, changed REAL NOT NULL, goal BLOB, result BLOB,
     PRIMARY KEY (action, id))"""
+# Columns that version 2 added; see `ServerGoal`.
+_ADDED: Final = ("cancel_if_lost", "superseded")
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,11 @@ class GoalFile:
                 problem = "got a file of another program; expected one of action servers."
                 raise DurableGoalsError(self._file, problem)
             run(_TABLE)
-            run(f"PRAGMA user_version = {VERSION}")
             run(f"PRAGMA application_id = {_APPLICATION}")
+        if version < VERSION:
+            for column in _ADDED:
+                run(f"ALTER TABLE goals ADD COLUMN {column} INTEGER NOT NULL DEFAULT 0")
+            run(f"PRAGMA user_version = {VERSION}")
         run("COMMIT")
         # Not within a transaction, where SQLite does not change these two.
         run("PRAGMA journal_mode = WAL")
@@ -141,11 +146,11 @@ class GoalFile:
                 )
                 # By rowid: in the order in which the goals arrived.
                 rows = self._connection.execute(
-                    "SELECT id, type, stamp_ns, client, status, text, begun, goal, result "
-                    "FROM goals WHERE action = ? ORDER BY rowid",
+                    "SELECT id, type, stamp_ns, client, status, text, begun, goal, result, "
+                    "cancel_if_lost, superseded FROM goals WHERE action = ? ORDER BY rowid",
                     (self._action,),
                 ).fetchall()
-            for id_, type_, stamp_ns, client, status, text, begun, goal, result in rows:
+            for id_, type_, stamp_ns, client, status, text, begun, goal, result, *flags in rows:
                 if goal is None:
                     past[id_] = status
                     continue
@@ -156,6 +161,7 @@ class GoalFile:
                         f"{self._type}. Try the old definition, or another file.",
                     )
                 record = ServerGoal(id_, stamp_ns, Status(status), text, client, result=result)
+                record.cancel_if_lost, record.superseded = map(bool, flags)
                 goals.append(KeptGoal(record, self._types.goal.from_bytes(goal), bool(begun)))
         except (sqlite3.Error, ValueError, TypeError) as error:
             raise self._error(error) from error
@@ -164,24 +170,24 @@ class GoalFile:
     def add(self, record: ServerGoal, content: Any) -> str | None:
         """Write a new goal; return the error's text, None when it was written."""
         return self._write(
-            "INSERT INTO goals VALUES (?, ?, ?, ?, ?, ?, ?, 0, ?, ?, ?)",
+            "INSERT INTO goals VALUES (?, ?, ?, ?, ?, ?, ?, 0, ?, ?, ?, ?, 0)",
             lambda: (
                 *(self._action, record.id, self._type, record.stamp_ns, record.client),
                 *(int(record.status), record.text, record.stamp_ns / 1e9),
-                *(type(content).to_bytes(content), record.result),
+                *(type(content).to_bytes(content), record.result, record.cancel_if_lost),
             ),
         )
 
     def update(self, record: ServerGoal, now: float) -> None:
         """Write a goal's present status and result; a failure is logged."""
         problem = self._write(
-            "UPDATE goals SET status = ?, text = ?, result = ?, begun = MAX(begun, ?), changed = ? "
-            "WHERE action = ? AND id = ?",
+            "UPDATE goals SET status = ?, text = ?, result = ?, begun = MAX(begun, ?), "
+            "superseded = ?, changed = ? WHERE action = ? AND id = ?",
             # Read under the lock: of two threads that change the goal, the last writes its final
             # state. `begun` stays set once the goal was ACTIVE.
             lambda: (
                 *(int(record.status), record.text, record.result),
-                int(record.status is Status.ACTIVE),
+                *(int(record.status is Status.ACTIVE), record.superseded),
                 *(now, self._action, record.id),
             ),
         )

@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core.action.goal_id_generator import GoalIDGenerator
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from actionlib_core.action._durable import GoalFile
-    from actionlib_core.clock import Event
+    from actionlib_core.clock import Event, Timer
     from actionlib_core.goal.ports import ServerPort
     from actionlib_core.node import Node
     from actionlib_core.wire.action_types import ActionTypes
@@ -45,6 +46,7 @@ log = logging.getLogger(__name__)
 DRAIN_S = 0.7  # longest wait of `stop` for acknowledgements; less when a whole node closes
 FAREWELL_S = 0.1  # interval of its farewells meanwhile, as each of them may get lost
 AHEAD_NS = 1_000_000_000  # a stamp later than this is reported: it comes from another clock
+CLIENTS_S = 10.0  # after a restart all living clients are found by then: peers search every 8 s
 REMEMBERED = 1024  # senders that were reported
 
 TEXT_STOPPED = "The action server was stopped"
@@ -123,6 +125,7 @@ class GoalKeeper:
         self._drained: Event | None = None  # set when all clients have answered; made by `stop`
         self._durable = durable
         self._file: GoalFile | None = None
+        self._looking: Timer | None = None  # it looks for the clients of restored goals
         self._tidying = threading.Lock()  # held while a thread tidies the file
         self._resumes = resumes
         self._ahead = Recent(REMEMBERED)  # senders whose stamps are in the future
@@ -160,13 +163,14 @@ class GoalKeeper:
         """Run or end the goals that an earlier server did not end.
 
         A goal that was never accepted is treated as new. One that was asked to stop is not run
-        again.
+        again. Clients that have died meanwhile are noticed `CLIENTS_S` later.
         """
         for handle in handles:
             record = handle.record
             with self.lock:
                 status = record.status
-                ends = status is Status.PREEMPTING or (handle.resumed and not self._resumes)
+                asked = status is Status.PREEMPTING or record.superseded
+                ends = asked or (handle.resumed and not self._resumes)
                 if status is not Status.RECALLING and not ends:
                     record.status = Status.PENDING  # so that the server's code can accept it again
             if status is Status.RECALLING:
@@ -177,8 +181,18 @@ class GoalKeeper:
                 self._deliver_goal(handle)
         if handles:
             self.status.on_change()
+            clients = {handle.record.client for handle in handles}
+            with self.lock:
+                if not self.stopped:
+                    look = partial(self._look_for_clients, clients)
+                    self._looking = self._clock.call_later(CLIENTS_S, look)
         elif self._file is not None:
             self.status.expire_later()  # results that were kept once more
+
+    def _look_for_clients(self, clients: set[str]) -> None:
+        """Treat clients of restored goals that are not there as dead."""
+        for client in clients - self.port.clients() - {""}:
+            self.on_client_lost(client)
 
     def close_file(self) -> None:
         """Close the file, if there is one."""
@@ -206,6 +220,11 @@ class GoalKeeper:
         file = self._file
         if file is not None:
             file.update(record, self._clock.time_ns() / 1e9)
+
+    def note_superseded(self, record: ServerGoal) -> None:
+        """Note that a running goal is asked to stop without a change of its status."""
+        record.superseded = True
+        self._keep(record)
 
     # -- calls of the server's code ------------------------------------------------------------
 
@@ -385,7 +404,7 @@ class GoalKeeper:
                     return
 
     def _is_drained(self) -> bool:
-        if not self.port.has_clients():
+        if not self.port.clients():
             return True
         with self.lock:
             return self.port.is_farewell_heard() and not self.goals.has_unacknowledged()
@@ -396,6 +415,9 @@ class GoalKeeper:
         with self.lock:
             self.stopped = True
             self.status.close()
+            looking = self._looking
+        if looking is not None:
+            looking.cancel()
         try:
             self.port.close()
         finally:

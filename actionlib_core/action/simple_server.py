@@ -438,10 +438,13 @@ class SimpleActionServer:
             stopping = self._stopping
             if not stopping:
                 decision = self._admit(goal)
+                current = self._policy.current
                 waits = self._policy.running or self.execute_callback is None
         if stopping:
             self._turn_away(goal, "reject", TEXT_STOPPED)
             return
+        if decision.preempt and current is not None:
+            self._keeper.note_superseded(current.record)
         if waits:  # else its acceptance, which follows at once, tells the client that it has come
             self._keeper.status.on_arrival()
         # Without the lock, as this sends results. The usual decision needs nothing more.
@@ -569,6 +572,7 @@ class SimpleActionServer:
 
         def stop(taker: Claim) -> None:
             log.info("%s is asked to stop: %s takes %s", who, taker.who(), name)
+            self._keeper.note_superseded(handle.record)
             self.internal_preempt_callback(handle)
 
         around = (handle, *around_sender(handle.record.id))

@@ -179,8 +179,8 @@ class ServerPort(Protocol):
     def close(self) -> None:
         """Withdraw from the network; a second call does nothing."""
 
-    def has_clients(self) -> bool:
-        """Return whether the action has a client."""
+    def clients(self) -> set[str]:
+        """Return the action's clients, as `ServerListener.on_goal` names them."""
 
     def begin_farewell(self) -> bool:
         """Note the clients that are to acknowledge the farewell; return whether there are any.

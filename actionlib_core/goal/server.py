@@ -60,6 +60,8 @@ class ServerGoal:
         made_at: When the client first sent it, as far as known [s, clock].
         age: Time from that until the copy was sent that has arrived first [s].
         cancel_if_lost: It is cancelled when its client dies.
+        superseded: While it ran, a newer goal or another user of its resource asked it to stop,
+            which its status does not show.
         arrived: False while only a cancel has come for this id.
         result: The result as it is sent, once there is one.
         listed_until: End of its time in the status list [s, clock]; None: no end yet, or passed.
@@ -75,6 +77,7 @@ class ServerGoal:
     made_at: float = 0.0
     age: float = 0.0
     cancel_if_lost: bool = False
+    superseded: bool = False
     arrived: bool = True
     result: object = None
     listed_until: float | None = None

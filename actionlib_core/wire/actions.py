@@ -609,8 +609,9 @@ class ActionServerPort:
         for entry in declared:
             entry.close()
 
-    def has_clients(self) -> bool:
-        return bool(self._clients)
+    def clients(self) -> set[str]:
+        # Copies, as other threads change them.
+        return {client.session for client in list(self._clients.values())}
 
     def begin_farewell(self) -> bool:
         if not self._publishers[self._keys.status, GoalStatusArray, RESULT].matching():

@@ -208,8 +208,8 @@ class RosServerPort:
         for entry in declared:
             entry.close()
 
-    def has_clients(self) -> bool:
-        return bool(self._clients)
+    def clients(self) -> set[str]:
+        return self._clients.copy()
 
     def begin_farewell(self) -> bool:
         return False

@@ -12,6 +12,7 @@ import sys
 import pytest
 
 from actionlib_core import ActionClient, ActionServer, SimpleActionServer
+from actionlib_core.action.goal_keeper import CLIENTS_S
 from actionlib_core.exceptions import ActionException, DurableGoalsError
 from actionlib_core.goal.server import MEMORY_S
 from actionlib_core.goal.states import Status
@@ -153,6 +154,167 @@ def test_a_goal_that_was_cancelled_before_it_was_accepted_is_recalled(world):
     assert world.end_of(goal_id)[0] == Status.RECALLED
 
 
+def simple(world, run, **options):
+    """Make a simple server that runs its goals again after a kill."""
+    kept = {"durable": world.file, "on_restart": "resume", **options}
+    return SimpleActionServer("work", Action, run, False, node=world.new_life(), **kept)
+
+
+@pytest.mark.parametrize("waits", [True, False], ids=["newer one waits", "newer one cancelled"])
+def test_a_goal_that_a_newer_one_replaced_is_not_begun_again(world, waits):
+    """Its status does not show that it was asked to stop, as in ROS."""
+    ended, runs = world.clock.event(), []
+    first = simple(world, lambda goal: ended.wait())
+    first.start()
+    older = send(world, 1)
+    newer = send(world, 2)
+    if not waits:
+        first.action_server.keeper.on_cancel(newer, 0)
+        world.clock.sleep(0.5)
+    assert first.is_preempt_requested()
+    assert first.current_goal.get_goal_status().status == Status.ACTIVE
+    world.kill(first.action_server)
+
+    def run(goal):
+        runs.append(goal.goal)
+        second.set_succeeded()
+
+    second = simple(world, run)
+    second.start()
+    state, text, _ = world.end_of(older)
+    assert state == Status.ABORTED
+    assert "restarted" in text
+    assert world.end_of(newer)[0] == (Status.SUCCEEDED if waits else Status.RECALLED)
+    assert runs == ([2] if waits else [])
+    ended.set()  # the thread of the first life, which a kill would have ended
+
+
+def test_a_goal_whose_resource_another_one_took_is_not_begun_again(world):
+    ended = world.clock.event()
+    first = simple(world, lambda goal: ended.wait(), resource="base")
+    first.start()
+    goal_id = send(world)
+    other = SimpleActionServer(
+        "other",
+        Action,
+        lambda goal: other.set_succeeded(),
+        False,
+        node=world.robot,
+        resource=("base", "preempt"),
+    )
+    other.start()
+    handle = ActionClient("other", Action, node=world.mission).send_goal(Goal(1))
+    world.clock.sleep(0.5)
+    assert first.is_preempt_requested()
+    world.kill(first.action_server)
+    simple(world, lambda goal: pytest.fail("begun again")).start()
+    assert world.end_of(goal_id)[0] == Status.ABORTED
+    ended.set()  # the thread of the first life, which holds the resource
+    assert handle.wait(60)
+
+
+# Clients that die while no server runs
+
+
+def other_client(world, name="other"):
+    client = ActionClient("work", Action, node=world.node(name))
+    assert client.wait_for_server(5)
+    return client
+
+
+def statuses(server):
+    return {
+        handle.get_goal_id().id: handle.get_goal_status().status for handle in server.status_list
+    }
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_wish_of_a_goal_to_end_with_its_client_survives(world, when):
+    server = world.serve(lambda handle: handle.set_accepted())
+    client = other_client(world)
+    ends, stays = (
+        client.send_goal(Goal(1), cancel_on_client_lost=wanted).get_goal_id()
+        for wanted in (True, False)
+    )
+    world.clock.sleep(0.5)
+    world.kill(server)
+    if when == "before":
+        client.node.transport.close()
+    server = world.serve(
+        lambda handle: handle.set_accepted(),
+        lambda handle: handle.set_canceled(),
+        on_restart="resume",
+    )
+    world.clock.sleep(CLIENTS_S - 1.0)
+    assert statuses(server) == {ends: Status.ACTIVE, stays: Status.ACTIVE}
+    if when == "after":
+        world.clock.sleep(2.0)
+        assert statuses(server) == {ends: Status.ACTIVE, stays: Status.ACTIVE}
+        client.node.transport.close()
+    world.clock.sleep(2.0)
+    assert statuses(server) == {ends: Status.PREEMPTED, stays: Status.ACTIVE}
+    server.stop()
+
+
+def test_server_that_cancels_goals_of_lost_clients_looks_for_those_of_its_former_life(world):
+    options = {"on_restart": "resume", "on_client_lost": "cancel"}
+    server = world.serve(lambda handle: handle.set_accepted(), **options)
+    gone, there = other_client(world, "gone"), other_client(world, "there")
+    ends, stays = (client.send_goal(Goal(1)).get_goal_id() for client in (gone, there))
+    world.clock.sleep(0.5)
+    world.kill(server)
+    gone.node.transport.close()
+    world.clock.sleep(0.5)
+    server = world.serve(lambda handle: handle.set_accepted(), **options)
+    world.clock.sleep(CLIENTS_S + 1.0)
+    assert statuses(server) == {ends: Status.PREEMPTING, stays: Status.ACTIVE}
+    server.stop()
+
+
+def test_goal_of_a_lost_client_that_another_life_was_to_stop_is_not_begun_again(world):
+    """The server dies again between the request and the end."""
+    server = world.serve(lambda handle: handle.set_accepted())
+    client = other_client(world)
+    goal_id = client.send_goal(Goal(1), cancel_on_client_lost=True).get_goal_id()
+    world.clock.sleep(0.5)
+    world.kill(server)
+    client.node.transport.close()
+    server = world.serve(lambda handle: handle.set_accepted(), on_restart="resume")
+    world.clock.sleep(CLIENTS_S + 1.0)
+    world.kill(server)
+    world.serve(lambda handle: pytest.fail("begun again"), on_restart="resume")
+    assert world.end_of(goal_id)[0] == Status.ABORTED
+
+
+def test_server_that_stops_looks_for_no_clients(world):
+    server = world.serve(lambda handle: handle.set_accepted())
+    client = other_client(world)
+    client.send_goal(Goal(1), cancel_on_client_lost=True)
+    world.clock.sleep(0.5)
+    world.kill(server)
+    client.node.transport.close()
+    server = world.serve(
+        lambda handle: handle.set_accepted(),
+        lambda handle: pytest.fail("cancelled"),
+        on_restart="resume",
+    )
+    server.stop()
+    world.clock.sleep(CLIENTS_S + 1.0)
+
+
+def test_file_of_the_version_before_gets_the_new_columns(world):
+    server = world.serve(lambda handle: handle.set_accepted())
+    goal_id = send(world)
+    world.kill(server)
+    with contextlib.closing(sqlite3.connect(world.file)) as raw:
+        raw.execute("ALTER TABLE goals DROP COLUMN cancel_if_lost")
+        raw.execute("ALTER TABLE goals DROP COLUMN superseded")
+        raw.execute("PRAGMA user_version = 1")
+    world.kill(world.serve(lambda handle: handle.set_accepted(), on_restart="resume"))
+    world.serve(lambda handle: handle.set_accepted())
+    assert world.end_of(goal_id)[0] == Status.ABORTED
+
+
 def test_a_result_that_nobody_has_heard_is_told_later(world, tmp_path):
     """The client is gone as the goal ends, and the server before the client is back."""
     handles = []
@@ -214,21 +376,8 @@ def test_an_orderly_end_is_no_death(world):
 
 def test_a_simple_server_runs_its_goal_again(world):
     began = []
-
-    def serve(run):
-        return SimpleActionServer(
-            "work",
-            Action,
-            run,
-            False,
-            node=world.new_life(),
-            durable=world.file,
-            on_restart="resume",
-        )
-
-    first = serve(lambda goal: (began.append(first.is_resumed()), first.wait_preempt(1000)))
+    first = simple(world, lambda goal: (began.append(first.is_resumed()), first.wait_preempt(1000)))
     first.start()
-    world.client.wait_for_server(5)
     goal_id = send(world)
     world.kill(first.action_server)
 
@@ -237,7 +386,7 @@ def test_a_simple_server_runs_its_goal_again(world):
         second.publish_feedback(Feedback(1))
         second.set_succeeded(Result(goal.goal))
 
-    second = serve(run)
+    second = simple(world, run)
     second.start()
     assert world.end_of(goal_id)[0] == Status.SUCCEEDED
     assert began == [False, True]
@@ -403,7 +552,7 @@ def test_a_file_that_is_none_of_ours_is_left_as_it_is(world, tmp_path, content):
             raw.execute("CREATE TABLE songs (title TEXT)")
             if content == "future":
                 raw.execute(f"PRAGMA application_id = {0x736D6767}")
-                raw.execute("PRAGMA user_version = 2")
+                raw.execute("PRAGMA user_version = 3")
     before = file.is_file() and file.read_bytes()
     with pytest.raises(DurableGoalsError) as caught:
         ActionServer("work", Action, node=world.robot, durable=file)
