@@ -488,11 +488,13 @@ def _decode_array(data: dict[str, Any], place: str) -> Any:
     dtype: Any = np.lib.format.descr_to_dtype(_decode(data["dtype"], place))
     if dtype.hasobject:
         raise JournalValueError(place, "got an array of Python objects; expected numbers.")
-    if "$scalar" in data:
-        return np.frombuffer(_bytes(data["$scalar"]), dtype)[0]
-    shape = tuple(data["shape"])
+    is_scalar = "$scalar" in data
+    shape = () if is_scalar else tuple(data["shape"])
     if dtype.itemsize == 0 or 0 in shape:  # `frombuffer` refuses items of size 0
-        return np.zeros(shape, dtype)
+        found = np.zeros(shape, dtype)
+        return found[()] if is_scalar else found
+    if is_scalar:
+        return np.frombuffer(_bytes(data["$scalar"]), dtype)[0]
     # A copy, as an array over `bytes` cannot be written to.
     return np.frombuffer(_bytes(data["$array"]), dtype).reshape(shape).copy()
 

@@ -943,14 +943,17 @@ class SqlStore(ABC):
             if schedule is None or tuple(schedule) != (QUEUED, due):
                 return False
             now = self._now(cursor)
-            self._insert(cursor, row, now)
+            # The clock may have been put back, or the schedule forgotten and made again: then this
+            # due time has had its mission, and only the next one counts.
+            self._insert(cursor, row, now, " ON CONFLICT (id) DO NOTHING RETURNING id")
+            begun = cursor.fetchone() is not None
             self._wake(cursor)
             self._do(
                 cursor,
                 "UPDATE smachpy_missions SET due = ?, changed = ? WHERE id = ?",
                 *(next_due, now, row.schedule),
             )
-            return True
+            return begun
 
         return self._transact(work)
 

@@ -456,7 +456,8 @@ class Store(Protocol):
             next_due: The next one [s since the Unix epoch].
 
         Returns:
-            Whether this call did it; False if another runner did, or the schedule was cancelled.
+            Whether this call created it; False if another runner did, the schedule was cancelled,
+            or there is a mission of this id already: then only the due time moves.
         """
         ...
 
