@@ -52,7 +52,7 @@ def unpack_header(raw: bytes) -> Header:
     """Read a connection header without the length in front.
 
     Raises:
-        ValueError: a field is incomplete, is not UTF-8, or has no `=`.
+        ValueError: a field is incomplete or has no `=`.
     """
     fields: Header = {}
     at = 0
@@ -62,7 +62,8 @@ def unpack_header(raw: bytes) -> Header:
         field = raw[at : at + length]
         if len(field) < length:
             raise ValueError(f"header field: got {len(field)} bytes; expected {length}")
-        key, equals, value = field.decode().partition("=")  # a UnicodeDecodeError is a ValueError
+        # The comments of a message definition may be in Latin-1: no reason to refuse its sender.
+        key, equals, value = field.decode(errors="replace").partition("=")
         if not (key and equals):
             raise ValueError(f"header field: got {key[:80]!r}; expected key=value")
         fields[key] = value

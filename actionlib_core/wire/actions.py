@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from actionlib_core.exceptions import ActionlibError, ServerConflictError, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.interfaces._message import codecs_of
+from actionlib_core.interfaces._values import TEXT_CODEC
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.transport import Quality, Sample
 from actionlib_core.transport.tokens import Kind, parse_token, token_key, token_pattern
@@ -118,7 +119,7 @@ def pack_goal(
         server: The receiver's token.
         cancel_if_lost: The server is to cancel it when its client dies.
     """
-    frame, raw = server.encode(), goal_id.encode()
+    frame, raw = server.encode(*TEXT_CODEC), goal_id.encode(*TEXT_CODEC)
     header = _HEADER.pack(int(cancel_if_lost), sent_ns // _NS, sent_ns % _NS, len(frame))
     front = _ID.pack(goal_stamp_ns // _NS, goal_stamp_ns % _NS, len(raw))
     return b"".join((header, frame, front, raw, goal))
@@ -128,7 +129,7 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     """Read an XActionGoal: its goal id, its stamp [ns], the bytes of the XGoal.
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     try:
         at = 16 + int(_U32.unpack_from(payload, 12)[0])  # behind the header and its frame_id
@@ -138,7 +139,7 @@ def unpack_goal(payload: bytes) -> tuple[str, int, bytes]:
     at, end = at + 12, at + 12 + length
     if end > len(payload):
         raise _too_short("XActionGoal", payload)
-    return payload[at:end].decode(), secs * _NS + nsecs, payload[end:]
+    return payload[at:end].decode(*TEXT_CODEC), secs * _NS + nsecs, payload[end:]
 
 
 def unpack_age(payload: bytes, stamp_ns: int) -> float:
@@ -157,14 +158,14 @@ def unpack_cancel_if_lost(payload: bytes, own_key: str) -> bool:
     messages in `seq`, and some fill in a frame such as "map".
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     return payload[:4] == _SEQ_CANCEL_IF_LOST and unpack_frame(payload) == own_key
 
 
 def pack_goal_id(goal_id: str, stamp_ns: int) -> bytes:
     """Write an actionlib_msgs/GoalID."""
-    raw = goal_id.encode()
+    raw = goal_id.encode(*TEXT_CODEC)
     return _ID.pack(stamp_ns // _NS, stamp_ns % _NS, len(raw)) + raw
 
 
@@ -172,7 +173,7 @@ def unpack_goal_id(payload: bytes) -> tuple[str, int]:
     """Read an actionlib_msgs/GoalID: the id, its stamp [ns].
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     try:
         secs, nsecs, length = _ID.unpack_from(payload, 0)
@@ -180,13 +181,13 @@ def unpack_goal_id(payload: bytes) -> tuple[str, int]:
         raise _too_short("GoalID", payload) from error
     if len(payload) < 12 + length:
         raise _too_short("GoalID", payload)
-    return payload[12 : 12 + length].decode(), secs * _NS + nsecs
+    return payload[12 : 12 + length].decode(*TEXT_CODEC), secs * _NS + nsecs
 
 
 def pack_status(entry: StatusEntry) -> bytes:
     """Write an actionlib_msgs/GoalStatus."""
     goal_id, stamp_ns, status, text = entry
-    raw_id, raw = goal_id.encode(), text.encode()
+    raw_id, raw = goal_id.encode(*TEXT_CODEC), text.encode(*TEXT_CODEC)
     front = _ID.pack(stamp_ns // _NS, stamp_ns % _NS, len(raw_id))
     return b"".join((front, raw_id, _TAIL.pack(status, len(raw)), raw))
 
@@ -195,7 +196,7 @@ def unpack_status(payload: bytes) -> StatusEntry:
     """Read an actionlib_msgs/GoalStatus.
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     try:
         return _read_status(payload, 0)[0]
@@ -206,7 +207,7 @@ def unpack_status(payload: bytes) -> StatusEntry:
 def pack_report(sent_ns: int, entry: StatusEntry, body: bytes) -> bytes:
     """Write an XActionResult or XActionFeedback: header, status, result or feedback."""
     goal_id, stamp_ns, status, text = entry
-    raw_id, raw = goal_id.encode(), text.encode()
+    raw_id, raw = goal_id.encode(*TEXT_CODEC), text.encode(*TEXT_CODEC)
     sent, stamp = divmod(sent_ns, _NS), divmod(stamp_ns, _NS)
     front = _FRONT.pack(0, *sent, 0, *stamp, len(raw_id))
     return b"".join((front, raw_id, _TAIL.pack(status, len(raw)), raw, body))
@@ -216,7 +217,7 @@ def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
     """Read the front of an XActionResult or XActionFeedback: status, position of the rest.
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     try:
         return _read_status(payload, 16 + int(_U32.unpack_from(payload, 12)[0]))
@@ -226,7 +227,7 @@ def unpack_report(payload: bytes) -> tuple[StatusEntry, int]:
 
 def pack_statuses(sent_ns: int, entries: Iterable[StatusEntry], frame: str = "") -> bytes:
     """Write an actionlib_msgs/GoalStatusArray; `frame`: the token in a farewell or its answer."""
-    raw, parts = frame.encode(), list(map(pack_status, entries))
+    raw, parts = frame.encode(*TEXT_CODEC), list(map(pack_status, entries))
     header = _HEADER.pack(0, sent_ns // _NS, sent_ns % _NS, len(raw))
     return b"".join((header, raw, _U32.pack(len(parts)), *parts))
 
@@ -235,7 +236,7 @@ def unpack_statuses(payload: bytes) -> list[StatusEntry]:
     """Read an actionlib_msgs/GoalStatusArray.
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     entries = []
     try:
@@ -254,12 +255,12 @@ def unpack_frame(payload: bytes) -> str:
     """Read the frame_id of the header at the beginning of a message.
 
     Raises:
-        ValueError: the bytes end too early, or a text is not UTF-8.
+        ValueError: the bytes end too early.
     """
     length = int.from_bytes(payload[12:16], "little")
     if len(payload) < 16 + length:
         raise _too_short("Header", payload)
-    return payload[16 : 16 + length].decode()
+    return payload[16 : 16 + length].decode(*TEXT_CODEC)
 
 
 def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
@@ -267,11 +268,12 @@ def _read_status(payload: bytes, at: int) -> tuple[StatusEntry, int]:
     secs, nsecs, length = _ID.unpack_from(payload, at)
     at, end = at + 12, at + 12 + length
     status, length = _TAIL.unpack_from(payload, end)  # fails if the bytes end within the id
-    goal_id = payload[at:end].decode()
+    goal_id = payload[at:end].decode(*TEXT_CODEC)
     at, end = end + 5, end + 5 + length
     if end > len(payload):
         raise IndexError(end)
-    return StatusEntry(goal_id, secs * _NS + nsecs, status, payload[at:end].decode()), end
+    text = payload[at:end].decode(*TEXT_CODEC)
+    return StatusEntry(goal_id, secs * _NS + nsecs, status, text), end
 
 
 # -- the two ends ------------------------------------------------------------------------------

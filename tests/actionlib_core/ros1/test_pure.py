@@ -9,14 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actionlib_core import SimpleActionClient
 from actionlib_core.exceptions import Ros1Error
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import get_action, get_message
-from actionlib_core.interfaces.actionlib.msg import TestAction, TestActionGoal
-from actionlib_core.interfaces.actionlib_msgs.msg import GoalID
+from actionlib_core.interfaces.actionlib.msg import (
+    TestAction,
+    TestActionGoal,
+    TestActionResult,
+    TestGoal,
+    TestResult,
+)
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.ros1 import answers, frames
-from actionlib_core.ros1.actions import GOAL_ID, ServerHere, action_type
+from actionlib_core.ros1.actions import GOAL_ID, ServerHere, _ShownServer, action_type
 from actionlib_core.ros1.answers import Names, SystemState
 from actionlib_core.ros1.goals import Admission, GoalsOfClients, GoalsOfServer
 from actionlib_core.ros1.node import check_master
@@ -37,6 +44,13 @@ def test_a_header_reads_as_it_was_written(fields):
     raw = frames.pack_header(fields)
     assert frames.read_length(raw[:4], frames.LARGEST_HEADER) == len(raw) - 4
     assert frames.unpack_header(raw[4:]) == fields
+
+
+def test_a_header_with_a_comment_in_latin_1_is_read():
+    raw = frames.pack_frame("message_definition=float64 t  # °C".encode("latin-1"))
+    raw += frames.pack_frame(b"type=pkg/T")
+    definition = "float64 t  # \ufffdC"
+    assert frames.unpack_header(raw) == {"message_definition": definition, "type": "pkg/T"}
 
 
 @given(st.binary(max_size=200))
@@ -388,3 +402,44 @@ def test_all_is_all_but_the_log_and_the_topics_of_actions():
 def test_other_bridges_do_not_count():
     state = SystemState({"/scan": ["/smachpy_bridge_1_2"], "/odom": ["/base", "/smachpy_bridge_1"]})
     assert without(state, "/smachpy_bridge_") == SystemState({"/odom": ["/base"]})
+
+
+@pytest.mark.parametrize("text", ["Größe".encode("latin-1"), "Größe".encode()[:3]])
+def test_a_goal_whose_texts_are_not_utf_8_is_taken_once_and_ends_as_its_server_says(text):
+    def status(goal_id, number):
+        goal = GoalID(id=goal_id)
+        return GoalStatus(goal_id=goal, status=number, text=text.decode("utf-8", "surrogateescape"))
+
+    types = {"status": Typed(GoalStatusArray._type, GoalStatusArray._md5sum)}
+    for word in ("goal", "feedback", "result", "cancel"):
+        kind = GoalID if word == "cancel" else get_message(f"actionlib/TestAction{word.title()}")
+        types[word] = Typed(kind._type, kind._md5sum)
+    typed = Typed(TestAction._type, TestAction._md5sum)
+    sent = []
+    with TwoNodes() as world:
+        goals = Mock(put=lambda payload: sent.append(TestActionGoal.from_bytes(payload)))
+        server = _ShownServer(
+            Sides(world.robot, Mock(), ""),
+            "/do",
+            typed,
+            types,
+            "/old",
+            frozenset(),
+            (goals, Mock()),
+        )
+        client = SimpleActionClient("do", TestAction, node=world.mission)
+        assert client.wait_for_server()
+        client.send_goal(TestGoal(1))
+        world.clock.sleep(0.1)
+        goal_id = sent[0].goal_id.id
+        listed = GoalStatusArray(status_list=[status(goal_id, Status.ACTIVE), status("x", 1)])
+        for _ in range(30):
+            server.on_status(listed.to_bytes())
+            world.clock.sleep(0.2)
+        assert client.get_state() == Status.ACTIVE
+        result = TestActionResult(status=status(goal_id, Status.SUCCEEDED), result=TestResult(7))
+        server.on_result(result.to_bytes())
+        assert client.wait_for_result()
+        assert (client.get_state(), client.get_result()) == (Status.SUCCEEDED, TestResult(7))
+        assert client.get_goal_status_text().encode("utf-8", "surrogateescape") == text
+    assert len(sent) == 1
