@@ -8,6 +8,7 @@ computer does not change it. The other keys are needed to resume:
     Started, Entered   a visit begins; `in`: path of the container; `beside`: the other children
                        keep running; `number`: the index of the iterator's item; `ending`: it is
                        the clean-up, and the fields of the `Ending` after which it runs
+    CleanedUp          the clean-up at `path` after an exception is over, which is raised now
     Left               a visit has ended with `outcome`; `next`: path of the child that follows;
                        `stopped`: path of a machine in it, or of itself -> label of the child in
                        which it was asked to stop; `served`: it had serviced the request to stop,
@@ -100,6 +101,11 @@ class _Visit(TypedDict):
     ending: NotRequired[tuple[str | None, str, bool]]
 
 
+class _Raised(TypedDict):
+    visits: dict[str, _Visit]
+    markings: dict[str, list[str]]
+
+
 class _Condition(TypedDict):
     set: dict[str, bool]
     events: list[tuple[str, Stamp]]
@@ -119,6 +125,7 @@ class _Data(TypedDict):
     userdata: dict[str, dict[str, Any]]
     markings: NotRequired[dict[str, list[str]]]
     conditions: NotRequired[dict[str, _Condition]]
+    raised: NotRequired[dict[str, _Raised]]
     stopped: NotRequired[dict[str, str]]
     preempts: list[_Preempt]
     started_ns: Stamp
@@ -154,6 +161,9 @@ class Position:
                 stop) and again (it begins once more after that).
             markings: path of a running plan -> ids of the places that hold tokens
             conditions: as in entries
+            raised: path of a clean-up that runs after an exception -> visits and markings of the
+                states that were active; once it is over they are active again, so that a resumed
+                run goes on with the state that had raised
             stopped: path of a machine that was asked to stop and has ended -> label of the child in
                 which it was
             userdata: path of a container -> key -> encoded value
@@ -196,7 +206,7 @@ class Position:
             DataError: a fact is missing, or is of another type, with its place.
         """
         checked(_Data, self.data, known_only=True)
-        for path, visit in self.visits.items():
+        for path, visit in self._all_visits():
             container = visit.get("in")
             if not isinstance(container, str):
                 raise DataError(container, "a path", f".visits.{path}.in")
@@ -225,6 +235,19 @@ class Position:
         conditions: dict[str, dict[str, Any]] = self.data.setdefault("conditions", {})
         return conditions
 
+    @property
+    def _raised(self) -> dict[str, dict[str, dict[str, Any]]]:
+        raised: dict[str, dict[str, dict[str, Any]]] = self.data.get("raised", {})
+        return raised
+
+    def _all_visits(self) -> list[tuple[str, dict[str, Any]]]:
+        """Return path and visit of all states, also of those that have raised."""
+        return [
+            each
+            for visits in (self.visits, *(kept["visits"] for kept in self._raised.values()))
+            for each in visits.items()
+        ]
+
     def to_bytes(self) -> bytes:
         """Return the position as a snapshot."""
         return json.dumps({**self.data, "version": VERSION}, separators=(",", ":")).encode()
@@ -232,7 +255,7 @@ class Position:
     def digests(self) -> set[str]:
         """Return the digests of the large values that it names."""
         values = [value for container in self.userdata.values() for value in container.values()]
-        for visit in self.visits.values():
+        for _, visit in self._all_visits():
             values += visit["once"].values()
             values.append((visit["goal"] or {}).get("result"))
         found = (value.get("$blob") for value in values if isinstance(value, dict))
@@ -275,17 +298,18 @@ class Position:
                     return names[old] + path[len(old) :]
             return path
 
-        visits = {
-            new(path): {**visit, "in": new(visit["in"])} for path, visit in self.visits.items()
-        }
-        # The target of an operator's jump is a label, not a path: look it up beside the child.
-        for path, visit in self.visits.items():
-            override = (visit.get("asked") or {}).get("override") or (None, None)
-            outcome, label, *more = override
-            if label is not None:
-                label = new(f"{visit['in']}/{label}").rpartition("/")[2]
-                asked = {**visit["asked"], "override": [outcome, label, *more]}
-                visits[new(path)]["asked"] = asked
+        def moved_visits(known: Mapping[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+            visits = {new(path): {**visit, "in": new(visit["in"])} for path, visit in known.items()}
+            # The target of an operator's jump is a label, not a path: look it up beside the child.
+            for path, visit in known.items():
+                override = (visit.get("asked") or {}).get("override") or (None, None)
+                outcome, label, *more = override
+                if label is not None:
+                    label = new(f"{visit['in']}/{label}").rpartition("/")[2]
+                    asked = {**visit["asked"], "override": [outcome, label, *more]}
+                    visits[new(path)]["asked"] = asked
+            return visits
+
         preempts = [{**one, "path": new(one["path"])} for one in self.data["preempts"]]
         moved = {
             facts: {new(path): values for path, values in getattr(self, facts).items()}
@@ -295,6 +319,15 @@ class Position:
             new(path): new(f"{path}/{label}").rpartition("/")[2]
             for path, label in self.data.get("stopped", {}).items()
         }
+        if self._raised:
+            moved["raised"] = {
+                new(path): {
+                    "visits": moved_visits(kept["visits"]),
+                    "markings": {new(at): ids for at, ids in kept["markings"].items()},
+                }
+                for path, kept in self._raised.items()
+            }
+        visits = moved_visits(self.visits)
         return Position({**self.data, "visits": visits, "preempts": preempts, **moved})
 
     # -- one function for each kind ------------------------------------------------------------
@@ -308,6 +341,34 @@ class Position:
             self.markings.pop(each, None)
             left += self._below.pop(each, ())
         self.markings.pop(path, None)
+        for each in [each for each in self._raised if each.startswith(f"{path}/")]:
+            del self._raised[each]
+
+    def _keep_raised(self, cleanup: str, container: str) -> None:
+        """Keep what is active in a container whose clean-up begins, for the time after that."""
+        known = self._raised.get(cleanup)  # kept when it began; it begins again after a pause
+        inside = f"{container}/"
+        kept = known or {
+            "visits": {path: one for path, one in self.visits.items() if path.startswith(inside)},
+            "markings": {
+                path: places
+                for path, places in self.markings.items()
+                if path == container or path.startswith(inside)
+            },
+        }
+        self._end_below(container)
+        self.data.setdefault("raised", {})[cleanup] = kept
+
+    def _on_cleaned_up(self, entry: Mapping[str, Any]) -> None:
+        path = entry["path"]
+        kept = self._raised.pop(path, {"visits": {}, "markings": {}})
+        self._end_below(path)
+        if path in self.visits:
+            self._drop(path)
+        self.visits.update(kept["visits"])
+        self.markings.update(kept["markings"])
+        for each in (*kept["visits"], *kept["markings"]):
+            self._link(each)
 
     def _link(self, path: str) -> None:
         """Note a path below those above it."""
@@ -356,7 +417,10 @@ class Position:
             # request: this entry then only has changes.
             if known is None or known["outcome"] is not None:
                 self._serve(container)
-            self._end_below(container)
+            if "ending" in entry and entry["ending"][0] is None:
+                self._keep_raised(path, container)
+            else:
+                self._end_below(container)
         self._end_below(path)
         self._begin(path, container, entry["stamp_ns"], entry.get("number"))
         if "ending" in entry:
@@ -504,7 +568,7 @@ class Position:
         # The clock may have been put back during the outage: stamps never exceed its time.
         last_ns = self.data["last_ns"] = min(self.data["last_ns"], stamp_ns)
         self.data["outages"].append([max(last_ns, stamp_ns - gone_ns), stamp_ns])
-        for visit in self.visits.values():
+        for _, visit in self._all_visits():
             self._go_on(visit, stamp_ns - gone_ns)  # the operator's pause has ended with its run
             visit["begun_ns"] = visit.get("begun_ns", visit["since_ns"]) + entry["shift_ns"]
             visit["since_ns"] += entry["shift_ns"]
@@ -524,12 +588,14 @@ class Position:
     def _on_finished(self, entry: Mapping[str, Any]) -> None:
         self.visits.clear()
         self.markings.clear()
+        self._raised.clear()
         self._below.clear()
         self.data.update(finished=True, outcome=entry["outcome"])
 
     _FOLD: ClassVar[dict[str, Callable[[Position, Mapping[str, Any]], None]]] = {
         "Started": _on_started,
         "Entered": _on_entered,
+        "CleanedUp": _on_cleaned_up,
         "Left": _on_left,
         "Retried": _on_retried,
         "GoalSent": _on_goal_sent,

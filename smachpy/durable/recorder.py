@@ -694,6 +694,11 @@ class Recorder(RunJournal):
                 return found
         return None
 
+    def cleaned_up(self, frame: Frame, step: Step) -> None:
+        path = step.path_in(frame)
+        if path in self._journal.position.visits and not frame.dead:
+            self._write("CleanedUp", path)
+
     def item(self, frame: Frame, number: int) -> int:
         children = self._children(frame.path) if self._unresumed else []
         self._numbers[frame.path] = number

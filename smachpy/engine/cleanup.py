@@ -136,6 +136,7 @@ def run_with_cleanup(frame: Frame, step: Step, run_others: Callable[[], str]) ->
         ending = Ending(None if failure else outcome, error_of, preempted=asked)
     _clean_up(frame, step, ending)
     if failure is not None:
+        journal.cleaned_up(frame, step)
         raise failure
     return outcome
 

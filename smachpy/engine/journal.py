@@ -148,6 +148,12 @@ class RunJournal:
     def ending(self, frame: Frame) -> Sequence[Any] | None:
         """Return the fields of the `Ending` for which the clean-up of `frame` began, or None."""
 
+    def cleaned_up(self, frame: Frame, step: Any) -> None:
+        """Write that the clean-up `step` is over, and the exception before it is raised now.
+
+        A resumed run goes on with the state that has raised it, which may be repaired by then.
+        """
+
     def item(self, frame: Frame, number: int) -> int:  # noqa: ARG002
         """Compare an item of the iterator of `frame` with the position before the resume.
 

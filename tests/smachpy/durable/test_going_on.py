@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -11,17 +12,27 @@ import pytest
 import smachpy
 from actionlib_core.clock import VirtualClock, current_clock, use_clock
 from actionlib_core.node import use_node
-from smachpy import Concurrence, InvalidStateError, NotDurableError, State, StateMachine, events
+from smachpy import (
+    Concurrence,
+    Container,
+    InvalidStateError,
+    NotDurableError,
+    State,
+    StateMachine,
+    events,
+)
 from smachpy.durable import recorder
 from smachpy.durable.journal import read_position
 from smachpy.durable.mission import MachineChangedError, OutageError
-from smachpy.durable.position import VERSION
+from smachpy.durable.position import VERSION, Position
 from smachpy.durable.store import FencedError, StoreError
 from smachpy.engine.interrupt import Interruption
 from smachpy.engine.preempt import asking
 from smachpy.exceptions import MissionError
+from smachpy.pnp import PetriNetPlan
 from smachpy.states.questions import AnswerRefusedError, find_questions, give_answer
 from tests.smachpy.durable.killing_store import Kill, KillingStore
+from tests.smachpy.pnp.nets import net_of
 from tests.two_nodes import TwoNodes
 
 if TYPE_CHECKING:
@@ -115,6 +126,126 @@ def test_on_resume_is_called_with_the_own_userdata_of_a_container(store: Killing
     kill(store, build(killed))
     assert go_on(store, build(fine)) == "ok"
     assert seen == [7, 7]  # of the root, and of the state that was active
+
+
+# -- states that raise, with a clean-up --------------------------------------------------------
+
+
+def in_machine(work: State, tidy: State) -> Container:
+    machine = machine_of(Doing(fine), work)
+    machine.add_cleanup("TIDY", tidy)
+    return machine
+
+
+def in_machine_below(work: State, tidy: State) -> Container:
+    """Both machines have a clean-up."""
+    machine = machine_of(in_machine(work, tidy))
+    machine.add_cleanup("TIDY", Doing(fine))
+    return machine
+
+
+def in_concurrence(work: State, tidy: State) -> Container:
+    cc = Concurrence(
+        ["ok", "skipped", "late"], "late", input_keys=["value"], output_keys=["value"],
+        outcome_map={"ok": {"WORK": "ok", "OTHER": "ok"}}, name="M",
+    )  # fmt: skip
+    cc.userdata.value = 0
+    with cc:
+        cc.add("WORK", work)
+        cc.add("OTHER", Doing(fine))
+    cc.add_cleanup("TIDY", tidy)
+    return cc
+
+
+def in_iterator(work: State, tidy: State) -> Container:
+    outcomes, keys = ["ok", "skipped", "late"], ["value"]
+    it = smachpy.Iterator(outcomes, keys, keys, range(3), "item", "ok", name="M")
+    it.userdata.value = 0
+    it.set_contained_state("WORK", work, loop_outcomes=["ok"])
+    it.add_cleanup("TIDY", tidy)
+    return it
+
+
+def in_plan(work: State, tidy: State) -> Container:
+    net = net_of("init* -> WORK.exec : WORK.start\nWORK.exec -> goal : WORK.end")
+    plan = PetriNetPlan(net, {"WORK": work}, name="M")
+    plan.userdata.value = 0
+    plan.add_cleanup("TIDY", tidy)
+    return plan
+
+
+@pytest.mark.parametrize(
+    "make", [in_machine, in_machine_below, in_concurrence, in_iterator, in_plan]
+)
+@pytest.mark.parametrize("tidies", [True, False], ids=["", "clean-up raises"])
+def test_one_that_raised_goes_on_once_it_is_repaired_although_a_clean_up_ran(
+    store: KillingStore, make: Callable[[State, State], Container], tidies: bool
+) -> None:
+    done: list[object] = []
+
+    def work(*_: object) -> str:
+        done.append(smachpy.once("first", lambda: done.append("once") or len(done)))
+        if done.count("tidied") < 2:
+            raise OSError("broken")
+        done.append("worked")
+        return "ok"
+
+    def tidy(*_: object) -> str:
+        done.append("tidied")
+        if not tidies:
+            raise OSError("no dock")
+        return "ok"
+
+    for _ in range(2):
+        with pytest.raises(smachpy.InvalidUserCodeError, match="broken"):
+            go_on(store, make(Doing(work), Doing(tidy)))
+        assert store.rows["m"].status == "interrupted"
+    assert go_on(store, make(Doing(work), Doing(tidy))) == ("goal" if make is in_plan else "ok")
+    items = 3 if make is in_iterator else 1
+    assert done.count("worked") == items
+    assert done[:6] == ["once", 1, "tidied", 1, "tidied", 1]
+    assert done.count("tidied") == 3
+    assert done.count("once") == items
+
+
+def test_one_that_raised_is_not_executed_before_the_clean_up_has_ended(
+    store: KillingStore,
+) -> None:
+    done: list[str] = []
+
+    def work(*_: object) -> str:
+        done.append("work")
+        if len(done) == 1:
+            raise OSError("broken")
+        return "ok"
+
+    kill(store, in_machine(Doing(work), Doing(killed)))
+    (leaf,) = read_position(store, "m").leaves()
+    assert leaf == "/M/TIDY"
+    with pytest.raises(smachpy.InvalidUserCodeError, match="broken"):
+        go_on(store, in_machine(Doing(work), Doing(fine)))
+    assert done == ["work"]
+    assert read_position(store, "m").leaves() == ["/M/S1"]
+    assert go_on(store, in_machine(Doing(work), Doing(fine))) == "ok"
+    assert done == ["work"] * 2
+
+
+def test_position_of_one_that_raised_survives_a_snapshot_and_another_name(
+    store: KillingStore,
+) -> None:
+    def work(*_: object) -> str:
+        smachpy.once("scan", lambda: "x" * 100_000)
+        raise OSError("broken")
+
+    kill(store, in_machine(Doing(work), Doing(killed)))
+    position = read_position(store, "m")
+    (digest,) = position.digests()
+    assert digest in store.blobs
+    again = Position(json.loads(position.to_bytes())).renamed({"/M/S1": "/M/NEW"})
+    again.check()
+    assert again.digests() == {digest}
+    again.fold({"kind": "CleanedUp", "path": "/M/TIDY", "stamp_ns": 1})
+    assert again.leaves() == ["/M/NEW"]
 
 
 def test_a_hook_that_raises_names_the_state(store: KillingStore) -> None:
