@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import inspect
+import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -525,6 +526,16 @@ def _call_hook(frame: Frame, state: Any, hook: Callable[..., object], *arguments
         raise raised(frame.here(), f"hook {name_of(hook)}", error) from error
 
 
+def time_left_around() -> float:
+    """Return the time until a timeout of a container passes that has this state in it [s]."""
+    frame, left = current_frame(), math.inf
+    while frame is not None:
+        if frame.timeout is not None:
+            left = min(left, frame.timeout.left_s())
+        frame = frame.parent
+    return left
+
+
 class Timeout:
     """The `timeout` of the child that `frame` runs: asks it to stop after `seconds`.
 
@@ -584,6 +595,12 @@ class Timeout:
             if self._halts == 0 and self._timer is not None and not (self._passed or self._ended):
                 self._frame.run.journal.went_on(self._frame.here())
                 self.start(self._left)
+
+    def left_s(self) -> float:
+        """Return the time until it passes [s]; infinite once it has, or while it is halted."""
+        if self._passed or self._halts or self._ended:
+            return math.inf
+        return self._due - self._frame.run.clock.now()
 
     def is_alone(self) -> bool:
         """Return whether the timeout has passed and nobody else has asked the child to stop."""

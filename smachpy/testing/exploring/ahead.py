@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     from typing import Self, TypeAlias
 
     from smachpy.base.cluster import Cluster
+    from smachpy.testing.exploring.explorer import Orders
     from smachpy.testing.exploring.search import ScheduleChoice, Search
     from smachpy.testing.runs import Run
 
     Prefix: TypeAlias = tuple[int, ...]
     Known: TypeAlias = list[tuple[Prefix, list[ScheduleChoice]]]
-    Found: TypeAlias = tuple[list[ScheduleChoice], Run | None]
+    Found: TypeAlias = tuple[list[ScheduleChoice], Run | None, Orders]
 
 TOGETHER: Final = 16
 """Runs that a process does without asking for more."""

@@ -10,7 +10,7 @@ import logging
 import math
 import pickle
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,14 @@ from smachpy.machines.container import Container, below
 from smachpy.testing import session
 from smachpy.testing.doubles import Double, Places
 from smachpy.testing.exploring.ahead import Ahead
-from smachpy.testing.exploring.explorer import DEFAULTS, FAULTS, Explorer, RunOptions, begins
+from smachpy.testing.exploring.explorer import (
+    DEFAULTS,
+    FAULTS,
+    Explorer,
+    Orders,
+    RunOptions,
+    begins,
+)
 from smachpy.testing.exploring.search import Search
 from smachpy.testing.exploring.verdicts import judge
 from smachpy.testing.kit import MissionKit, check_machine
@@ -92,11 +99,13 @@ class Exploration:
         ok: Whether every run kept all invariants.
         runs: Number of runs, without those for shortening.
         exhaustive: Whether there are no more runs: every choice was tried in every situation.
-        stopped_by: Why not: "max_runs", "max_time", "max_depth" or "counterexample".
+        stopped_by: Why not: "max_runs", "max_time", "max_depth", "timeout" or "counterexample".
         counterexample: A shortest run that breaks an invariant.
         seconds: How long it took.
         not_raised: Exceptions in `on_exception` or `retry` that no run raised, because they
             cannot be made from a text alone.
+        no_time_for: What no run tried, because a `timeout` of the machine leaves no time for it,
+            such as "/M/A to outlast /M/B".
     """
 
     ok: bool
@@ -106,6 +115,7 @@ class Exploration:
     counterexample: Counterexample | None
     seconds: float
     not_raised: tuple[str, ...] = ()
+    no_time_for: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return self.ok
@@ -127,6 +137,10 @@ class Exploration:
         extent = "all there are" if self.exhaustive else f"stopped by {self.stopped_by}"
         names = ", ".join(self.not_raised)
         left_out = f" (not raised, as they want arguments: {names})" if names else ""
+        if self.no_time_for:
+            first, *more = self.no_time_for
+            rest = f" (and {len(more)} more)" if more else ""
+            extent = f"not all there are: a timeout leaves no time for {first}{rest}"
         head = f"{self.runs} runs in {self.seconds:.1f} s, {extent}"
         if self.counterexample is None:
             return f"{head}: no counterexample{left_out}"
@@ -150,13 +164,14 @@ def explore(
 ) -> Exploration:
     """Run a mission with every combination of leaf outcomes, preempts, faults and interleavings.
 
-    Each leaf is replaced by a double that takes one second and ends with each of its outcomes in
-    turn. If several run at once, each may be the next to end; it outlasts the others then. Other
-    durations are not varied: those of kept states, of pauses before retries, of scripted servers.
-    Runs with few unusual choices come first. Without invariants of your own, each situation
-    (active states, outcomes, items, userdata, threads that can continue) is entered once, which
-    makes machines with loops finite; state that leaves keep elsewhere is not seen. Your own
-    invariant may look at the whole past, so then every sequence of choices is a case of its own.
+    Each leaf is replaced by a double that takes one second, less within a timeout of a few seconds,
+    and ends with each of its outcomes in turn. If several run at once, each may be the next to end;
+    it outlasts the others then. Other durations are not varied: those of kept states, of pauses
+    before retries, of scripted servers. Runs with few unusual choices come first. Without
+    invariants of your own, each situation (active states, outcomes, items, userdata, threads that
+    can continue) is entered once, which makes machines with loops finite; state that leaves keep
+    elsewhere is not seen. Your own invariant may look at the whole past, so then every sequence of
+    choices is a case of its own.
 
     These invariants are always checked: the mission ends; it does not raise; after a preempt it
     ends within `grace`; no goal is left running.
@@ -211,8 +226,10 @@ def explore(
 
         tries = _Tries(runner, ahead, search, budget, verdict_on, on_run, progress)
         example, stopped_by = tries.all(max_time)
+    no_time_for = tries.no_time_for()
     stopped_by = "counterexample" if example is not None else stopped_by
     stopped_by = stopped_by or ("max_depth" if search.is_cut else "")
+    stopped_by = stopped_by or ("timeout" if no_time_for else "")
     if example is not None and folder is not None:
         file = folder() / f"{example.run.record.label}-counterexample.svg"
         example = replace(example, picture=example.run.draw(file))
@@ -229,6 +246,7 @@ def explore(
         example,
         budget.seconds,
         left_out,
+        no_time_for if stopped_by == "timeout" else (),
     )
 
 
@@ -243,6 +261,12 @@ class _Tries:
     verdict_on: Callable[[Run, Exception | None], Verdict | None]
     on_run: Callable[[Run], object] | None
     progress: Callable[[int], object] | None
+    orders: Orders = field(default_factory=Orders)
+
+    def no_time_for(self) -> tuple[str, ...]:
+        """Return what a timeout has cut off in some runs, and no run had the time for."""
+        left = sorted(self.orders.cut - self.orders.ended)
+        return tuple(f"{a} to end" if a == b else f"{a} to outlast {b}" for a, b in left)
 
     def all(self, max_time: float) -> tuple[Counterexample | None, str]:
         """Try what the search asks for; return the counterexample, and why not all was tried."""
@@ -260,6 +284,7 @@ class _Tries:
             if verdict is not None:
                 return _shrunk(self.runner, self.verdict_on, max_time, verdict, run), ""
             choices = self.runner.explorer.choices
+            self.orders.add(self.runner.explorer.orders)
             self.ahead.note(prefix, choices)
             self.search.add(prefix, choices)
             example, stopped_by = _killed_anywhere(self.runner, self.verdict_on, self.budget)
@@ -274,8 +299,9 @@ class _Tries:
         found = self.ahead.found(prefix, self.search)
         if found is None:
             return False
-        choices, run = found
+        choices, run, orders = found
         self._tell(run)
+        self.orders.add(orders)
         self.search.add(prefix, choices)
         return True
 
@@ -575,7 +601,8 @@ def runs_of(
                 return None
             explorer = runner.explorer
             is_ok = judge(run, error, explorer, grace=grace, invariants=invariants) is None
-            return (explorer.choices, run if wants_runs else None) if is_ok else None
+            told = run if wants_runs else None
+            return (explorer.choices, told, explorer.orders) if is_ok else None
 
         if job not in _compared:
             mine = [found(prefix) for prefix, _ in known]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import partial
+from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from actionlib_core.interfaces import get_action
+from smachpy.engine.described import walk
 from smachpy.engine.preempt import asking
+from smachpy.engine.step import time_left_around
 from smachpy.events import Entered, Failed, Finished, Iterated, Left, Retried
 from smachpy.events.introspection import describe
 from smachpy.machines.container import Container
@@ -33,8 +36,12 @@ if TYPE_CHECKING:
 
 PREEMPTED = "preempted"
 FAULTS = frozenset({"hang", "raise", "deaf", "kill"})
-STEP_S = 1.0  # [s] duration of a double or server, unless it outlasts others
-APART_S = 0.001  # [s] added per leaf if there are kills, so that no two end at the same moment
+STEP_S = 1.0  # [s] duration of a server, and the longest of a double, unless it outlasts others
+WITHIN_STEP_S = 0.97  # [s] its longest where a timeout is near, so that both end at two moments
+STEPS_WITHIN = 10.3  # so many doubles have time, one after the other, within each timeout
+SHORTEST_S = 0.001  # [s] doubles do not become faster for a shorter timeout
+APART = 0.001  # part added per leaf if there are kills, so that no two end at the same moment
+AFTER = 1e-4  # part of a double's duration after which one that outlasts it looks around
 WITHIN = 0.9  # a leaf outlasts others for this part of its remaining timeout
 _OUTSIDE = frozenset({"monitor", "condition", "service"})
 
@@ -158,12 +165,34 @@ class _Execution:
         until: When its current time ends or ended [s].
         picked: The last choice.
         picks: The number of choices so far.
+        turn: Its place among those that outlast others: the first ends first; 0: it does not.
     """
 
     begun: float
     until: float
     picked: str = OUTLASTS
     picks: int = 0
+    turn: int = 0
+
+
+@dataclass(slots=True)
+class Orders:
+    """What timeouts left time for, as pairs of leaves: the first outlasts the second.
+
+    A leaf and itself: it ends by itself.
+
+    Attributes:
+        cut: There was no time for that.
+        ended: There was.
+    """
+
+    cut: set[tuple[str, str]] = field(default_factory=set)
+    ended: set[tuple[str, str]] = field(default_factory=set)
+
+    def add(self, others: Orders) -> None:
+        """Add those of another run."""
+        self.cut |= others.cut
+        self.ended |= others.ended
 
 
 class Explorer:
@@ -183,6 +212,7 @@ class Explorer:
         mismatch: Why it could not follow the given choices.
         not_raised: Names of the exceptions that should be raised but cannot be made.
         root_path: Path of the machine.
+        orders: Which leaves a timeout left no time in the run.
     """
 
     def __init__(
@@ -215,13 +245,20 @@ class Explorer:
         self.doubles: set[str] = set()
         self._led: dict[str, _Led] = {}
         self._bounded: set[str] = set()
+        steps_s, self._timed, self._brief = _tempo(root, states, options["max_steps"])
         # After a kill, leaves that end at the same moment may end in another order: avoid ties.
-        tie_s = APART_S if "kill" in options["faults"] else 0.0
-        self._step_s = {path: STEP_S + n * tie_s for n, path in enumerate(sorted(self._leaves), 1)}
+        tie = APART if "kill" in options["faults"] else 0.0
+        self._step_s = {
+            path: steps_s[path] * (1 + n * tie) for n, path in enumerate(sorted(self._leaves), 1)
+        }
+        self._after_s = min(self._step_s.values(), default=STEP_S) * AFTER
+        # Ages are told apart by this, but not by the moments in which others look around.
+        self._grain_s = 1e-6 if tie else self._after_s * 100
         self._kept = _kept_by(record, options["keep"])
         self._replace_leaves(places, root, record.path, self._kept)
         self.choices: list[ScheduleChoice] = []
         self.picks: dict[Hashable, str] = {}
+        self.orders = Orders()
 
     @property
     def turns(self) -> list[ScheduleChoice]:
@@ -253,6 +290,9 @@ class Explorer:
         self._given = picks
         self._begins = begins
         self._executions: dict[tuple[str, int], _Execution] = {}
+        self._running: dict[str, _Execution] = {}
+        self._turns = 0
+        self.orders = Orders()
         self._replies: dict[str, int] = {}
         self.picks = {}
         self.choices = []
@@ -417,7 +457,7 @@ class Explorer:
             return -1.0
         if age > self._step_s.get(path, STEP_S) and path in self.doubles - self._bounded:
             return math.inf  # it outlasts others, however long that takes
-        return round(age, 6)
+        return float(round(age / self._grain_s))
 
     def _preempt(self) -> None:
         with asking("test"):
@@ -523,6 +563,12 @@ class Explorer:
         return double
 
     def _execute(self, double: Double, path: str, ud: Any) -> str:
+        try:
+            return self._end_of(double, path, ud)
+        finally:
+            self._running.pop(path, None)
+
+    def _end_of(self, double: Double, path: str, ud: Any) -> str:
         outcomes = double.get_registered_outcomes()
         begun = self._clock.now()
         number = 0 if self._begins is None else self._begins(path)
@@ -540,13 +586,14 @@ class Explorer:
             self._visits[path] = self._visits.get(path, -1) + 1
             execution = _Execution(begun, begun + seconds)
             self._executions[path, number] = execution
+        self._running[path] = execution
         led = self._led.get(path, _Led({}, waits=False))
         while execution.picked == OUTLASTS or execution.picked in led.events:
-            outlasts = execution.picks > 0 and execution.picked == OUTLASTS
-            if self._sleep(double, seconds, outlasts=outlasts) and PREEMPTED in outcomes:
+            if self._sleep(double, path, execution, seconds) and PREEMPTED in outcomes:
                 double.service_preempt()
                 return PREEMPTED
-            seconds = self._longer_s(double, path, execution.begun)
+            execution.turn = 0
+            seconds = self._longer_s(double, path, execution)
             pick = (path, number, execution.picks)
             may_outlast = seconds > 0 and not led.waits
             picked = self._pick(double, path, outcomes, pick, led, may_outlast=may_outlast)
@@ -557,7 +604,10 @@ class Explorer:
             execution.until = self._clock.now() + seconds
             if picked == OUTLASTS:
                 self._outlasting.add(path)
+                self._turns += 1
+                execution.turn = self._turns
         picked = execution.picked
+        self._note_end(double, path, execution)
         for key, value in self._writes.get(path, {}).items():
             ud[key] = value
         return self._act(double, path, picked, outcomes)
@@ -568,18 +618,59 @@ class Explorer:
         if later is not None:
             self._requests.append(self._clock.call_later(STEP_S, later))
 
-    def _sleep(self, double: Double, seconds: float, *, outlasts: bool) -> bool:
+    def _sleep(self, double: Double, path: str, execution: _Execution, seconds: float) -> bool:
         """Wait for a double's duration; return whether a preempt ended it."""
-        if not outlasts:
-            return double.sleep(seconds)
-        if self._clock.limit is not None:
-            self._clock.limit += seconds  # time for outlasting does not count as an endless run
-        begin = self._clock.now()
+        if execution.turn:
+            return self._outlast(double, path, execution)
+        left = self._left_s(double, execution)
         asked = double.sleep(seconds)
-        self._outlasted.append((begin, self._clock.now()))
+        if left <= seconds and asked and self._clock.now() >= execution.until - seconds + left:
+            self.orders.cut.add((path, path))
         return asked
 
-    def _longer_s(self, double: Double, path: str, begun: float) -> float:
+    def _outlast(self, double: Double, path: str, execution: _Execution) -> bool:
+        """Wait until the others have ended, or outlast this one; return whether a preempt ended it.
+
+        Where no timeout is near, that is so after a long time. Otherwise the time must not run out
+        meanwhile, so it looks around as soon as each of them ends.
+        """
+        end, asked = execution.until, False
+        while not asked and end - (now := self._clock.now()) > self._after_s / 100:
+            until, ends = end, {}
+            if path in self._brief:
+                ends = self._ends_before(path, execution, now)
+                until = max(ends.values(), default=now)
+            if until <= now:
+                break
+            if until > end:
+                self._note_late(path, {each for each in ends if ends[each] > end})
+            execution.until = min(until, end)
+            if self._clock.limit is not None:  # outlasting does not count as an endless run
+                self._clock.limit += execution.until - now
+            asked = double.sleep(execution.until - now)
+            self._outlasted.append((now, self._clock.now()))
+        return asked
+
+    def _ends_before(self, path: str, execution: _Execution, now: float) -> dict[str, float]:
+        """Return what goes on before it is the turn of a leaf that outlasts others, and how long.
+
+        Whatever is not known (a kept leaf, a pause before a retry) takes one more step.
+        """
+        unknown = now + self._step_s[path]
+        ends = {}
+        for other in self._active.keys() & self._leaves - self._hanging - {path}:
+            each = self._running.get(other)
+            if each is None or each.until < now:
+                ends[other] = unknown
+            elif each.turn < execution.turn:
+                ends[other] = each.until + self._after_s
+        for other in self._active.keys() - self._leaves:
+            inside = other + "/"
+            if not any(each.startswith(inside) for each in self._active):
+                ends[other] = unknown
+        return ends
+
+    def _longer_s(self, double: Double, path: str, execution: _Execution) -> float:
         """Return how much longer a double would run to outlast the others [s]; 0: it ends now.
 
         So each of the leaves that run at once may be the next to end. The last one always ends; the
@@ -593,11 +684,38 @@ class Explorer:
             or double.preempt_requested()
         ):
             return 0.0
-        timeout = get_options(double).timeout
-        if timeout is None:
+        left = self._left_s(double, execution)
+        if math.isinf(left):
             return self._long_s
-        left = (timeout - (self._clock.now() - begun)) * WITHIN
-        return 0.0 if left <= STEP_S else min(left, self._long_s)
+        now = self._clock.now()
+        seconds = min(left * WITHIN, self._long_s)
+        late = {
+            each
+            for each in others & self._running.keys()
+            if not self._running[each].turn
+            and self._running[each].until + self._after_s > now + seconds
+        }
+        self._note_late(path, late)
+        return 0.0 if others == late else seconds
+
+    def _left_s(self, double: Double, execution: _Execution) -> float:
+        """Return how long a double has until a timeout of its own or around it passes [s]."""
+        timeout = get_options(double).timeout
+        own = math.inf if timeout is None else execution.begun + timeout - self._clock.now()
+        return min(own if own > 0 else math.inf, time_left_around())
+
+    def _note_late(self, path: str, others: Iterable[str]) -> None:
+        """Note leaves that a timeout leaves a double no time to outlast."""
+        for each in others:
+            if each in self._running and self._running[each].picked != HANGS:
+                self.orders.cut.add((path, each))
+
+    def _note_end(self, double: Double, path: str, execution: _Execution) -> None:
+        """Note the last choice of a double, and beside which others it ends."""
+        if execution.picked != HANGS and not double.preempt_requested():
+            self.orders.ended.update((each, path) for each in self._active.keys() & self._leaves)
+        elif execution.picked == HANGS and get_options(double).timeout is not None:
+            execution.until = self._clock.now() + self._left_s(double, execution)
 
     def _pick(
         self,
@@ -627,13 +745,21 @@ class Explorer:
         if led.waits:
             faults = ()
         elif (
-            get_options(double).timeout is not None or "hang" in faults or self._waits(double, path)
+            get_options(double).timeout is not None
+            or self._may_time_out(path)
+            or "hang" in faults
+            or self._waits(double, path)
         ):
             options.append(HANGS)
         options += [RAISES, *self._raised.get(path, ())] if "raise" in faults else []
         options += [DEAF] if "deaf" in faults and self._preempts else []
         situation = self._situation((path, *sorted(options)))
         return options[self.choose(path, options, situation, key)]
+
+    def _may_time_out(self, path: str) -> bool:
+        """Return whether the timeout of a container ends a leaf that hangs; not after a preempt."""
+        is_asked = self._preempts < self._options["preempts"]
+        return path in self._timed and not is_asked and math.isfinite(time_left_around())
 
     def _waits(self, double: Double, path: str) -> bool:
         """Return whether it is a watcher next to others: it waits until they end and preempt it."""
@@ -668,6 +794,73 @@ class Explorer:
             double.service_preempt()
             return PREEMPTED
         return next(outcome for outcome in outcomes if picked == LATE.format(outcome))
+
+
+def _tempo(
+    root: Container, states: Sequence[StateRecord], max_steps: int
+) -> tuple[dict[str, float], set[str], set[str]]:
+    """Choose how long doubles take, so that they have time within the timeouts.
+
+    Leaves that may run at once are equally fast, so that they end in the usual order. None is so
+    fast that a loop takes half of all steps before its timeout.
+
+    Returns:
+        Leaf -> duration of its double [s]; the leaves in a container with a timeout, except in its
+        clean-up; those with a timeout, of whatever state, in the group of leaves that may run at
+        once.
+    """
+    limits = {path: get_options(state).timeout for path, state in walk(root, states[0].path)}
+    together = {s.path for s in states if s.kind == "concurrence" or s.net is not None}
+    loops = {s.path for s in states if _may_loop(s)} if any(limits.values()) else set[str]()
+    own, above, group = dict[str, float](), dict[str, float](), dict[str, str]()
+    longest = dict[str, float]()  # of the loops
+    for leaf in [s.path for s in states if not s.is_container]:
+        *around, _ = _above(leaf)
+        own[leaf] = _bound([limits[leaf]])
+        above[leaf] = _bound([limits[path] for path in around])
+        name = group[leaf] = next((path for path in around if path in together), leaf)
+        for number, path in enumerate(around, 1):
+            seconds = _bound([limits[each] for each in around[:number]]) if path in loops else 0.0
+            if seconds < math.inf:
+                longest[name] = max(longest.get(name, 0.0), seconds)
+    nearest = dict.fromkeys(group.values(), math.inf)
+    for leaf, name in group.items():
+        near = above[leaf] if name == leaf else min(above[leaf], own[leaf])
+        nearest[name] = min(nearest[name], near)
+    steps_s = {}
+    for leaf, name in group.items():
+        quick = max(nearest[name] / STEPS_WITHIN, longest.get(name, 0.0) / (max_steps / 2))
+        longest_s = WITHIN_STEP_S if math.isfinite(nearest[name]) else STEP_S
+        steps_s[leaf] = min(longest_s, quick, own[leaf] / 2, above[leaf] / 2)
+    tidy = {f"{s.path}/{s.cleanup}" for s in states if s.cleanup}
+    timed = {leaf for leaf in above if math.isfinite(above[leaf]) and not tidy & {*_above(leaf)}}
+    return steps_s, timed, {leaf for leaf, name in group.items() if math.isfinite(nearest[name])}
+
+
+def _above(path: str) -> list[str]:
+    """Return the paths of all states from the root down to this one."""
+    parts = path.split("/")
+    return ["/".join(parts[:number]) for number in range(2, len(parts) + 1)]
+
+
+def _may_loop(state: StateRecord) -> bool:
+    """Return whether a container may run a child again."""
+    if state.kind not in {"machine", "sequence"}:
+        return state.kind in {"iterator", "plan"}
+    following = dict[str, set[str]]()
+    for each in state.transitions:
+        if not each.target_is_outcome:
+            following.setdefault(each.source, set()).add(each.target)
+    try:
+        TopologicalSorter(following).prepare()
+    except CycleError:
+        return True
+    return False
+
+
+def _bound(timeouts: Iterable[float | None]) -> float:
+    """Return the shortest timeout that a double may keep within; infinite if there is none."""
+    return min((t for t in timeouts if t is not None and t >= SHORTEST_S), default=math.inf)
 
 
 def _raised_in(

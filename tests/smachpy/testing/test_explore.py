@@ -448,6 +448,108 @@ def test_a_leaf_may_outlast_a_chain_beside_it(timeout):
         replay(beside(planted, timeout=timeout), choices, preempts=0)
 
 
+def bounded(*, around=None, own=None, inner=None, chain=3):
+    """A beside a chain of B0, B1, ...; `inner` is the timeout of B1."""
+    late = {} if around is None else {"timeout": around, "timeout_outcome": "late"}
+    both = Concurrence(["done", "late", "preempted"], "done", **late)
+    after = StateMachine(["done", "aborted", "preempted"])
+    with after:
+        for n in range(chain):
+            limit = {"timeout": inner} if n == 1 else {}
+            to = f"B{n + 1}" if n + 1 < chain else "done"
+            after.add(f"B{n}", Leaf("done", "aborted", "preempted", **limit), {"done": to})
+    with both:
+        both.add("A", Leaf("done", "aborted", "preempted", timeout=own))
+        both.add("S", after)
+    sm = StateMachine(["done", "late", "preempted"], name="M")
+    with sm:
+        sm.add("BOTH", both)
+    return sm
+
+
+def ends(machine):
+    """The result, and in which orders leaves have ended with 'done'."""
+    seen = set()
+
+    def note(run):
+        ended = [e for e in run.events if type(e).__name__ == "Left" and e.outcome == "done"]
+        labels = [e.path.rpartition("/")[2] for e in ended]
+        seen.add(" ".join(label for label in labels if label not in {"BOTH", "S"}))
+        seen.add(run.outcome)
+
+    return explore(machine, preempts=0, max_runs=5_000, on_run=note), seen
+
+
+@pytest.mark.parametrize("around", [None, 0.5, 4.0, 60.0])
+@pytest.mark.parametrize("own", [None, 0.5])
+def test_a_leaf_outlasts_others_within_each_timeout(around, own):
+    found, seen = ends(lambda: bounded(around=around, own=own))
+    assert found.exhaustive, str(found)
+    assert {"A B0 B1 B2", "B0 A B1 B2", "B0 B1 A B2", "B0 B1 B2 A"} <= seen
+    assert ("late" in seen) == (around is not None)
+
+
+@pytest.mark.parametrize("inner", [0.5, 5.0])
+def test_a_leaf_with_a_timeout_outlasts_one_that_has_outlasted_others(inner):
+    found, seen = ends(lambda: bounded(inner=inner))
+    assert found.exhaustive, str(found)
+    assert {"A B0 B1 B2", "B0 A B1 B2", "B0 B1 A B2", "B0 B1 B2 A"} <= seen
+
+
+def test_leaves_that_a_timeout_leaves_no_time_are_named():
+    def machine():
+        inner = StateMachine(["done", "late", "preempted"], timeout=5.0, timeout_outcome="late")
+        with inner:
+            for n in range(12):
+                inner.add(f"B{n}", Leaf(), {"done": f"B{n + 1}" if n < 11 else "done"})
+        sm = StateMachine(["done", "late", "preempted"], name="M")
+        with sm:
+            sm.add("I", inner)
+        return sm
+
+    found, _ = ends(machine)
+    assert (found.ok, found.exhaustive, found.stopped_by) == (True, False, "timeout")
+    assert found.no_time_for == ("/M/I/B10 to end",)
+    assert "not all there are: a timeout leaves no time for /M/I/B10 to end" in str(found)
+    found, _ = ends(lambda: bounded(own=0.0001))
+    assert found.no_time_for == ("/M/BOTH/A to end",)
+
+
+def test_a_loop_within_a_timeout_is_explored_to_the_end():
+    found, seen = ends(lambda: rounds(5.0))
+    assert found.exhaustive, str(found)
+    assert "late" in seen
+
+
+def rounds(seconds):
+    inside = StateMachine(["done", "late", "preempted"], timeout=seconds, timeout_outcome="late")
+    with inside:
+        inside.add("LOOK", Leaf("done", "again", "preempted"), {"again": "LOOK"})
+    sm = StateMachine(["done", "late", "preempted"], name="M")
+    with sm:
+        sm.add("SEARCH", inside)
+    return sm
+
+
+@pytest.mark.parametrize("cleanup", [True, False])
+@pytest.mark.parametrize("ends", [("done",), ("done", "preempted")])
+def test_the_timeout_of_a_container_is_reached(ends, cleanup):
+    inner = StateMachine(["done", "late", "preempted"], timeout=5.0, timeout_outcome="late")
+    with inner:
+        inner.add("A", Leaf(*ends), {"done": "B"})
+        inner.add("B", Leaf(*ends))
+    if cleanup:
+        inner.add_cleanup("TIDY", Leaf(*ends))
+    sm = StateMachine(["done", "late", "preempted"], name="M")
+    with sm:
+        sm.add("I", inner)
+    outcomes = set()
+    found = explore(sm, on_run=lambda run: outcomes.add(run.outcome))
+    found.assert_ok()
+    assert found.exhaustive
+    assert {"done", "late"} <= outcomes
+
+
 def test_leaves_that_run_at_once_end_in_every_order():
     def two():
         both = Concurrence(["done"], "done", name="C")
