@@ -19,7 +19,7 @@ from smachpy.machines.state import CBState, State, get_options
 from smachpy.machines.util import CBInterface
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from smachpy.events.introspection import StateRecord
 
@@ -116,7 +116,7 @@ def _has_own_execute(state: State) -> bool:
 
 
 def _is_foreign(code: Any) -> bool:
-    return bool(code.__module__.partition(".")[0] != "smachpy")
+    return bool((code.__module__ or "").partition(".")[0] != "smachpy")
 
 
 def _may_write_anything(state: State) -> bool:
@@ -164,7 +164,11 @@ def _of_leaf(state: State, record: StateRecord) -> Facts:
         ignored=suppression.of_state(state, callback),
     )
     if code is None:
-        return replace(facts, reads=None if _is_foreign(type(state)) else _sent_keys(state))
+        if _is_foreign(type(state)):
+            return replace(facts, reads=None)
+        callbacks = list(_looked_at(state))
+        outside = tuple(found for each in callbacks for found in each.outside)
+        return replace(facts, reads=_sent_keys(state, callbacks), outside=outside)
     # An outcome named in the constructor may be declared in some cases, and returned only then.
     known = {*record.outcomes, *source.texts_in_constructors(type(state)), "preempted"}
     returns = code.returns or {}
@@ -193,22 +197,26 @@ def _function(given: Any) -> Callable[..., Any] | None:
     return callback if inspect.isfunction(callback) else None
 
 
-def _sent_keys(state: State) -> Reads:
+def _looked_at(state: State) -> Iterator[source.Code]:
+    """Yield what the callbacks of a state of this package do, as far as that is known."""
+    for given in state._smachpy.code:
+        callback = _function(given.callback.function if isinstance(given, Outgoing) else given)
+        code = None if callback is None else source.look_at(callback, userdata=0, owner=None)
+        if code is not None:
+            yield code
+
+
+def _sent_keys(state: State, callbacks: Iterable[source.Code]) -> Reads:
     """Return the keys that a state of this package reads to send or test something."""
     keys: set[str] = set()
     sometimes: set[str] = set()
-    callbacks: list[Any] = []
     for code in state._smachpy.code:
         if isinstance(code, Outgoing):
             keys |= {*code.slots} if code.key is None else {code.key, *code.slots}
-            callbacks.append(code.callback.function)
-        else:
-            callbacks.append(code)
-    for callback in map(_function, callbacks):
-        code = None if callback is None else source.look_at(callback, userdata=0, owner=None)
-        if code is not None and code.reads is not None:
-            keys |= code.reads.always
-            sometimes |= code.reads.sometimes
+    for found in callbacks:
+        if found.reads is not None:
+            keys |= found.reads.always
+            sometimes |= found.reads.sometimes
     return Reads(frozenset(keys), frozenset(sometimes - keys))
 
 

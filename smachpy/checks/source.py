@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
+import os
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from smachpy.checks.model import Place, Reads
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
     Function: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
     Texts: TypeAlias = set[str] | None  # all possible values of an expression; None: unknown
@@ -53,31 +54,39 @@ _CHANGERS = frozenset(
     }
     | {"clear", "sort", "reverse", "update", "setdefault", "add", "discard"}
 )
-# What differs each time, and is in no recording. `time` and `random` begin as recorded.
+# What differs each time, and is in no recording. `random` begins as recorded, and the clock, which
+# then runs on without the time that code takes: `time.monotonic` is left out, as it has no date.
 _OUTSIDE = (
-    "os.environ",
-    "os.getenv",
-    "os.urandom",
-    "os.listdir",
-    "os.getpid",
-    "uuid.uuid1",
-    "uuid.uuid4",
-    "secrets",
-    "socket",
-    "subprocess",
-    "urllib.request",
-    "requests",
-    "http.client",
-    "datetime.datetime.now",
-    "datetime.datetime.utcnow",
-    "datetime.datetime.today",
+    *("open", "input", "io.open", "pathlib.Path.cwd", "pathlib.Path.home", "glob", "tempfile"),
+    *("shutil", "shelve", "sqlite3", "fileinput"),
+    *("os.environ", "os.environb", "os.getenv", "os.getenvb", "os.urandom", "os.getrandom"),
+    *("os.listdir", "os.scandir", "os.walk", "os.stat", "os.lstat", "os.access", "os.open"),
+    *("os.read", "os.getcwd", "os.getpid", "os.getppid", "os.getlogin", "os.getloadavg"),
+    *("os.path.exists", "os.path.isfile", "os.path.isdir", "os.path.getmtime", "os.path.getsize"),
+    *("os.system", "os.popen", "subprocess", "asyncio.create_subprocess_exec"),
+    *("asyncio.create_subprocess_shell", "multiprocessing", "platform", "getpass"),
+    *("sys.stdin", "select", "socket", "ssl", "asyncio.open_connection", "urllib.request"),
+    *("http.client", "requests", "httpx", "aiohttp", "urllib3", "ftplib", "smtplib", "serial"),
+    *("psutil", "uuid.uuid1", "uuid.uuid4", "uuid.uuid6", "uuid.uuid7", "uuid.getnode", "secrets"),
+    *("random.Random", "random.SystemRandom", "numpy.random"),
+    *("time.time", "time.time_ns", "time.process_time", "time.process_time_ns"),
+    *("time.thread_time", "time.thread_time_ns"),
+    *("datetime.datetime.now", "datetime.datetime.utcnow", "datetime.datetime.today"),
     "datetime.date.today",
-    "random.Random",
-    "random.SystemRandom",
-    "numpy.random",
-    "shelve",
-    "sqlite3",
 )
+# These read the clock only if they get no time.
+_OF_NOW = frozenset({"time.localtime", "time.gmtime", "time.ctime", "time.asctime"})
+# Methods of `pathlib.Path` that look at the disk; the first ones have no other meaning.
+_READS_FILE = frozenset({"read_text", "read_bytes"})
+_PATH = "pathlib.Path"
+_OF_PATH = _READS_FILE | {"open", "exists", "is_file", "is_dir", "stat", "iterdir", "glob", "rglob"}
+# Where things are that call themselves after another module.
+_HOMES = {
+    **dict.fromkeys(("posix", "nt"), "os"),
+    **dict.fromkeys(("posixpath", "ntpath", "genericpath"), "os.path"),
+    "_socket": "socket",
+    "pathlib._local": "pathlib",
+}
 _SHORT_S = 1.0  # [s] a shorter loop need not check for a preempt
 # Context managers that limit awaits within them: of asyncio, async_timeout, anyio and trio.
 _LIMITERS = frozenset({"timeout", "timeout_at", "fail_after", "fail_at", "move_on_after"})
@@ -172,6 +181,54 @@ def _parse(function: Any) -> tuple[Function, str] | None:
     return None
 
 
+def _outside_name(
+    node: ast.Name | ast.Attribute, names: Mapping[str, str], call: ast.Call | None
+) -> str:
+    """Return the full name of something outside; "" if it is none.
+
+    Args:
+        node: The name in the code.
+        names: What the names of modules, and of what is in them, stand for.
+        call: The call of it, if it is called.
+    """
+    words: list[str] = []
+    inner: ast.AST = node
+    while isinstance(inner, ast.Attribute):
+        words.insert(0, inner.attr)
+        inner = inner.value
+    if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name | ast.Attribute):
+        made = _dotted(inner.func, names)
+        return f"{made}.{words[-1]}" if made == _PATH and _OF_PATH.intersection(words[-1:]) else ""
+    name = _dotted(node, names)
+    if words and words[-1] in _READS_FILE:
+        return name or words[-1]
+    if name in _OF_NOW and call is not None and not call.args and not call.keywords:
+        return name
+    return name if any(name == one or name.startswith(f"{one}.") for one in _OUTSIDE) else ""
+
+
+def _dotted(node: ast.expr, names: Mapping[str, str]) -> str:
+    """Return the full name of `a.b.c`; "" if `a` is neither a module nor in one."""
+    words: list[str] = []
+    while isinstance(node, ast.Attribute):
+        words.insert(0, node.attr)
+        node = node.value
+    first = names.get(node.id, "") if isinstance(node, ast.Name) else ""
+    return ".".join([first, *words]) if first else ""
+
+
+def _full_name(thing: object) -> str:
+    """Return the full name of a module, or of a function or class in one; "" for others."""
+    if inspect.ismodule(thing):
+        return _HOMES.get(thing.__name__, thing.__name__)
+    if thing is os.environ:
+        return "os.environ"
+    if not (inspect.isroutine(thing) or inspect.isclass(thing)):
+        return ""
+    home = str(thing.__module__)
+    return f"{_HOMES.get(home, home)}.{thing.__qualname__}"
+
+
 class _Body:
     """The body of one function.
 
@@ -213,29 +270,32 @@ class _Body:
             for inner in ast.walk(node)
         }
         kept |= {id(node.value) for node in self._all if isinstance(node, ast.Attribute)}
+        calls = {id(n.func): n for n in self._all if isinstance(n, ast.Call)}
+        names = self._names()
         for node in self._all:
             if isinstance(node, ast.Name | ast.Attribute) and id(node) not in kept:
-                what = self._outside_name(node)
+                what = _outside_name(node, names, calls.get(id(node)))
                 if what:
                     yield what, self.place(node)
 
-    def _outside_name(self, node: ast.Name | ast.Attribute) -> str:
-        """Return the full name of something outside; "" if it is none."""
-        words: list[str] = []
-        inner: ast.AST = node
-        while isinstance(inner, ast.Attribute):
-            words.insert(0, inner.attr)
-            inner = inner.value
-        if not isinstance(inner, ast.Name):
-            return ""
+    def _names(self) -> dict[str, str]:
+        """Return the names of modules, and of what is in them, with what they stand for."""
+        found = {"open": "open", "input": "input"}
         scope = getattr(self._function, "__globals__", {})
-        if inner.id not in scope:
-            return inner.id if (inner.id, words) == ("open", []) else ""
-        thing = scope[inner.id]
-        is_module = inspect.ismodule(thing)
-        first = thing.__name__ if is_module else f"{getattr(thing, '__module__', '')}.{inner.id}"
-        name = ".".join([first, *words])
-        return name if any(name == one or name.startswith(f"{one}.") for one in _OUTSIDE) else ""
+        used = {node.id for node in self._all if isinstance(node, ast.Name)}
+        found.update((name, _full_name(scope[name])) for name in used & scope.keys())
+        bound = {a.arg for a in ast.walk(self._tree.args) if isinstance(a, ast.arg)}
+        bound |= {name for node in self._nodes for name, _ in _bindings(node)}
+        for name in bound:
+            found.pop(name, None)
+        for node in self._all:
+            if isinstance(node, ast.Import):
+                for each in node.names:
+                    top = each.name.partition(".")[0]
+                    found[each.asname or top] = each.name if each.asname else top
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.update((n.asname or n.name, f"{node.module}.{n.name}") for n in node.names)
+        return found
 
     # -- outcomes ------------------------------------------------------------------------------
 

@@ -84,7 +84,7 @@ def of_state(state: State, function: Callable[..., Any] | None) -> dict[str, str
 @functools.lru_cache(maxsize=1024)
 def _comments(code: Any) -> dict[str, str]:
     """Return rule -> reason from the comments of a class or function."""
-    if code.__module__.partition(".")[0] == "smachpy":
+    if (code.__module__ or "").partition(".")[0] == "smachpy":
         return {}
     where = f"comment in {'class' if isinstance(code, type) else 'function'} {code.__name__}"
     found = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import linecache
 import os
 import threading
 import time
@@ -512,6 +513,103 @@ def test_what_no_recording_has_is_looked_for_when_somebody_asks():
     sm = machine(("A", CBState(look, outcomes=["done", "failed"]), {"failed": "done"}))
     found = the(check(sm, enable=["outside"]), "outside")
     assert "/M/A uses os.environ.get, which no recording has" in found.message
+
+
+def reads(code):
+    """What the rule `outside` finds in the body of a state."""
+    lines = [f"    {line}" for line in code.splitlines()]
+    text = "\n".join([*_IMPORTS, "def look(ud):", *lines, "    return 'done'", ""])
+    name = f"<outside {len(linecache.cache)}>"
+    linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+    scope = {"__name__": "looked_at"}
+    exec(compile(text, name, "exec"), scope)
+    found = check(machine(("A", CBState(scope["look"], outcomes=["done"]), {})), enable=["outside"])
+    texts = [p.message for p in found.problems if p.rule == "outside"]
+    return [text.removeprefix("/M/A uses ").partition(",")[0] for text in texts]
+
+
+_IMPORTS = """
+import datetime
+import linecache
+import os
+import os.path as files
+import pathlib
+import random
+import socket
+import time
+import uuid
+import numpy as np
+import smachpy
+from datetime import date, datetime as dt
+from os import environ as env, getpid as own_id
+from pathlib import Path
+from random import random as roll
+from time import monotonic, sleep, time as now
+from uuid import uuid4 as fresh
+""".splitlines()
+
+
+@pytest.mark.parametrize(
+    ("code", "name"),
+    [
+        ("time.time()", "time.time"),
+        ("now()", "time.time"),
+        ("from time import time as t\nt()", "time.time"),
+        ("import time as clock\nclock.time_ns()", "time.time_ns"),
+        ("time.localtime()", "time.localtime"),
+        ("datetime.datetime.now()", "datetime.datetime.now"),
+        ("dt.now()", "datetime.datetime.now"),
+        ("date.today()", "datetime.date.today"),
+        ("fresh()", "uuid.uuid4"),
+        ("env['HOME']", "os.environ"),
+        ("os.getenv('HOME')", "os.getenv"),
+        ("own_id()", "os.getpid"),
+        ("files.exists('x')", "os.path.exists"),
+        ("open('x')", "open"),
+        ("Path('x').read_text()", "pathlib.Path.read_text"),
+        ("pathlib.Path('x').exists()", "pathlib.Path.exists"),
+        ("p = Path('x')\np.read_bytes()", "read_bytes"),
+        ("socket.create_connection(('a', 1))", "socket.create_connection"),
+        ("np.random.rand()", "numpy.random.rand"),
+        ("random.Random(3)", "random.Random"),
+        ("(lambda: time.time())()", "time.time"),
+    ],
+)
+def test_what_no_recording_has_is_named_however_it_was_imported(code, name):
+    assert reads(code) == [name]
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "time.monotonic()",
+        "monotonic()",
+        "sleep(1)",
+        "roll()",
+        "random.random()",
+        "time.localtime(0)",
+        "dt(2020, 1, 1)",
+        "smachpy.once('id', fresh)",
+        "smachpy.once('t', lambda: time.time())",
+        "Path('x') / 'y'",
+        "open = len\nopen('x')",
+        "time = ud\ntime.time()",
+        "ud.time",
+        "files.join('a', 'b')",
+    ],
+)
+def test_what_is_the_same_each_time_is_not_named(code):
+    assert reads(code) == []
+
+
+def test_what_no_recording_has_is_found_in_callbacks_too():
+    def goal(ud, goal):
+        goal.target_pose.header.seq = int(time.time())
+
+    state = SimpleActionState("move_base", MoveBaseAction, goal_cb=goal)
+    ends = {"succeeded": "done", "aborted": "done", "preempted": "done"}
+    found = the(check(machine(("A", state, ends)), enable=["outside"]), "outside")
+    assert "/M/A uses time.time, which no recording has" in found.message
 
 
 def test_a_loop_that_never_looks_at_the_preempt():
