@@ -115,6 +115,7 @@ class Execution:
         self._begin_again: set[str] = set()  # to begin once their earlier run has stopped
         self._reported: object = None  # the last `HeldBack`, which is published once
         self._values: dict[str, bool] = {}  # name -> value when the guards were evaluated last
+        self._looked = 0.0  # the time of that, for all guards the same [s]
         self.moment = table.moment(self._net.initial)
         self.branches = Branches(frame)
         self.orders: deque[tuple[str, str]] = deque()
@@ -234,17 +235,17 @@ class Execution:
             return values[name]
 
         self._values = values
+        self._looked = self._frame.run.clock.now()
         return tuple([guard is None or guard.holds(value) for guard in moment.guards])
 
     def _value(self, name: str) -> bool:
         test = self._table.outcome_tests.get(name)
         if test is not None:
             return test.holds(self._ended.get(test.label))
-        now = self._frame.run.clock.now()
         due = self._due(name)
         if due is not None:
-            return now >= due
-        arguments = name, self._frame.path, now
+            return self._looked >= due
+        arguments = name, self._frame.path, self._looked
         # Code of the user may block: after a preempt it is bounded by the plan's grace.
         if self._knowledge.is_code(name):
             return bool(call_bounded(self._machine, self._frame, self._knowledge.value, arguments))
@@ -392,8 +393,9 @@ class Execution:
         """
         waits = [self._knowledge.every(name) for name in moment.externals]
         dues = [self._due(name) for name in moment.externals]
-        now = self._frame.run.clock.now()
-        waits += [max(0.0, due - now) for due in dues if due is not None and due > now]
+        now, looked = self._frame.run.clock.now(), self._looked
+        # One that has passed since the guards were evaluated is as good as a notice.
+        waits += [max(0.0, due - now) for due in dues if due is not None and due > looked]
         return min((wait for wait in waits if wait is not None), default=None)
 
     def _report_waiting(self, moment: Moment) -> None:

@@ -243,6 +243,26 @@ def test_a_timeout_condition():
             assert clock.now() == pytest.approx(end)
 
 
+def test_a_timeout_that_passes_while_another_guard_is_evaluated_interrupts():
+    """It waited for ever: the guard had been false before, and the time had passed after."""
+    text = """
+    init* -> A.exec : A.start
+    A.exec -> goal : A.end
+    A.exec -> fail : A.interrupt [timeout_A_5]
+    A.exec -> fail : A.interrupt [door]
+    """
+
+    def door(ud):
+        clock.sleep(0.5)
+        return False
+
+    plan = plan_of(text, seconds={"A": (99.0,)}, conditions={"door": door})
+    with virtual_time() as clock:
+        clock.call_later(4.75, lambda: plan.post("anything"))
+        assert plan.execute() == "fail"
+        assert clock.now() < 6.0
+
+
 def test_conditions_on_userdata_are_looked_at_when_it_is_written():
     text = """
     init* -> A.exec B.exec : A.start B.start
