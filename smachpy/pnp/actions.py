@@ -435,13 +435,9 @@ def _goal_state(call: Call, goal: Goal) -> State:
     from smachpy.actions.simple_action_state import SimpleActionState
 
     fields = {**goal.goal}
-    if goal.cases:
-        case = call.parameters[0] if call.parameters else ""
-        if not case.startswith("@") and case not in goal.cases:
-            raise InvalidStateError(
-                f"{call.name}: cases: got {case!r}; expected one of {sorted(goal.cases)}."
-                f"{did_you_mean(case, goal.cases)}"
-            )
+    # The value of a variable is known only when it runs, and is looked up then.
+    if not (call.parameters and call.parameters[0].startswith("@")):
+        _case(call, goal, call.parameters)
     # "{NAME}" in any text is a userdata key, which the state must declare; "{1}" is a parameter.
     keys = {
         key
@@ -454,7 +450,7 @@ def _goal_state(call: Call, goal: Goal) -> State:
 
     def fill(ud: Any, made: Any) -> None:
         parameters = call.values(ud)
-        case = goal.cases.get(parameters[0] if parameters else "", {}) if goal.cases else {}
+        case = _case(call, goal, parameters)
         for path, value in {**fields, **case}.items():  # a case replaces fields of the goal
             _set_field(call, made, path, _filled(call, value, parameters, ud))
 
@@ -469,6 +465,23 @@ def _goal_state(call: Call, goal: Goal) -> State:
         spec: Any = goal.spec
         fill({}, spec().action_goal.goal)  # reports a wrong field now, not during the run
     return state
+
+
+def _case(call: Call, goal: Goal, parameters: tuple[str, ...]) -> Mapping[str, Any]:
+    """Return the further fields for the first parameter.
+
+    Raises:
+        InvalidStateError: there are cases, but none for it.
+    """
+    if not goal.cases:
+        return {}
+    case = parameters[0] if parameters else ""
+    if case not in goal.cases:
+        raise InvalidStateError(
+            f"{call.name}: cases: got {case!r}; expected one of {sorted(goal.cases)}."
+            f"{did_you_mean(case, goal.cases)}"
+        )
+    return goal.cases[case]
 
 
 def _filled(call: Call, value: Any, parameters: tuple[str, ...], ud: Any) -> Any:

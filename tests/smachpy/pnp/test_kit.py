@@ -1,9 +1,13 @@
 """Plans under the test kit, in explorations, recorded, and with a timeout and a retry of their own."""
 
+import pytest
+
 import smachpy
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from smachpy import State, StateMachine
-from smachpy.pnp import PetriNetPlan
-from smachpy.testing import explore
+from smachpy.exceptions import InvalidStateError
+from smachpy.pnp import Goal, PetriNetPlan
+from smachpy.testing import explore, mission_kit
 from tests.smachpy.pnp.nets import net_of
 
 FORK = """
@@ -59,3 +63,18 @@ def test_options_of_a_plan(clock):
     assert sm.execute() == "late"
     assert clock.now() == 4.0
     assert dict(smachpy.describe(sm).children[0].details)["timeout"] == "2 s -> late"
+
+
+def test_an_unknown_case_in_a_variable_sends_no_goal():
+    """The goal was sent without the case's fields: to the origin of the map."""
+    cases = {"kitchen": {"target_pose.pose.position.x": 4.0}}
+    goal = Goal("move_base", MoveBaseAction, {"target_pose.header.frame_id": "map"}, cases)
+    net = net_of("init* -> goto_@place.exec : start\ngoto_@place.exec -> goal : end")
+    with mission_kit() as mission:
+        server = mission.action_server("move_base", MoveBaseAction)
+        plan = PetriNetPlan(net, {"goto": goal}, userdata={"place": "kitchn"})
+        with pytest.raises(InvalidStateError, match="cases: got 'kitchn'.*Did you mean 'kitchen'"):
+            mission(plan)
+        assert server.goals == []
+        mission(PetriNetPlan(net, {"goto": goal}, userdata={"place": "kitchen"}))
+        assert [goal.target_pose.pose.position.x for goal in server.goals] == [4.0]
