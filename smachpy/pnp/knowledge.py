@@ -314,7 +314,10 @@ class Knowledge:
         parts = name.split("_")
         for count in range(len(parts) - 1, 0, -1):
             source = self.sources.get("_".join(parts[:count]))
-            if source is not None and callable(source):
+            # An expression is callable, too, but takes no parameters.
+            if isinstance(source, Polled) or (
+                callable(source) and not isinstance(source, Expression)
+            ):
                 return source, tuple(parts[count:])
         return None
 

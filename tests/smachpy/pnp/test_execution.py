@@ -208,6 +208,29 @@ def test_guards_are_read_before_any_firing_and_a_loser_is_skipped():
     assert len(asked) == 1  # once a step, for both guards
 
 
+def test_parameters_in_the_name_of_a_polled_condition():
+    """It was never asked, and no check noted it."""
+    text = """
+    init* -> A.exec : A.start
+    A.exec -> goal : A.interrupt [near_hall_door]
+    A.exec -> fail : A.end
+    """
+    asked = []
+    near = Polled(lambda ud, *words: asked.append(words) or len(asked) > 2, 0.5)
+    plan = plan_of(text, seconds={"A": (9.0,)}, conditions={"near": near})
+    with virtual_time() as clock:
+        assert plan.execute() == "goal"
+        assert clock.now() == pytest.approx(1.0)
+    assert asked == [("hall", "door")] * 3
+
+
+def test_an_expression_has_no_parameters_in_its_name():
+    """`low_battery` asked `low` with a parameter, which ended the plan."""
+    plan = plan_of("init* -> goal : t [not low_battery]", conditions={"low": Expression("x > 0")})
+    assert [problem.rule for problem in plan.binding_problems()] == ["unknown-condition"]
+    assert plan.execute() == "goal"
+
+
 def test_all_goal_places_must_hold_exactly_their_tokens():
     text = """
     init* -> goal~g2 x : t
