@@ -12,7 +12,7 @@ from smachpy.engine.described import ContainerData
 from smachpy.engine.step import Plan as CompiledChildren
 from smachpy.events.introspection import NetRecord, NetTransitionRecord, PlaceRecord, Structure
 from smachpy.exceptions import InvalidStateError, did_you_mean
-from smachpy.machines.container import Container, shared_below
+from smachpy.machines.container import Container, below, shared_below
 from smachpy.machines.state import DataOf, Shown
 from smachpy.pnp.actions import Binder, NotImported, Order, SetVariable, Unbound, Wait, WaitFor
 from smachpy.pnp.execution import Execution
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from smachpy.checks.model import Problem
     from smachpy.engine.frame import Frame
     from smachpy.events.introspection import Kind
-    from smachpy.machines.state import StateOptions
+    from smachpy.machines.state import State, StateOptions
     from smachpy.pnp.knowledge import Events
     from smachpy.pnp.server import PNPServer
     from smachpy.userdata.user_data import Fields, UserData
@@ -447,7 +447,7 @@ class PetriNetPlan(Container):
         return {places[p].id: marking.count(p) for p in dict.fromkeys(marking)}
 
     def post(self, event: str) -> None:
-        """Post an event to the guards of the plan and its sub-plans.
+        """Post an event to the guards of the plan and of all plans below it.
 
         Args:
             event: Its name; "not_NAME" and "!NAME" make NAME false from now on.
@@ -455,20 +455,23 @@ class PetriNetPlan(Container):
         Threads: any; does not wait.
         """
         frame = self._smachpy.live.frame
-        self._smachpy.knowledge.post(event, None if frame is None else frame.run.clock)
-        for child in self._states.values():
-            if isinstance(child, PetriNetPlan):
-                child.post(event)
+        # Its life begins now for a sub-plan that does not run yet, too.
+        clock = None if frame is None else frame.run.clock
+        for plan in plans_in(self):
+            plan._smachpy.knowledge.post(event, clock)
 
     def set_condition(self, name: str, value: bool | None) -> None:
-        """Set a condition; None deletes it. It has no effect if one of this name is registered.
+        """Set a condition of the plan and of all plans below it; None deletes it.
+
+        It has no effect where one of this name is registered.
 
         Raises:
             InvalidStateError: `name` is empty or no text, or `value` is a text.
 
         Threads: any; does not wait.
         """
-        self._smachpy.knowledge.set(name, value)
+        for plan in plans_in(self):
+            plan._smachpy.knowledge.set(name, value)
 
     def fire(self, transition: str) -> None:
         """Fire a transition now regardless of its guard, if its places hold their tokens.
@@ -500,6 +503,12 @@ class PetriNetPlan(Container):
     def __forget_variable(self, key: str) -> None:
         if key in self.userdata:
             del self.userdata[key]
+
+
+def plans_in(state: State) -> list[PetriNetPlan]:
+    """Return all plans in a state, itself included, from the outside in."""
+    # One instance may be in several places.
+    return [s for s in {id(s): s for s in below(state)}.values() if isinstance(s, PetriNetPlan)]
 
 
 # -- loading ---------------------------------------------------------------------------------------

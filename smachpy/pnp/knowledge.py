@@ -234,6 +234,11 @@ class Knowledge:
             self.changes += 1
         self.changed()
 
+    def set_values(self) -> dict[str, bool]:
+        """Return the conditions that were set, and their values."""
+        with self._lock:
+            return dict(self._set)
+
     def changed(self) -> None:
         """Notify the listeners: a waiting plan evaluates its guards again."""
         for listener in self._listeners:

@@ -20,7 +20,7 @@ from smachpy.events import Left
 from smachpy.events.outcome_classes import outcome_class
 from smachpy.exceptions import InconsistentMachineError, InvalidStateError, did_you_mean
 from smachpy.pnp.build import Action, action
-from smachpy.pnp.container import PetriNetPlan, load
+from smachpy.pnp.container import PetriNetPlan, load, plans_in
 from smachpy.pnp.files import load_plan
 from smachpy.pnp.knowledge import Knowledge, Polled
 from smachpy.pnp.reading import plan_file
@@ -28,7 +28,7 @@ from smachpy.pnp.text import rule_of
 from smachpy.userdata.user_data import UserData
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
     from typing import Self
 
@@ -42,10 +42,17 @@ _BUILT_IN: Final = ("timeout_", "action_failed")
 
 
 class _Running:
-    """An action or a plan that was started."""
+    """An action or a plan that was started.
 
-    def __init__(self, plan: PetriNetPlan) -> None:
+    Attributes:
+        plan: The plan, or the one around the action.
+        hears: The plans that are told of events. The one around an action asks `PNPCmd` itself.
+        task: The thread of one that was started without waiting for its end.
+    """
+
+    def __init__(self, plan: PetriNetPlan, hears: Sequence[PetriNetPlan]) -> None:
         self.plan = plan
+        self.hears = hears
         self.task: Task | None = None
 
 
@@ -243,12 +250,14 @@ class PNPCmd:
         return self._knowledge.value(name, "PNPCmd", current_clock().now())
 
     def set_condition(self, name: str, value: bool) -> None:
-        """Set a condition."""
-        self._knowledge.set(name, value)
+        """Set a condition, also of the plans that run or that are started later."""
+        for knowledge in self._all_knowledge():
+            knowledge.set(name, value)
 
     def post(self, event: str) -> None:
-        """Post an event."""
-        self._knowledge.post(event, current_clock())
+        """Post an event, also to the plans that run."""
+        for knowledge in self._all_knowledge():
+            knowledge.post(event, current_clock())
 
     # -- plans ---------------------------------------------------------------------------------
 
@@ -301,6 +310,12 @@ class PNPCmd:
         meant = self._part(name, params).name
         return whole == meant or (not params and whole.startswith(f"{meant}_"))
 
+    def _all_knowledge(self) -> list[Knowledge]:
+        """Return the conditions of this object and of the running plans."""
+        with self._lock:
+            plans = [plan for running in self._running.values() for plan in running.hears]
+        return [self._knowledge, *(plan._smachpy.knowledge for plan in plans)]
+
     def _tasks_of(self, name: str, params: str | Iterable[object] = "") -> list[Task | None]:
         """Return the tasks of the running actions; None for one in its caller's thread."""
         with self._lock:
@@ -324,7 +339,7 @@ class PNPCmd:
         problems = plan.find_problems("PNPCmd")
         if problems:
             raise InconsistentMachineError("PNPCmd", problems)
-        return self._note(part.name, plan)
+        return self._note(part.name, plan, plans_in(plan)[1:])
 
     def _asking(self, name: str) -> Any:
         def ask(_userdata: object) -> bool:
@@ -343,17 +358,19 @@ class PNPCmd:
         problems = plan.find_problems(name)
         if problems:
             raise InconsistentMachineError(name, problems)
-        running = self._note(name, plan)
+        running = self._note(name, plan, plans_in(plan))
+        for condition, value in self._knowledge.set_values().items():
+            plan.set_condition(condition, value)
         self._plan = (name, "")
         return running
 
-    def _note(self, name: str, plan: PetriNetPlan) -> _Running:
+    def _note(self, name: str, plan: PetriNetPlan, hears: Sequence[PetriNetPlan]) -> _Running:
         with self._lock:
             if name in self._running:
                 raise InvalidStateError(
                     f"{name}: it is already running; expected one run at a time."
                 )
-            self._running[name] = running = _Running(plan)
+            self._running[name] = running = _Running(plan, hears)
             return running
 
     def _run(self, name: str, running: _Running) -> None:

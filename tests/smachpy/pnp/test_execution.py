@@ -243,6 +243,44 @@ def test_all_goal_places_must_hold_exactly_their_tokens():
         assert clock.now() == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("nested", [False, True])
+@pytest.mark.parametrize("how", ["post", "set_condition"])
+def test_events_and_conditions_reach_all_plans_below(how, nested):
+    """A plan in a machine in a plan heard no event, and no sub-plan of `set_condition`."""
+    sub = PetriNetPlan(net_of("init* -> goal : t [go]"))
+    job = sub
+    if nested:
+        job = StateMachine(["goal", "fail", "preempted"])
+        with job:
+            job.add("SUB", sub)
+    plan = plan_of("init* -> job.exec : start\njob.exec -> goal : end", actions={"job": job})
+    with virtual_time() as clock:
+        act = {
+            "post": lambda: plan.post("go"),
+            "set_condition": lambda: plan.set_condition("go", True),
+        }
+        clock.call_later(1.0, act[how])
+        clock.call_later(60.0, plan.request_preempt)
+        assert plan.execute() == "goal"
+        assert clock.now() == 1.0
+
+
+def test_an_old_event_is_none_for_a_sub_plan_that_begins():
+    """Its life began with the sub-plan: an event of an hour ago opened a door."""
+    sub = PetriNetPlan(net_of("init* -> goal : t [go]"))
+    text = """
+    init* -> A.exec : A.start
+    A.exec -> mid : A.end
+    mid -> job.exec : job.start
+    job.exec -> goal : job.end
+    """
+    plan = plan_of(text, seconds={"A": (3600.0,)}, actions={"job": sub})
+    with virtual_time() as clock:
+        clock.call_later(1.0, lambda: plan.post("go"))
+        clock.call_later(3700.0, plan.request_preempt)
+        assert plan.execute() == "preempted"
+
+
 @pytest.mark.parametrize(("name", "value"), [("", True), (None, True), ("c", "False"), ("c", b"0")])
 def test_set_condition_refuses_texts_for_truth_and_names_that_are_none(name, value):
     """A text was true, whatever it says."""

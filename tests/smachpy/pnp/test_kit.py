@@ -73,7 +73,7 @@ def test_an_unknown_case_in_a_variable_sends_no_goal():
     with mission_kit() as mission:
         server = mission.action_server("move_base", MoveBaseAction)
         plan = PetriNetPlan(net, {"goto": goal}, userdata={"place": "kitchn"})
-        with pytest.raises(InvalidStateError, match="cases: got 'kitchn'.*Did you mean 'kitchen'"):
+        with pytest.raises(InvalidStateError, match=r"cases: got 'kitchn'.*Did you mean 'kitchen'"):
             mission(plan)
         assert server.goals == []
         mission(PetriNetPlan(net, {"goto": goal}, userdata={"place": "kitchen"}))

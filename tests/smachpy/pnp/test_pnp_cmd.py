@@ -4,7 +4,7 @@ import pytest
 
 import smachpy
 from smachpy.exceptions import InvalidStateError
-from smachpy.pnp import PlanError, PNPCmd, write_pnml
+from smachpy.pnp import PetriNetPlan, PlanError, PNPCmd, write_pnml
 from tests.smachpy.pnp.nets import net_of
 
 
@@ -95,6 +95,32 @@ def test_plans(clock, tmp_path, log):
     assert cmd.plan_status() == "preempted"
     with pytest.raises(PlanError, match="Did you mean 'rest'"):
         cmd.execute_plan("rset")
+
+
+@pytest.mark.parametrize("how", ["post", "set", "set before"])
+def test_events_and_conditions_reach_a_plan_that_was_started(clock, tmp_path, log, how):
+    """Only single actions heard of them."""
+    net = net_of("init* -> goal : t [obstacle]")
+    write_pnml(net, tmp_path / "watch.pnml")
+    with PNPCmd(plan_folder=tmp_path) as cmd:
+        if how == "set before":
+            cmd.set_condition("obstacle", True)
+        cmd.start_plan("watch")
+        clock.sleep(1.0)
+        if how == "set":
+            cmd.set_condition("obstacle", True)
+        elif how == "post":
+            cmd.post("obstacle")
+        assert cmd.wait_for_termination(1.0)
+        assert cmd.plan_status() == "goal"
+
+
+def test_events_reach_an_action_that_is_a_plan(clock):
+    watch = PetriNetPlan(net_of("init* -> goal : t [obstacle]"))
+    with PNPCmd({"watch": watch}) as cmd:
+        clock.call_later(1.0, lambda: cmd.post("obstacle"))
+        assert cmd.exec_action("watch") == "success"
+        assert clock.now() == 1.0
 
 
 @pytest.mark.parametrize(
