@@ -331,6 +331,7 @@ class SimpleActionState(State):
                     )
                 else:
                     exchange.adopt(kept, ack_timeout=wait_s)
+                self._smachpy_goal_sent()
                 if not run.status:  # else it had ended in the earlier process
                     exchange.follow(lambda feedback: self.__on_feedback(ud, feedback))
             except BaseException as error:
@@ -346,6 +347,9 @@ class SimpleActionState(State):
             if limit is not None and self.__exec_s is not None and not run.preempted:
                 limit.start(min(self.__exec_s, run.left(wake.clock.now())))
         return exchange
+
+    def _smachpy_goal_sent(self) -> None:
+        """Do nothing; overridden by states that send more about their goal."""
 
     def _smachpy_grace(self, inherited: Grace) -> Grace:
         own: Grace = self._smachpy.options.preempt_timeout

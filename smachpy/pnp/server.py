@@ -159,6 +159,8 @@ class ServerAction(SimpleActionState):
         self._call = call
         self._robot = call.robot or server.robot
         self._id = 0
+        self._is_sent = False
+        self._told: Any = None  # set once the goal was sent, or will not be
         self._name = server.action.replace("{robot}", self._robot).lstrip("/")
         super().__init__(
             self._name,
@@ -184,12 +186,17 @@ class ServerAction(SimpleActionState):
 
         # The callback runs in another thread, where this node may not be the current one.
         asked: list[bool] = []
-        node, done = get_node(), clock_of_run().event(f"the interruption of {self._call.name}")
+        node, clock = get_node(), clock_of_run()
+        done = clock.event(f"the interruption of {self._call.name}")
+        # The robot would begin an action that it has been told to interrupt before.
+        self._is_sent, self._told = False, clock.event(f"the goal of {self._call.name}")
 
         def interrupt() -> None:
             asked.append(True)
             try:
-                self._interrupt(node)
+                self._told.wait()
+                if self._is_sent:
+                    self._interrupt(node)
             finally:
                 done.set()
 
@@ -197,6 +204,7 @@ class ServerAction(SimpleActionState):
         try:
             outcome = super().execute(ud)
         finally:
+            self._told.set()
             forget()
             # The program may end with the plan: first the interrupt must have reached the robot.
             if asked:
@@ -206,6 +214,10 @@ class ServerAction(SimpleActionState):
             self.service_preempt()
             return "preempted"
         return outcome
+
+    def _smachpy_goal_sent(self) -> None:
+        self._is_sent = True
+        self._told.set()
 
     def _interrupt(self, node: Node) -> None:
         """Send the goal that interrupts the action.

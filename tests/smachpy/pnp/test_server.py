@@ -12,9 +12,10 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.node import use_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher
+from smachpy.actions.goal_run import GoalFollower
 from smachpy.exceptions import InvalidStateError, InvalidUserCodeError
 from smachpy.pnp import PetriNetPlan, PlanError, PNPCmd, PNPServer, load_plan, write_pnml
-from smachpy.pnp.server import _ACTION, _CONDITION, _interface
+from smachpy.pnp.server import _ACTION, _CONDITION, ServerAction, _interface
 from tests.smachpy.pnp.nets import net_of
 from tests.two_nodes import TwoNodes
 
@@ -135,6 +136,40 @@ def test_a_preempt_interrupts_the_action() -> None:
         assert plan.execute() == "preempted"
         assert robot.told[-1] == "goto_kitchen interrupt"
         assert robot.running == {}
+
+
+def test_an_interrupt_comes_after_the_goal_that_it_interrupts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The robot was told to stop, and then to begin: it drove on after the end of the plan."""
+    with Robot() as robot:
+        plan = PetriNetPlan(net_of(SENSING), server=PNPServer())
+        send = GoalFollower.send
+
+        def send_late(follower: GoalFollower, *goal: Any, **options: Any) -> None:
+            plan.request_preempt()
+            robot.clock.sleep(0.05)  # such as an entry in the journal takes
+            send(follower, *goal, **options)
+
+        monkeypatch.setattr(GoalFollower, "send", send_late)
+        assert plan.execute() == "preempted"
+        assert robot.told == ["goto_kitchen start", "goto_kitchen interrupt"]
+        assert robot.running == {}
+
+
+def test_no_interrupt_of_a_goal_that_was_not_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Robot() as robot:
+        fill = ServerAction._fill
+
+        def fill_late(state: ServerAction, *given: Any) -> None:
+            fill(state, *given)
+            plan.request_preempt()
+            robot.clock.sleep(0.05)
+
+        monkeypatch.setattr(ServerAction, "_fill", fill_late)
+        plan = PetriNetPlan(net_of(SENSING), server=PNPServer())
+        assert plan.execute() == "preempted"
+        assert robot.told == []
 
 
 def test_a_robot_that_does_not_answer_ends_the_plan_with_an_error() -> None:
