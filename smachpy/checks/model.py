@@ -67,7 +67,9 @@ RULES: dict[str, CheckRule] = {
             "net-label", "error", "a label, a condition or a name of a plan that looks wrong"
         ),
         CheckRule(
-            "net-unmatched", "warning", "a plan starts or ends an action without its exec place"
+            "net-unmatched",
+            "warning",
+            "a plan starts or ends an action, or has a rule for one, without its exec place",
         ),
         CheckRule("net-unbound", "error", "a plan names an action that nothing does"),
         CheckRule("net-condition", "warning", "a guard asks for what nobody is known to say"),

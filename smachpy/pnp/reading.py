@@ -9,7 +9,7 @@ from actionlib_core.inputs.checked_file import read_limited
 from smachpy.exceptions import did_you_mean
 from smachpy.pnp.pnml import LARGEST_FILE, read_pnml
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
-from smachpy.pnp.text import parse_pddl, parse_plan, parse_rules
+from smachpy.pnp.text import parse_rules, plan_of_pddl, read_plan_text
 
 if TYPE_CHECKING:
     from smachpy.pnp.net import Net
@@ -32,7 +32,11 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
     # Execution rules only exist for text forms; a net has its interrupts as transitions.
     beside = path.with_suffix(".er")
     rules = parse_rules(_text(beside), file=str(beside)) if beside.is_file() else ()
-    ignored = [
+    text = _text(path)
+    if path.suffix == ".pddlout":
+        text = plan_of_pddl(text, str(file))
+    net, actions = read_plan_text(text, rules, path.name.partition(".")[0], str(file))
+    found = [
         PlanProblem(
             "comment",
             "warning",
@@ -44,9 +48,20 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
         for rule in rules
         if rule.ignored
     ]
-    name = path.name.partition(".")[0]
-    parse = parse_pddl if path.suffix == ".pddlout" else parse_plan
-    return parse(_text(path), rules, name=name, file=str(file)), tuple(ignored)
+    found += [
+        PlanProblem(
+            "unmatched",
+            "warning",
+            f"got {rule.action!r}; expected an action of the plan, one of {sorted(actions)}."
+            f"{did_you_mean(rule.action, actions)}",
+            f"rule for {rule.action!r}",
+            str(beside),
+            rule.line,
+        )
+        for rule in rules
+        if rule.action not in actions
+    ]
+    return net, tuple(found)
 
 
 def find_plan(folder: Path | str, name: str) -> Path | None:

@@ -84,11 +84,18 @@ def parse_plan(
     Raises:
         PlanError: it cannot be read; with the line.
     """
+    return read_plan_text(text, rules, name, file)[0]
+
+
+def read_plan_text(
+    text: str, rules: tuple[ExecutionRule, ...], name: str, file: str
+) -> tuple[Net, set[str]]:
+    """Read a plan as `parse_plan` does; return also the actions that rules may be for."""
     reader = _PlanParser(text, rules, file)
     part = reader.plan(0)
     reader.end()
     try:
-        return part.net(name, file=file)
+        return part.net(name, file=file), reader.actions
     except InvalidStateError as error:
         found = [PlanProblem("text", "error", p, "", file) for p in error.problems or [str(error)]]
         raise PlanError(found) from error
@@ -98,6 +105,15 @@ def parse_pddl(
     text: str, rules: tuple[ExecutionRule, ...] = (), *, name: str = "plan", file: str = ""
 ) -> Net:
     """Read a list of PDDL actions, one "(action p1 p2)" a line; arguments as for `parse_plan`."""
+    return read_plan_text(plan_of_pddl(text, file), rules, name, file)[0]
+
+
+def plan_of_pddl(text: str, file: str) -> str:
+    """Return a list of PDDL actions as a linear plan with the same lines.
+
+    Raises:
+        PlanError: a line cannot be read.
+    """
     # Planners put the time before the action and the duration behind it: "0.001: (a b) [1.000]".
     lines = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -106,7 +122,7 @@ def parse_pddl(
         if words and match is None:
             raise _error(file, number, f"got {words!r}; expected '(action p1 p2)'.")
         lines.append("_".join(match[1].split()) + ";" if match else "")
-    return parse_plan("\n".join(lines), rules, name=name, file=file)
+    return "\n".join(lines)
 
 
 def parse_rules(text: str, *, file: str = "") -> tuple[ExecutionRule, ...]:
@@ -178,6 +194,7 @@ class _PlanParser:
     def __init__(self, text: str, rules: tuple[ExecutionRule, ...], file: str) -> None:
         self._file = file
         self._rules = rules
+        self.actions: set[str] = set()  # names of those that rules apply to, without parameters
         self._tokens = list(self._scan(text))
         self._at = 0
 
@@ -273,7 +290,9 @@ class _PlanParser:
             self._take()
         # Rules are for the action's name without robot and parameters.
         own = made.name.partition("#")[2] or made.name
-        rules = [one.rule for one in self._rules if one.action == own.partition("_")[0]]
+        own = own.partition("_")[0]
+        self.actions.add(own)
+        rules = [one.rule for one in self._rules if one.action == own]
         return replace(made, rules=tuple(rules))
 
     def _choice(self, depth: int) -> Part:

@@ -72,6 +72,23 @@ def test_what_a_rule_says_in_vain_is_a_warning(folder):
     assert "*x* 3" in problem.message
 
 
+@pytest.mark.parametrize("ending", ["plan", "pddlout"])
+def test_a_rule_for_no_action_of_the_plan_is_a_warning(folder, ending):
+    """It vanished; the robot drove on past the obstacle."""
+    text = "goto_x; wait_1"
+    Path(f"tour.{ending}").write_text("(goto x)" if ending == "pddlout" else text)
+    rules = [
+        "*if* obstacle *during* gto *do* say_hi; goal",
+        "*if* obstacle *during* goto *do* goal",
+    ]
+    Path("tour.er").write_text("\n".join(rules))
+    (wrong,) = load(f"tour.{ending}", {"goto": print, "say": print}).problems
+    assert (wrong.rule, wrong.severity, wrong.line, wrong.file) == (
+        "unmatched", "warning", 1, "tour.er")  # fmt: skip
+    assert "got 'gto'" in wrong.message
+    assert "Did you mean 'goto'?" in wrong.message
+
+
 def test_the_picture_is_the_net(folder):
     assert main(["render", "fetch.pnml", "-o", "fetch.svg"]) == 0
     ids = {e.get("id") for e in ET.parse("fetch.svg").iter() if e.get("id")}
