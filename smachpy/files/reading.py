@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
@@ -26,6 +26,7 @@ from smachpy.files.reference import (
     Reference,
     check_allowed,
     check_named,
+    file_of,
     finish,
     make_named,
     make_registered,
@@ -845,13 +846,20 @@ class _Reader:
         path = self._inside(name)
         beside = mapping_beside(path)
         named = [] if beside is None else read_mapping(beside, imports=False).named()
+        # Code beside the plan comes first, as when the plan runs by itself.
+        places = {
+            text: replace(place, folder=path.parent)
+            if file_of(text.partition(":")[0], path.parent)
+            else place
+            for text in named
+        }
         for text in named if self._to_run else ():
-            check_allowed(text.partition(":")[0], place)
+            check_allowed(text.partition(":")[0], places[text])
         plan = finish(load_plan(path, to_run=False, imports=False), origin, options, place)
 
         def make() -> State:
             for text in named:
-                named_thing(text, place)
+                named_thing(text, places[text])
             return finish(load_plan(path), origin, options, place)
 
         if named:

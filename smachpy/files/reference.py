@@ -254,7 +254,7 @@ def check_named(text: str, arguments: Mapping[str, Any], place: Naming) -> None:
     first = name.partition(".")[0]
     if not all(part.isidentifier() for part in name.split(".")):
         raise MissionError(f"{place.where}: got {text!r}; expected module:Name.")
-    file = _file_of(module, place.folder) or _installed(module, place)
+    file = file_of(module, place.folder) or _installed(module, place)
     if file is None:
         return
     try:
@@ -305,7 +305,7 @@ def check_allowed(module: str, place: Naming) -> None:
     Raises:
         MissionError: it is.
     """
-    inside = _file_of(module, place.folder) is not None
+    inside = file_of(module, place.folder) is not None
     if inside or any(f"{module}.".startswith(f"{allowed}.") for allowed in place.allow):
         return
     top = module.partition(".")[0]
@@ -316,19 +316,21 @@ def check_allowed(module: str, place: Naming) -> None:
     )
 
 
-def _file_of(module: str, folder: Path) -> Path | None:
+def file_of(module: str, folder: Path) -> Path | None:
+    """Return the file of a module in a folder, or None."""
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
     path = folder.joinpath(*parts)
-    for file in (path.with_suffix(".py"), path / "__init__.py"):
-        if file.is_file() and file.resolve().is_relative_to(folder.resolve()):
-            return file.resolve()
+    with contextlib.suppress(OSError):  # a name that is too long
+        for file in (path.with_suffix(".py"), path / "__init__.py"):
+            if file.is_file() and file.resolve().is_relative_to(folder.resolve()):
+                return file.resolve()
     return None
 
 
 def _import(name: str, place: Naming) -> Any:
-    file = _file_of(name, place.folder)
+    file = file_of(name, place.folder)
     folder = place.folder.resolve()
     with contextlib.ExitStack() as stack:
         if file is not None:  # code of an allowed package must not find that of the folder instead

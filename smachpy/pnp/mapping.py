@@ -219,8 +219,15 @@ def _interface(section: Section, kind: str) -> Any:
     return None
 
 
+def _files_of(module: str, folder: Path) -> list[Path]:
+    """Return the files in a folder that `import module` may mean there."""
+    path = folder.joinpath(*module.split("."))
+    files = (path / "__init__.py", path.with_suffix(".py"))
+    return [file.resolve() for file in files if file.is_file()]
+
+
 def _thing(section: Section, imports: bool) -> Any:
-    """Return what `run: module:name` names; modules beside the file are found, too."""
+    """Return what `run: module:name` names; a module beside the file comes first."""
     text = section.text("run", REQUIRED)
     module, colon, name = text.partition(":")
     if not (module and colon and name):
@@ -232,6 +239,12 @@ def _thing(section: Section, imports: bool) -> Any:
     sys.path.insert(0, folder)
     try:
         thing: Any = importlib.import_module(module)
+        # A module of this name that the program has already is not imported again.
+        found, beside = getattr(thing, "__file__", None), _files_of(module, Path(folder))
+        if beside and (found is None or Path(found).resolve() not in beside):
+            got = f"got {text!r}, whose module is {found} already; expected {beside[0]}"
+            section.report("run", f"{got}. Try another name for the file.")
+            return None
         for part in name.split("."):
             thing = getattr(thing, part)
     except Exception as error:  # noqa: BLE001  the user's module

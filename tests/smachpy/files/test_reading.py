@@ -405,6 +405,22 @@ def test_a_plan_that_cannot_be_read_is_told_with_its_place(file):
     assert "is no XML" in problem
 
 
+@pytest.mark.parametrize("beside", ["plan", "mission"])
+def test_the_code_of_a_plan_in_another_folder(file, tmp_path, monkeypatch, beside):
+    """A module of this name beside the mission ran in place of the one beside the plan."""
+    monkeypatch.delitem(sys.modules, "robot_of_plan", raising=False)
+    (tmp_path / "plans").mkdir()
+    file("actions: {goto: {run: 'robot_of_plan:goto'}}", "plans/actions.yaml")
+    file("goto_x", "plans/go.plan")
+    file("def goto(ud, place): return True", "robot_of_plan.py")
+    if beside == "plan":
+        file("def goto(ud, place): return True", "plans/robot_of_plan.py")
+    path = file("outcomes: [goal, fail, preempted]\nstates:\n  P: {plan: plans/go.plan}\n")
+    assert load(path).execute() == "goal"
+    found = Path(sys.modules["robot_of_plan"].__file__)
+    assert found.parent.name == ("plans" if beside == "plan" else tmp_path.name)
+
+
 def test_stop_others_names_states_of_the_concurrence(file):
     text = "outcomes: [done, preempted]\nstates:\n  A: {concurrence: {outcomes: [done, preempted], default_outcome: done, stop_others: [LET], states: {LEFT: {state: wait}}}}\n"
     (problem,) = problems_of(file(text))

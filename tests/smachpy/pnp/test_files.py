@@ -89,6 +89,22 @@ def test_a_rule_for_no_action_of_the_plan_is_a_warning(folder, ending):
     assert "Did you mean 'goto'?" in wrong.message
 
 
+def test_the_code_of_another_folder_is_not_run(tmp_path, monkeypatch):
+    """The second plan ran the first one's `goto`."""
+    monkeypatch.delitem(sys.modules, "robot_of_two", raising=False)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "go.plan").write_text("goto_x")
+        (tmp_path / name / "actions.yaml").write_text(
+            "actions:\n  goto: {run: 'robot_of_two:goto'}"
+        )
+        (tmp_path / name / "robot_of_two.py").write_text("def goto(ud, place): pass\n")
+    load_plan(tmp_path / "a" / "go.plan")
+    with pytest.raises(PlanError, match=r"b.actions.yaml:2: .*a.robot_of_two.py already"):
+        load_plan(tmp_path / "b" / "go.plan")
+    assert load_plan(tmp_path / "a" / "go.plan").execute() == "goal"
+
+
 def test_the_picture_is_the_net(folder):
     assert main(["render", "fetch.pnml", "-o", "fetch.svg"]) == 0
     ids = {e.get("id") for e in ET.parse("fetch.svg").iter() if e.get("id")}
