@@ -144,8 +144,9 @@ class Modes(StateMachine):
             self.add(name, Waiting(events), lasts)
             return
         state = _mission(name, mission)
-        if not get_options(state).on_exception:
-            set_options(state, on_exception={Exception: RAISED})
+        own = get_options(state).on_exception  # its own come first, and may be for some errors only
+        if Exception not in own:
+            set_options(state, on_exception={**own, Exception: RAISED})
         ways: dict[str, Any] = {}
         for outcome in state.get_registered_outcomes():
             if outcome == "preempted":  # of the whole machine, which then ends

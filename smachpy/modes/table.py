@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.inputs.expression import Expression, ExpressionError, MissingNameError
 from actionlib_core.inputs.suggest import did_you_mean
+from smachpy.base import log
 from smachpy.exceptions import SmachError
 
 if TYPE_CHECKING:
@@ -48,11 +49,22 @@ class Way:
     when: str = ""
 
     def holds(self, values: Mapping[str, Any]) -> bool:
-        """Return whether the condition holds; one whose key is not there does not."""
+        """Return whether the condition holds; one that cannot be evaluated does not.
+
+        This is logged once, except for a key that is not there.
+        """
         try:
             return not self.when or bool(Expression(self.when)(values))
         except MissingNameError:
             return False
+        except ExpressionError as error:
+            if self not in _told:
+                _told.add(self)
+                log.logwarn(f"Modes: a way to {self.target!r} does not count: {error}")
+            return False
+
+
+_told: set[Way] = set()  # those whose conditions could not be evaluated
 
 
 @dataclass(frozen=True, slots=True)

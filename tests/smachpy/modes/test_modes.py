@@ -163,6 +163,44 @@ def test_an_exception_of_a_mission_does_not_end_the_modes():
     assert leaves(run_of(modes, (1.0, "start"), end=5.0)) == ["idle", "auto/A", "fault"]
 
 
+@pytest.mark.parametrize("own", [ValueError, Exception])
+def test_on_exception_of_a_mission_counts_before_the_event_error(own):
+    """A mission that had `on_exception` for other errors ended all modes."""
+
+    def raising(error):
+        @smachpy.state(["done"])
+        def broken(userdata):
+            raise error("no motor")
+
+        sm = StateMachine(["done", "handled"], on_exception={own: "handled"})
+        sm.add("A", broken)
+        return sm
+
+    for error in (ValueError, KeyError):
+        modes = Modes(
+            ["idle", {"name": "auto", "mission": partial(raising, error)}, "fault", "calm"],
+            [["start", "idle", "auto"], ["error", "auto", "fault"], ["handled", "auto", "calm"]],
+            name="ROBOT",
+        )
+        expected = "calm" if issubclass(error, own) else "fault"
+        assert leaves(run_of(modes, (1.0, "start"), end=5.0)) == ["idle", "auto/A", expected]
+
+
+@pytest.mark.parametrize("level", ["high", None])
+def test_a_condition_that_cannot_be_evaluated_does_not_hold(level):
+    """It ended all modes."""
+    ways = [
+        {"trigger": "go", "source": "a", "dest": "b", "when": "level > 3"},
+        ["next", "a", "m"],
+        {"trigger": "done", "source": "m", "dest": "b", "when": "level > 3"},
+        ["done", "m", "c"],
+    ]
+    states = ["a", "b", "c", {"name": "m", "mission": mission}]
+    modes = Modes(states, ways, userdata={"level": level}, name="ROBOT")
+    run = run_of(modes, (1.0, "go"), (2.0, "go"), (3.0, "next"), end=60.0)
+    assert leaves(run) == ["a", "m/A", "m/B", "m/DOCK", "c"]
+
+
 def test_conditions_of_ways_read_the_userdata():
     ways = [
         {"trigger": "go", "source": "a", "dest": "b", "when": "level > 3"},
