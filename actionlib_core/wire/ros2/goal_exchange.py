@@ -16,7 +16,8 @@ from actionlib_core.wire.ros2.goal_states import ENDED, CancelCode, GoalCode, to
 
 # A server forgets a goal some time after its end (10 s by default). When it answers "unknown" later
 # than this after the goal was sent, the goal may have run and been forgotten, so it is not sent
-# again.
+# again. The same holds once the link was lost: this computer's clock stands still while it sleeps,
+# and a server may keep results for a shorter time.
 SETTLED_S = 5.0
 
 TEXT_REFUSED = "the server refused the goal"
@@ -98,6 +99,7 @@ class GoalExchange:
         "_cancel_refused",
         "_cancel_wanted",
         "_cancelling",
+        "_link_lost",
         "_never_active",
         "_refused",
         "_sendings",
@@ -115,6 +117,7 @@ class GoalExchange:
         self.sent_at = 0.0
         self._attached = attached
         self._sendings = 0
+        self._link_lost = False  # while the goal may have been at the server
         self._refused = False  # a repeated request was refused, which is not settled yet
         self._waits = False  # the last list seen shows it as accepted
         self._never_active = False
@@ -231,7 +234,7 @@ class GoalExchange:
         """Handle the answer that the server does not know the goal."""
         if self.phase is ExchangePhase.TAKEN:  # it knew the goal before
             return Duty.UNKNOWN
-        if now > self.sent_at + SETTLED_S:
+        if self._link_lost or now > self.sent_at + SETTLED_S:
             return Duty.UNSETTLED
         if self._refused:
             return Duty.REFUSED
@@ -286,8 +289,9 @@ class GoalExchange:
     def on_link_lost(self) -> None:
         """Handle the loss of the server: open requests will not be answered."""
         self.asking = self._cancelling = False
-        if self.phase is ExchangePhase.SENT:
+        if self.phase in {ExchangePhase.SENT, ExchangePhase.UNSURE}:
             self.phase = ExchangePhase.UNSURE
+            self._link_lost = True
         elif self.phase is ExchangePhase.QUEUED:
             self.phase = ExchangePhase.HERE
 

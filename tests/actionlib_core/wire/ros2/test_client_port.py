@@ -453,6 +453,20 @@ def test_goal_whose_answer_a_lost_link_took_is_settled_not_sent_again(world):
     assert server.sent == [uuid]
 
 
+def test_goal_that_ran_and_was_forgotten_while_the_link_was_lost_does_not_run_again(world):
+    server = world.server()
+    server.publish_states()  # a probe asks for this list
+    client = world.client(world.node(world.link, probe=0.5), server_lost_timeout=300.0)
+    server.on_goal = lambda query, uuid: None
+    handle = client.send_goal(Fibonacci.Goal(order=1))
+    server.wait(lambda: server.sent)
+    world.link.cut(3.0)
+    assert handle.wait(60.0)
+    assert handle.get_goal_status() == Status.LOST
+    assert "may or may not have run" in handle.get_goal_status_text()
+    assert len(server.sent) == 1
+
+
 def test_doubt_that_outlasts_what_a_server_remembers_ends_as_lost(world):
     server, client = world.server(), world.client(server_lost_timeout=300.0)
     server.on_goal = lambda query, uuid: None

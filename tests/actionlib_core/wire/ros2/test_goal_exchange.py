@@ -81,6 +81,16 @@ def test_doubt_of_long_ago_is_not_settled_by_sending_again():
     assert goal.on_result(0, SETTLED_S + 0.1) == Duty.UNSETTLED
 
 
+@pytest.mark.parametrize("unanswered", [False, True])
+def test_doubt_over_a_lost_link_is_not_settled_by_sending_again(unanswered):
+    goal = sent()
+    if unanswered:
+        goal.on_unanswered()
+    goal.on_link_lost()  # while the computer slept, the server may have run and forgotten the goal
+    assert goal.want() == Duty.ASK
+    assert goal.on_result(0, 1.0) == Duty.UNSETTLED
+
+
 def test_unanswered_question_for_the_result_is_asked_again_later():
     goal = sent()
     goal.on_answer(accepted=True)
@@ -230,12 +240,13 @@ EVENTS = {
     "canceling": lambda goal, _: goal.on_cancel_answer(0, listed=True),
     "link lost": lambda goal, _: goal.on_link_lost() or Duty.NOTHING,
 }
+DOUBTFUL = {ExchangePhase.SENT, ExchangePhase.UNSURE}
 OVER = Duty.END | Duty.REFUSED | Duty.RECALLED | Duty.UNKNOWN | Duty.UNSETTLED
 
 
 @given(st.lists(st.sampled_from(sorted(EVENTS)), max_size=40))
-def test_goal_is_sent_again_only_after_a_server_has_said_that_it_does_not_know_it(events):
-    goal, asked, may_send = GoalExchange(), 0, True
+def test_goal_is_sent_again_only_if_its_server_does_not_know_it_and_was_never_lost(events):
+    goal, asked, may_send, in_doubt = GoalExchange(), 0, True, False
     for now, event in enumerate(events):
         awaited = {
             "accepted": ExchangePhase.SENT,
@@ -247,7 +258,8 @@ def test_goal_is_sent_again_only_after_a_server_has_said_that_it_does_not_know_i
         if event in {"unknown", "ended", "no result"} and not goal.asking:
             continue
         if event == "unknown" and goal.phase is ExchangePhase.UNSURE:
-            may_send = True
+            may_send = not in_doubt
+        in_doubt |= event == "link lost" and goal.phase in DOUBTFUL
         step = EVENTS[event](goal, now / 10)
         asked += bool(step & Duty.ASK)
         if step & OVER:
