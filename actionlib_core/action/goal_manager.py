@@ -50,6 +50,8 @@ ACK_AT = 64  # this number of waiting acknowledgements is sent at once
 REPEATED_AT_ONCE = 100  # goals for which something is sent again in one tick
 LOOKS = 256  # planned looks at goals that may belong to ended ones
 REMEMBERED = 1024  # ids of ended goals whose result may arrive again
+LATE_S = 2.0  # a timer that is so late means that this process stood still
+UNREAD_S = 1.0  # what servers have sent meanwhile is read within this time
 CALLBACKS_S = 1.0  # `wait` gives callbacks this time to return after the goal's end
 
 STOPPED = "the action client was stopped"
@@ -823,6 +825,8 @@ class GoalManager:
     def _on_timer(self) -> None:
         now = self.clock.now()
         with self.lock:
+            if now > self._due + LATE_S:
+                self._servers.wait_longer(now + UNREAD_S)
             self._timer, self._due = None, math.inf
             if self._closed:
                 return

@@ -479,6 +479,11 @@ class KnownServers:
             del self.foreign[session]
         return silent
 
+    def wait_longer(self, until: float) -> None:
+        """Give servers time to be heard until then: what they have sent is not read yet."""
+        self.away = {server: max(until, end) for server, end in self.away.items()}
+        self.foreign = {session: max(until, end) for session, end in self.foreign.items()}
+
     @property
     def is_there(self) -> bool:
         """Whether the action has a server, with or without a token."""

@@ -64,6 +64,10 @@ log = logging.getLogger("actionlib_core")
 
 OVERTAKEN_S = 0.05  # longest wait for feedback that was sent before a result
 STATUS_S = 0.005  # of the status lists within this time only the last is passed on
+# A bridge that looks so long after the last time stood still, or its master did. What servers have
+# sent meanwhile is read within the second time.
+STOPPED_S = 3.0
+UNREAD_S = 1.0
 NEXT_S = 2.0  # a server here that has left may be replaced by another within this time
 # Results are acknowledged after this time, since our servers then stop listing the goal, and a
 # client in ROS 1 counts a goal that is not listed as lost.
@@ -197,6 +201,8 @@ class ServerInRos:
         self._shown: _ShownServer | None = None
         self._silent = ""  # the node that was hidden because it sends no status lists
         self._last_status = 0.0
+        self._looked_at = self._clock.now()
+        self._spared = False  # since the last status
         self._closed = False
         goal_type = f"{type_name}Goal" if type_name else ""
         self._goals = self._advertise("goal", goal_type, "")
@@ -301,7 +307,12 @@ class ServerInRos:
         """Hide a server that sends no status lists: it hangs, and its clients would wait for it."""
         with self._lock:
             shown, now = self._shown, self._clock.now()
+            stopped = now > self._looked_at + STOPPED_S
+            self._looked_at = now
             if shown is None or now < self._last_status + self._status_timeout:
+                return
+            if stopped and not self._spared:  # but not for ever while the master is slow
+                self._last_status, self._spared = now + UNREAD_S - self._status_timeout, True
                 return
             self._silent = shown.ros_node
             self._hide()
@@ -323,7 +334,7 @@ class ServerInRos:
             if shown is None or link not in shown.links:
                 return
             if word == "status":
-                self._last_status = self._clock.now()
+                self._last_status, self._spared = self._clock.now(), False
         # Each topic has its own connection and thread: let feedback that was sent before the result
         # go first.
         if word == "result":

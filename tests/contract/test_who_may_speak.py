@@ -24,6 +24,7 @@ from actionlib_core.interfaces.actionlib.msg import (
 from actionlib_core.interfaces.actionlib.msg import TestGoal as Goal
 from actionlib_core.interfaces.actionlib.msg import TestResult as Result
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_core.node import Node
 from actionlib_core.time import Time
 from actionlib_core.transport.tokens import Kind, token_key
 from actionlib_core.wire import actions
@@ -216,6 +217,49 @@ def test_goal_of_a_server_without_a_token_is_lost_when_its_lists_stop(world, tim
     assert handle.get_goal_status() == GoalStatus.LOST
     assert "no status list" in handle.get_goal_status_text()
     assert not client.wait_for_server(0.1)
+
+
+class Stopped:
+    """The clock of a process that stands still until a time (SIGSTOP): its timers run after that."""
+
+    def __init__(self, clock):
+        self._clock = clock
+        self.until = 0.0
+
+    def __getattr__(self, name):
+        return getattr(self._clock, name)
+
+    def call_later(self, delay, step):
+        def run():
+            left = self.until - self._clock.now()
+            if left > 0:
+                self._clock.call_later(left, step)
+            else:
+                step()
+
+        return self._clock.call_later(delay, run)
+
+
+@pytest.mark.parametrize("heard", [True, False])
+def test_process_that_stood_still_loses_a_server_only_if_it_is_not_heard_afterwards(world, heard):
+    clock = Stopped(world.clock)
+    with Node("stopped", transport=world.network.session(), clock=clock) as node:
+        client = ActionClient("do", Action, node=node)
+        bridge = Bridge(world)
+        assert client.wait_for_server(LONG_S)
+        handle = client.send_goal(Goal(1))
+        world.clock.sleep(1.0)
+        bridge.alive = False  # what it sends is not read meanwhile
+        clock.until = world.clock.now() + LONG_S
+        world.clock.sleep(LONG_S + 0.5)
+        if heard:
+            bridge.alive = True
+            bridge.beat()
+        world.clock.sleep(10.0)
+        assert handle.get_goal_status() == (GoalStatus.ACTIVE if heard else GoalStatus.LOST)
+        bridge.alive = False
+        assert handle.wait(LONG_S)
+        node.transport.close()
 
 
 def test_goal_of_a_bridge_does_not_run_at_a_server_that_appears(world):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable
 
 WAIT_S = 2.0  # longest wait for the answer to a probe
+STOPPED = 2.0  # times the wait: a process that looks so late was stopped, and what came is unread
 
 
 class LinkProbe:
@@ -51,12 +52,14 @@ class LinkProbe:
         self.last_received = clock.now()
         self._clock = clock
         self._every = every
+        self._wait = min(every, WAIT_S)
         self._ask = ask
         self._wanted = wanted
         self._on_silent = on_silent
         self._lock = threading.Lock()
         self._timer: Timer | None = None
         self._asked: Closable | None = None
+        self._asked_at = 0.0
         self._closed = False
 
     def note_received(self) -> None:
@@ -91,7 +94,8 @@ class LinkProbe:
         elif left > 0:
             self._later(left, self._look)
         else:
-            self._later(min(self._every, WAIT_S), self._judge)
+            self._asked_at = self._clock.now()
+            self._later(self._wait, self._judge)
             try:
                 self._keep(self._ask())
             except TransportError:  # the session is closed
@@ -99,11 +103,15 @@ class LinkProbe:
 
     def _judge(self) -> None:
         self._timer = None
-        quiet = self._clock.now() - self.last_received
-        if quiet < self._every:
+        now = self._clock.now()
+        if self.last_received >= self._asked_at:
             self._keep(None)
+        elif now - self._asked_at > STOPPED * self._wait:
+            self._look()  # and so probe once more
+            return
         elif self._wanted():
-            self._on_silent(quiet)  # the probe stays open: a late answer counts as well
+            # The probe stays open: a late answer counts as well.
+            self._on_silent(now - self.last_received)
         self.watch()
 
     def _keep(self, asked: Closable | None) -> None:

@@ -23,13 +23,14 @@ from actionlib_core.interfaces.actionlib.msg import (
 )
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from actionlib_core.ros1 import answers, frames
-from actionlib_core.ros1.actions import GOAL_ID, ServerHere, _ShownServer, action_type
+from actionlib_core.ros1.actions import GOAL_ID, ServerHere, ServerInRos, _ShownServer, action_type
 from actionlib_core.ros1.answers import Names, SystemState
 from actionlib_core.ros1.goals import Admission, GoalsOfClients, GoalsOfServer
 from actionlib_core.ros1.node import check_master
 from actionlib_core.ros1.plan import BridgePlan, Wanted, make_plan, without
 from actionlib_core.ros1.publishers import Publishers
 from actionlib_core.ros1.sides import Sides, Typed, type_of
+from actionlib_core.time import Duration
 from actionlib_core.transport.tokens import Endpoint, Kind
 from tests.two_nodes import TwoNodes
 
@@ -404,16 +405,20 @@ def test_other_bridges_do_not_count():
     assert without(state, "/smachpy_bridge_") == SystemState({"/odom": ["/base"]})
 
 
+def types_of_test():
+    """The types of the five topics of actionlib/TestAction."""
+    kinds = {"status": GoalStatusArray, "cancel": GoalID}
+    for word in ("goal", "feedback", "result"):
+        kinds[word] = get_message(f"actionlib/TestAction{word.title()}")
+    return {word: Typed(kind._type, kind._md5sum) for word, kind in kinds.items()}
+
+
 @pytest.mark.parametrize("text", ["Größe".encode("latin-1"), "Größe".encode()[:3]])
 def test_a_goal_whose_texts_are_not_utf_8_is_taken_once_and_ends_as_its_server_says(text):
     def status(goal_id, number):
         goal = GoalID(id=goal_id)
         return GoalStatus(goal_id=goal, status=number, text=text.decode("utf-8", "surrogateescape"))
 
-    types = {"status": Typed(GoalStatusArray._type, GoalStatusArray._md5sum)}
-    for word in ("goal", "feedback", "result", "cancel"):
-        kind = GoalID if word == "cancel" else get_message(f"actionlib/TestAction{word.title()}")
-        types[word] = Typed(kind._type, kind._md5sum)
     typed = Typed(TestAction._type, TestAction._md5sum)
     sent = []
     with TwoNodes() as world:
@@ -422,7 +427,7 @@ def test_a_goal_whose_texts_are_not_utf_8_is_taken_once_and_ends_as_its_server_s
             Sides(world.robot, Mock(), ""),
             "/do",
             typed,
-            types,
+            types_of_test(),
             "/old",
             frozenset(),
             (goals, Mock()),
@@ -443,3 +448,46 @@ def test_a_goal_whose_texts_are_not_utf_8_is_taken_once_and_ends_as_its_server_s
         assert (client.get_state(), client.get_result()) == (Status.SUCCEEDED, TestResult(7))
         assert client.get_goal_status_text().encode("utf-8", "surrogateescape") == text
     assert len(sent) == 1
+
+
+@pytest.mark.parametrize("heard", [True, False])
+def test_bridge_that_stood_still_hides_a_server_only_if_it_is_not_heard_afterwards(heard):
+    with TwoNodes() as world:
+        shown = ServerInRos(
+            Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction"
+        )
+        for word, typed in types_of_test().items():
+            shown.connect("/old", word, f"link for {word}", typed)
+        client = SimpleActionClient("do", TestAction, node=world.mission)
+        assert client.wait_for_server()
+
+        def run(seconds, *, status):
+            for _ in range(seconds):
+                world.clock.sleep(1.0)
+                if status:
+                    shown.take("/old", "status", "link for status", GoalStatusArray().to_bytes())
+                shown.check_silence()
+
+        run(10, status=True)
+        assert client.wait_for_server(Duration(0.1))
+        world.clock.sleep(60.0)  # SIGSTOP, a debugger
+        shown.check_silence()
+        run(10, status=heard)
+        assert client.wait_for_server(Duration(0.1)) is heard
+        run(10, status=False)
+        assert not client.wait_for_server(Duration(0.1))
+
+
+def test_server_is_hidden_though_each_look_is_late():
+    with TwoNodes() as world:
+        shown = ServerInRos(
+            Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction"
+        )
+        for word, typed in types_of_test().items():
+            shown.connect("/old", word, f"link for {word}", typed)
+        client = SimpleActionClient("do", TestAction, node=world.mission)
+        assert client.wait_for_server()
+        for _ in range(3):  # the master hangs
+            world.clock.sleep(20.0)
+            shown.check_silence()
+        assert not client.wait_for_server(Duration(0.1))

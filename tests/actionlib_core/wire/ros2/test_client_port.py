@@ -575,6 +575,37 @@ def test_silent_server_that_is_heard_again_gets_its_goals_back(world):
     assert server.sent == [uuid]
 
 
+class StoppedOnce:
+    """The clock of a process that stands still for 60 s after its first probe: SIGSTOP, a debugger."""
+
+    def __init__(self, clock):
+        self.now = clock.now
+        self._clock = clock
+        self._delays = iter((0.0, 60.0))
+
+    def call_later(self, delay, step):
+        return self._clock.call_later(max(delay, next(self._delays, 0.0)), step)
+
+
+@pytest.mark.parametrize("answered", [{1}, {2}, set()])
+def test_process_that_stood_still_after_a_probe_judges_by_the_next_one(clock, answered):
+    asked, silent = [], []
+
+    def ask():
+        asked.append(clock.now())
+        if len(asked) in answered:
+            probe.note_received()
+        return contextlib.ExitStack()
+
+    probe = LinkProbe(StoppedOnce(clock), 5.0, ask, lambda: True, silent.append)
+    probe.watch()
+    clock.sleep(68.0)
+    probe.close()
+    second = 70.0 if 1 in answered else 65.0
+    assert asked == [pytest.approx(at) for at in (5.0, second) if at < 68.0]
+    assert silent == ([] if answered else [pytest.approx(67.0)])
+
+
 def test_look_that_rounding_makes_come_too_early_lets_time_pass(clock):
     asked = []
 
