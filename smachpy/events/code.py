@@ -76,9 +76,12 @@ def own_files() -> dict[str, Path]:
 @cache  # each recording asks it of all modules
 def _is_installed(file: str) -> bool:
     """Whether a module's file is one of Python or of an installed package."""
-    path = Path(file).resolve()
-    apart = {*sysconfig.get_paths().values(), sys.base_prefix, sys.prefix}
-    return any(path.is_relative_to(one) for one in apart)
+    return not {*Path(file).resolve().parents}.isdisjoint(_folders_of_installed())
+
+
+@cache
+def _folders_of_installed() -> frozenset[Path]:
+    return frozenset(map(Path, {*sysconfig.get_paths().values(), sys.base_prefix, sys.prefix}))
 
 
 def own_constants(files: Mapping[str, Path]) -> dict[str, str]:
