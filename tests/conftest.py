@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -17,7 +18,7 @@ from hypothesis import HealthCheck, settings
 from actionlib_core.clock import VirtualClock, use_clock
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
 # Test runs on one machine, and the workers of one run, do not find each other's processes.
 if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
@@ -62,6 +63,17 @@ def _children() -> set[str]:
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
             children.update((task / "children").read_text().split())
     return children
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Let no garbage collection look at the tests and all modules that they import: they stay."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(autouse=True)
