@@ -63,9 +63,8 @@ def own_files() -> dict[str, Path]:
         file = getattr(module, "__file__", None)
         if not isinstance(file, str) or name.partition(".")[0] in _LIBRARY:
             continue
-        path = Path(file)
-        if path.suffix == ".py" and not _is_installed(file) and path.is_file():
-            path = path.resolve()
+        path = _own_file(file, None if file.startswith("/") else Path.cwd())
+        if path is not None and path.is_file():
             # A file that is loaded again has a number behind its name.
             first, _, number = name.rpartition("_")
             again = first == path.stem and number.isascii() and number.isdigit()
@@ -74,9 +73,11 @@ def own_files() -> dict[str, Path]:
 
 
 @cache  # each recording asks it of all modules
-def _is_installed(file: str) -> bool:
-    """Whether a module's file is one of Python or of an installed package."""
-    return not {*Path(file).resolve().parents}.isdisjoint(_folders_of_installed())
+def _own_file(file: str, folder: Path | None) -> Path | None:
+    """Return a module's file, resolved; None for one of Python or of an installed package."""
+    path = (folder or Path()).joinpath(file).resolve()
+    is_own = file.endswith(".py") and _folders_of_installed().isdisjoint(path.parents)
+    return path if is_own else None
 
 
 @cache
