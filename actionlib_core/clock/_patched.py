@@ -406,7 +406,7 @@ def _replace() -> None:
     # All modules, as `from time import sleep` has put the function into a module's own globals.
     for name, module in list(sys.modules.items()):
         names = getattr(module, "__dict__", None)
-        if type(names) is dict and not _is_in(name, REAL_TIME):
+        if type(names) is dict:
             for key, real in _search(name, names):
                 if names.get(key) is real:
                     _places.append((names, key, real, _FAKES[id(real)]))
@@ -421,7 +421,8 @@ def _search(name: str, names: dict[str, Any]) -> list[tuple[str, Any]]:
     """Return the names to replace in a module; the result is kept, as modules rarely change."""
     key = (id(names), len(names))
     if _seen.get(name) != key:
-        _found[name] = [(n, value) for n, value in list(names.items()) if id(value) in _FAKES]
+        here = () if _is_in(name, REAL_TIME) else list(names.items())
+        _found[name] = [(n, value) for n, value in here if id(value) in _FAKES]
         _seen[name] = key
     return _found[name]
 
