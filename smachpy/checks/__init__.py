@@ -97,8 +97,7 @@ def check(
         moments = graph.build(subject)
         problems += structure.find(subject, moments)
         problems += userdata.find(subject, moments)
-        found = (properties_of_runs.find(subject, moments, one) for one in wanted)
-        problems += [problem for problem in found if problem is not None]
+        problems += properties_of_runs.find(subject, moments, wanted)
     ignores = tuple(ignores)
     kept: list[Problem] = []
     ignored: list[tuple[Problem, str]] = []

@@ -11,7 +11,7 @@ from smachpy.checks.model import Problem
 from smachpy.exceptions import SmachError, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from smachpy.checks.graph import Graph, GraphNode
     from smachpy.checks.model import Subject
@@ -97,16 +97,31 @@ def parse(text: str) -> Property:
     return Property(kind, names)
 
 
-def find(subject: Subject, graph: Graph, wanted: Property) -> Problem | None:
-    """Return a problem if a property does not hold.
+def find(subject: Subject, graph: Graph, wanted: Iterable[Property]) -> Iterator[Problem]:
+    """Yield a problem for each property that does not hold.
 
     Raises:
-        PropertyError: it names something that does not exist.
+        PropertyError: one names something that does not exist.
     """
+    meant: dict[str, list[str]] = {}  # the paths that each path, and each end of one, stands for
+    for record in subject.root.walk():
+        end = record.path
+        while end:
+            meant.setdefault(end, []).append(record.path)
+            end = end.partition("/")[2]
+    for each in wanted:
+        problem = _find(subject, graph, each, meant)
+        if problem is not None:
+            yield problem
+
+
+def _find(
+    subject: Subject, graph: Graph, wanted: Property, meant: Mapping[str, list[str]]
+) -> Problem | None:
     if wanted.kind == "always_reaches":
         found = _always_reaches(subject, graph, wanted.names)
     else:
-        paths = [_resolve(subject, name) for name in wanted.names]
+        paths = [_resolve(subject, name, meant) for name in wanted.names]
         search: dict[str, Callable[..., Broken]] = {
             "never": _never,
             "before": _before,
@@ -120,14 +135,14 @@ def find(subject: Subject, graph: Graph, wanted: Property) -> Problem | None:
     return Problem("property", "error", subject.root.path, text, moments=moments(found[1]))
 
 
-def _resolve(subject: Subject, name: str) -> str:
+def _resolve(subject: Subject, name: str, meant: Mapping[str, list[str]]) -> str:
     """Return the path of the state that matches `name`."""
-    paths = [record.path for record in subject.root.walk()]
-    if name in paths:
+    if name.startswith("/") and name in meant:
         return name
-    found = [path for path in paths if path.endswith("/" + name.strip("/"))]
+    found = meant.get(name.strip("/"), [])
     if len(found) == 1:
         return found[0]
+    paths = [record.path for record in subject.root.walk()]
     what = f"{len(found)} states: {found}" if found else "no state"
     near = did_you_mean(name, [*paths, *(p.rpartition("/")[2] for p in paths)])
     raise PropertyError(f"property: state {name!r} means {what}; expected one of {paths}.{near}")

@@ -10,7 +10,8 @@ import pytest
 
 import smachpy
 from smachpy import CBState, Concurrence, StateMachine
-from smachpy.checks import graph
+from smachpy.checks import graph, never
+from smachpy.events.introspection import StateRecord
 from smachpy.events.run_state import innermost, paths_above
 
 if TYPE_CHECKING:
@@ -123,6 +124,27 @@ def test_a_further_child_of_a_concurrence_is_no_dearer_than_the_first_ones() -> 
 def test_properties_grow_with_the_machine(what: str) -> None:
     assert slope(chain, lambda machine: smachpy.check(machine, properties=[what])) < 1.2
     assert slope(ring, lambda machine: smachpy.check(machine, properties=[what])) < 1.2
+
+
+def test_a_property_for_each_state_takes_no_walk_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    machine = chain(20)
+    walks = [0]
+    real = StateRecord.walk
+
+    def count(record: StateRecord) -> Any:
+        walks[0] += record.path == "/BIG"
+        return real(record)
+
+    def walks_of(labels: list[str]) -> int:
+        walks[0] = 0
+        report = smachpy.check(machine, properties=[never(label) for label in labels])
+        assert sum(problem.rule == "property" for problem in report.problems) == len(labels)
+        return walks[0]
+
+    monkeypatch.setattr(StateRecord, "walk", count)
+    assert walks_of([*machine.get_children()]) == walks_of(["S2"])
 
 
 def test_a_walk_over_nested_machines_visits_each_once() -> None:
