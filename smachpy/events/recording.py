@@ -787,11 +787,11 @@ def _read_header(path: Path, line: str) -> Recording:
             base = read_facts(base)
     except ValueError as error:
         is_ours = isinstance(data, dict) and data.get("format") == FORMAT
-        got = "a wrong header" if is_ours else "no header" if line else "an empty file"
+        got = f"{'a wrong' if is_ours else 'no'} header ({error})" if line else "an empty file"
         cut = ", which is cut off" if line and not line.endswith("\n") else ""
         raise RecordingError(
             path,
-            f"line 1{cut}: got {got} ({error}); expected a file of `smachpy run --record`.",
+            f"line 1{cut}: got {got}; expected a file of `smachpy run --record`.",
         ) from error
     stamp_ns = header["stamp_ns"]
     made_ns = header.get("made_ns", stamp_ns)  # older files have none
@@ -854,7 +854,8 @@ def find_recordings(places: Iterable[str | Path]) -> list[Path]:
         elif place.is_file():
             found.append(place)
         else:
-            raise RecordingError(place, "no such file or folder; expected recorded runs.")
+            got = "got a device or a pipe" if place.exists() else "no such file or folder"
+            raise RecordingError(place, f"{got}; expected recorded runs.")
     return found
 
 

@@ -348,7 +348,7 @@ WRONG = [
     (lambda path: changed_origin(path, mission={"seed": "x"}), "$.origin.mission.seed: got 'x'"),
     (lambda path: changed_origin(path, namespace="a b//"), "line 1: origin: invalid namespace"),
     (lambda path: cut(path, 300), "line 1, which is cut off: got no header"),
-    (lambda path: cut(path, 0), "line 1: got an empty file"),
+    (lambda path: cut(path, 0), "line 1: got an empty file; expected a file of"),
     (lambda path: path.write_bytes(bytes(range(256)) * 9), "line 1: got no header"),
     (
         lambda path: path.write_text(path.read_text().replace('"/ROUND', '"/OTHER')),
@@ -370,6 +370,22 @@ def test_what_is_wrong_with_a_recording_is_one_line(night, capsys, harm, said):
     assert len(lines) == 1
     assert said in lines[0]
     assert lines[0].count(str(path)) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["/dev/null"], "recording '/dev/null': got a device or a pipe; expected recorded runs."),
+        (["FOLDER"], "FOLDER: got no recordings; expected *.jsonl files."),
+        (["/dev/null", "-o", "test_x.py"], "recording '/dev/null': line 1: got an empty file;"),
+        (["FOLDER", "-o", "test_x.py"], "-o: got the folder 'FOLDER'; expected one recording."),
+    ],
+)
+def test_a_place_that_is_no_recording_is_told_as_what_it_is(words, said, tmp_path, capsys):
+    folder = str(tmp_path)
+    words = [word.replace("FOLDER", folder) for word in words]
+    assert main(["runs", "reproduce", *words]) == 2
+    assert said.replace("FOLDER", folder) in capsys.readouterr().err
 
 
 def test_a_recording_of_another_computer_says_what_is_another_there(night, tmp_path, capsys):

@@ -96,8 +96,10 @@ def _write(args: argparse.Namespace) -> int:
     where = "smachpy runs reproduce: -o"
     if args.record is not None:
         raise UsageError("smachpy runs reproduce: --record: got it with -o; expected one.")
-    if len(args.places) != 1 or Path(args.places[0]).is_dir():
-        raise UsageError(f"{where}: got {len(args.places)} places; expected one recording.")
+    is_folder = len(args.places) == 1 and Path(args.places[0]).is_dir()
+    if len(args.places) != 1 or is_folder:
+        got = f"the folder {args.places[0]!r}" if is_folder else f"{len(args.places)} places"
+        raise UsageError(f"{where}: got {got}; expected one recording.")
     if args.output.suffix != ".py":
         raise UsageError(f"{where} {str(args.output)!r}: expected a name that ends with .py.")
     with quiet():
