@@ -29,10 +29,12 @@ class KillingStore:
         self.kill_at = 0
         self.written = False
         self.dead = False
+        self.fence = 0
 
     def arm(self, kill_at: int, *, written: bool) -> None:
         """Begin a new life, that ends at write number `kill_at`; 0: it does not."""
         self.writes, self.kill_at, self.written, self.dead = 0, kill_at, written, False
+        self.fence += 1
 
     def create(self, row: MissionRow) -> None:
         self.rows[row.id] = row
@@ -55,7 +57,8 @@ class KillingStore:
     def claim(self, id: str, runner: str, *, seconds: float, reserved: Lease | None) -> Lease:
         del seconds, reserved
         self._set(id, status=RUNNING)
-        return Lease(id, 1, runner)
+        self.fence += 1
+        return Lease(id, self.fence, runner)
 
     def renew(self, lease: Lease, *, seconds: float, beat_ns: int | None = None) -> bool:
         del lease, seconds, beat_ns
@@ -67,7 +70,8 @@ class KillingStore:
     def append(
         self, lease, entries, *, snapshot=None, status=None, outcome=None, blobs=(), **_
     ) -> None:
-        if self.dead:
+        # The threads of an earlier life may still run: of a killed process nothing more comes.
+        if self.dead or lease.fence != self.fence:
             raise Kill
         self.writes += 1
         self.dead = self.writes == self.kill_at
