@@ -242,7 +242,9 @@ def _text_of(path: Path) -> str:
 
 
 def _is_package(folder: Path) -> bool:
-    return any(os.path.isdir(folder / kind) for kind in KINDS)  # noqa: PTH112  as in `find`
+    place = str(folder)
+    # Nearly all that is asked for is no folder at all. As in `find`, any name may be asked for.
+    return os.path.isdir(place) and any(os.path.isdir(f"{place}/{kind}") for kind in KINDS)  # noqa: PTH112
 
 
 def _folders_of(root: Path, package: str) -> list[Path]:
