@@ -147,9 +147,9 @@ def own_modules(tmp_path, monkeypatch):
 
 
 def forget_modules(folder):
+    inside = os.path.join(folder, "")
     for name, module in list(sys.modules.items()):
-        file = getattr(module, "__file__", None)
-        if file and folder in Path(file).parents:
+        if str(getattr(module, "__file__", None)).startswith(inside):
             del sys.modules[name]
 
 
