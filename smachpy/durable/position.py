@@ -11,7 +11,8 @@ computer does not change it. The other keys are needed to resume:
     CleanedUp          the clean-up at `path` after an exception is over, which is raised now
     Left               a visit has ended with `outcome`; `next`: path of the child that follows;
                        `stopped`: path of a machine in it, or of itself -> label of the child in
-                       which it was asked to stop; `served`: it had serviced the request to stop,
+                       which it was asked to stop; `goes_on`: the same, of machines whose next run
+                       begins there, or ""; `served`: it had serviced the request to stop,
                        which its container is rid of
     Retried            attempt `attempt` has ended; the next begins at `at_ns`
     GoalSent, GoalTaken, GoalDone    a goal is about to be sent, is at a server, has ended
@@ -19,11 +20,13 @@ computer does not change it. The other keys are needed to resume:
     Once               a call has returned `value` for `key`
     Fired              `transitions` of the plan at `path` have fired: its tokens are in `marking`,
                        the actions at the paths `ends` must stop, those at `begins` begin
-    Noted              nothing but changes, see below
+    Noted              nothing but changes, see below; or, with `stopped` and `goes_on`, an operator
+                       has chosen what follows the machine that has ended there
     PreemptRequested   `source`, `by` and `why` asked the container at `path` to stop; if `passed`,
                        it has got the request from above, or from its own timeout. With `override`
                        an operator asked the child there; it is None, or the outcome, the label that
-                       comes next, and whether that holds only if the child stops
+                       comes next, and whether that holds only if the child stops; `goes_on` as
+                       above: an event of modes has left the child there
     Recalled           the state at `path` withdraws the requests `origins` that it has got
     Halted             an operator holds a state in the container at `path`: its timeouts stop
     WentOn             they go on
@@ -127,6 +130,7 @@ class _Data(TypedDict):
     conditions: NotRequired[dict[str, _Condition]]
     raised: NotRequired[dict[str, _Raised]]
     stopped: NotRequired[dict[str, str]]
+    goes_on: NotRequired[dict[str, str]]
     preempts: list[_Preempt]
     started_ns: Stamp
     last_ns: Stamp
@@ -135,6 +139,31 @@ class _Data(TypedDict):
     emergency: NotRequired[bool]
     finished: bool
     outcome: str | None
+
+
+def _moved_places(known: Mapping[str, str], new: Callable[[str], str]) -> dict[str, str]:
+    """Return path -> label of a child with other paths; a label moves as its path does."""
+    return {
+        new(path): label and new(f"{path}/{label}").rpartition("/")[2]
+        for path, label in known.items()
+    }
+
+
+def _moved_visits(
+    known: Mapping[str, dict[str, Any]], new: Callable[[str], str]
+) -> dict[str, dict[str, Any]]:
+    """Return visits with other paths."""
+    visits = {new(path): {**visit, "in": new(visit["in"])} for path, visit in known.items()}
+    # The target of an operator's jump is a label, not a path: look it up beside the child.
+    for path, visit in known.items():
+        outcome, label, *more = (visit.get("asked") or {}).get("override") or (None, None)
+        if label is not None:
+            label = new(f"{visit['in']}/{label}").rpartition("/")[2]
+            asked = {**visit["asked"], "override": [outcome, label, *more]}
+            if "goes_on" in asked:
+                asked["goes_on"] = _moved_places(asked["goes_on"], new)
+            visits[new(path)]["asked"] = asked
+    return visits
 
 
 class Position:
@@ -151,9 +180,10 @@ class Position:
                 goal, or None: action, id, sent_ns, taken_ns, begun_ns, status, text, result,
                 preempted (it ended after its state was asked to stop) and stopped (the end of a
                 process has cancelled it); asked, if an operator asked it to stop: source, by, why
-                and override. A container may also have requests, triples of source, by and why that
-                asked it to stop, and served, those after which it began another child: a served
-                request concerns no later child. recalled: the requests that it has withdrawn.
+                and override, and maybe goes_on as below, for the time after its end. A container
+                may also have requests, triples of source, by and why that asked it to stop, and
+                served, those after which it began another child: a served request concerns no
+                later child. recalled: the requests that it has withdrawn.
                 met: it has met others at a barrier.
                 halted_ns: since when its timeouts stand still, if they do.
                 The visit of a clean-up has ending: the fields of the `Ending` after which it runs.
@@ -166,6 +196,8 @@ class Position:
                 run goes on with the state that had raised
             stopped: path of a machine that was asked to stop and has ended -> label of the child in
                 which it was
+            goes_on: path of a machine that an event of modes has left, or of one below it -> label
+                of the child in which its next run begins, or ""
             userdata: path of a container -> key -> encoded value
             preempts: path, source, by and why of the newest requests; on_visit: it is also in the
                 visit of the container (not in journals of old versions)
@@ -298,36 +330,23 @@ class Position:
                     return names[old] + path[len(old) :]
             return path
 
-        def moved_visits(known: Mapping[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-            visits = {new(path): {**visit, "in": new(visit["in"])} for path, visit in known.items()}
-            # The target of an operator's jump is a label, not a path: look it up beside the child.
-            for path, visit in known.items():
-                override = (visit.get("asked") or {}).get("override") or (None, None)
-                outcome, label, *more = override
-                if label is not None:
-                    label = new(f"{visit['in']}/{label}").rpartition("/")[2]
-                    asked = {**visit["asked"], "override": [outcome, label, *more]}
-                    visits[new(path)]["asked"] = asked
-            return visits
-
         preempts = [{**one, "path": new(one["path"])} for one in self.data["preempts"]]
         moved = {
             facts: {new(path): values for path, values in getattr(self, facts).items()}
             for facts in ("userdata", "markings", "conditions")
         }
-        moved["stopped"] = {
-            new(path): new(f"{path}/{label}").rpartition("/")[2]
-            for path, label in self.data.get("stopped", {}).items()
-        }
+        for kind in ("stopped", "goes_on"):
+            if kind in self.data:
+                moved[kind] = _moved_places(self.data[kind], new)
         if self._raised:
             moved["raised"] = {
                 new(path): {
-                    "visits": moved_visits(kept["visits"]),
+                    "visits": _moved_visits(kept["visits"], new),
                     "markings": {new(at): ids for at, ids in kept["markings"].items()},
                 }
                 for path, kept in self._raised.items()
             }
-        visits = moved_visits(self.visits)
+        visits = _moved_visits(self.visits, new)
         return Position({**self.data, "visits": visits, "preempts": preempts, **moved})
 
     # -- one function for each kind ------------------------------------------------------------
@@ -431,10 +450,7 @@ class Position:
         visit = self.visits[path]
         self._keep_end(path, visit, entry)
         self._end_below(path)
-        stopped = self.data.setdefault("stopped", {})
-        for each in [each for each in stopped if f"{each}/".startswith(f"{path}/")]:
-            del stopped[each]
-        stopped.update(entry.get("stopped", {}))
+        self._keep_places(entry)
         if entry.get("served"):
             self._serve(visit["in"])
         if visit.get("stopping"):
@@ -446,6 +462,15 @@ class Position:
         else:
             self._drop(path)
             self._begin(following, visit["in"], entry["stamp_ns"])
+
+    def _keep_places(self, entry: Mapping[str, Any]) -> None:
+        """Keep where the next runs of a machine that has ended begin, and of those below it."""
+        inside = f"{entry['path']}/"
+        for kind in ("stopped", "goes_on"):
+            known = self.data.setdefault(kind, {}) if kind in entry else self.data.get(kind, {})
+            for each in [each for each in known if f"{each}/".startswith(inside)]:
+                del known[each]
+            known.update(entry.get(kind, {}))
 
     def _keep_end(self, path: str, visit: Mapping[str, Any], entry: Mapping[str, Any]) -> None:
         """Keep the end of a child of the root, for lists and viewers."""
@@ -516,7 +541,8 @@ class Position:
                 self._begin(path, entry["path"], entry["stamp_ns"])
 
     def _on_noted(self, entry: Mapping[str, Any]) -> None:
-        pass
+        if "stopped" in entry:
+            self._keep_places(entry)
 
     def _on_preempt(self, entry: Mapping[str, Any]) -> None:
         request = {name: entry[name] for name in ("path", "source", "by", "why")}
@@ -528,7 +554,10 @@ class Position:
                 # As `smachpy.engine.visit.Override.instead_of`.
                 if earlier is not None and (override is None or override[2:] == [True]):
                     override = earlier
-                visit["asked"] = {**request, "override": override}
+                before = visit.get("asked") or {}
+                left = entry.get("goes_on") or before.get("goes_on")
+                kept = {"goes_on": left} if left else {}
+                visit["asked"] = {**request, "override": override, **kept}
             return
         visit = self.visits.get(entry["path"])
         if visit is not None:

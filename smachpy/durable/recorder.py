@@ -27,6 +27,7 @@ from smachpy.engine.preempt import ask, ask_child, asking, current_origin, pass_
 from smachpy.engine.visit import Origin, Override
 from smachpy.exceptions import InvalidUserCodeError, MissionError, error_text
 from smachpy.machines.container import Container, control_of
+from smachpy.machines.history import remember, remembered
 from smachpy.machines.state import get_options
 from smachpy.userdata.kept_types import register_annotations
 from smachpy.userdata.readonly import ATOMS
@@ -34,7 +35,7 @@ from smachpy.userdata.secret import is_secret
 from smachpy.userdata.user_data import CheckedDict, ConstantKey, data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from actionlib_core.clock import Clock
     from actionlib_core.resources import Policy
@@ -372,6 +373,7 @@ class Recorder(RunJournal):
             stopped = self._journal.position.data.get("stopped", {})
             for path, container in self._containers.items():
                 container._smachpy.live.stopped_at = stopped.get(path, "")
+            remember(self._machine, self._root, self._journal.position.data.get("goes_on", {}))
             self._resumed[self._root] = self._unresumed.pop(self._root)
             self._all_back = run.clock.event("the states that were active")
             if not self._unresumed:
@@ -517,6 +519,10 @@ class Recorder(RunJournal):
         self._is_asking = True
         stopping, self._to_stop = self._to_stop, []
         for frame, step, origin, override in stopping:
+            path = step.path_in(frame)
+            asked = self._journal.position.visits.get(path, {}).get("asked") or {}
+            with frame.run.lock:
+                remember(step.state, path, asked.get("goes_on", {}))
             with asking(*origin):
                 ask_child(frame, step, override)
         held, self._held = self._held, []
@@ -611,15 +617,12 @@ class Recorder(RunJournal):
         override = None if visit is None else visit.override
         answered = visit is not None and visit.has_answered(outcome)
         overridden = override is not None and override.holds(answered=answered)
-        if frame.path not in self._containers or not isinstance(outcome, str) or overridden:
+        if frame.path not in self._containers or not isinstance(outcome, str):
             return outcome
-        facts: dict[str, Any] = {"outcome": outcome}
-        if self._has_history and isinstance(state, Container):
-            facts["stopped"] = {
-                where: each._smachpy.live.stopped_at
-                for where, each in walk(state, path)
-                if isinstance(each, Container) and each._smachpy.live.stopped_at
-            }
+        facts: dict[str, Any] = self._places(state, path)
+        if overridden:
+            return self._chosen_by_operator(path, outcome, facts)
+        facts["outcome"] = outcome
         step.decide(frame, outcome)
         target = step.next[outcome].target if outcome in step.next else None
         asked = state._preempt_requested or (visit is not None and visit.is_asked())
@@ -644,6 +647,28 @@ class Recorder(RunJournal):
                 for key in getattr(step.userdata, "_output", {}).values():
                     self._writers[frame.path].get(key, set()).discard(path)
         return outcome
+
+    def _chosen_by_operator(self, path: str, outcome: str, places: dict[str, Any]) -> str:
+        """Write where the child at `path` has ended; an operator has chosen what follows."""
+        if places:
+            self._write("Noted", path, **places)
+        return outcome
+
+    def _places(self, state: Any, path: str) -> dict[str, Any]:
+        """Return where the next runs of a machine that has ended begin, for an entry."""
+        if not isinstance(state, Container):
+            return {}
+        goes_on: dict[str, str] = {}
+        if state._smachpy.live.goes_on or path in self._journal.position.data.get("goes_on", {}):
+            goes_on = remembered(state, path)
+        elif not self._has_history:
+            return {}
+        stopped = {
+            where: each._smachpy.live.stopped_at
+            for where, each in walk(state, path)
+            if isinstance(each, Container) and each._smachpy.live.stopped_at
+        }
+        return {"stopped": stopped, **({"goes_on": goes_on} if goes_on else {})}
 
     def take(
         self, resource: str, path: str, policy: Policy, stop: Callable[[str], object]
@@ -909,13 +934,19 @@ class Recorder(RunJournal):
         if self.on_suspend is not None:
             self.on_suspend(by, self._top)
 
-    def asked_one(self, frame: Frame, step: Step, override: Override | None) -> None:
+    def asked_one(
+        self,
+        frame: Frame,
+        step: Step,
+        override: Override | None,
+        left: Mapping[str, str] | None = None,
+    ) -> None:
         path = step.path_in(frame)
         if path in self._journal.position.visits:
             source, by, why = current_origin()
             wanted = None if override is None else list(dataclasses.astuple(override))
             facts = {"source": source, "by": by, "why": why, "override": wanted}
-            self._write("PreemptRequested", path, **facts)
+            self._write("PreemptRequested", path, **facts, **({"goes_on": left} if left else {}))
 
     def _give_up_waiting(self) -> None:
         """Pass on the requests, although an operator still holds some of the states."""

@@ -91,10 +91,22 @@ class RunJournal:
     def recalled(self, path: str) -> None:
         """Write that the child at `path` withdraws the requests to stop that it has got."""
 
-    def asked_one(self, frame: Frame, step: Any, override: Override | None) -> None:
+    def asked_one(
+        self,
+        frame: Frame,
+        step: Any,
+        override: Override | None,
+        left: Mapping[str, str] | None = None,
+    ) -> None:
         """Write that an operator asked the child of `step` to stop, with the override.
 
         A resumed run asks it again.
+
+        Args:
+            frame: Where it runs.
+            step: The child.
+            override: What follows instead.
+            left: Where the next run of the child goes on: path of a machine -> label.
         """
 
     def stopped(self) -> None:

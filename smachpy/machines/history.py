@@ -2,27 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from smachpy.engine.described import walk
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
-def remember(container: Any) -> None:
-    """Let the next run of a running machine begin where it is now, with the userdata that it has.
+def places(container: Any) -> dict[str, str]:
+    """Return where a running machine is: path -> label of the active child, for `remember`.
 
-    Machines inside of it that are active do the same; an iterator begins with its first item, a
-    concurrence with all its children. Called before it is asked to stop, with the run's lock held.
+    Machines inside of it that are active are in it, too. An iterator, which begins with its first
+    item, and a concurrence, which begins with all its children, have the label "". With the run's
+    lock held.
     """
     frame = container._smachpy.live.frame
     if frame is None or frame.tidying is not None:
-        return
-    container._smachpy.live.goes_on = "last"
+        return {}
+    found = {frame.path: ""}
     for each in frame.running():
         step = each.step
         if step is None:
             continue
         if hasattr(container._smachpy, "next_initial"):
-            container._smachpy.next_initial = step.label
+            found[frame.path] = step.label
         if step.state._smachpy_is_container:
-            remember(step.state)
+            found.update(places(step.state))
+    return found
+
+
+def remember(state: Any, path: str, found: Mapping[str, str]) -> None:
+    """Let the next runs of a machine, and of those below it, begin in these `places`.
+
+    They begin with the userdata that they have.
+    """
+    for where, each in walk(state, path) if found else ():
+        label = found.get(where)
+        if label is None or not each._smachpy_is_container:
+            continue
+        each._smachpy.live.goes_on = "last"
+        if label in each._smachpy.children and hasattr(each._smachpy, "next_initial"):
+            each._smachpy.next_initial = label
+
+
+def remembered(state: Any, path: str) -> dict[str, str]:
+    """Return the `places` in which the next runs begin, as told to `remember`."""
+    return {
+        where: getattr(each._smachpy, "next_initial", None) or ""
+        for where, each in walk(state, path)
+        if each._smachpy_is_container and each._smachpy.live.goes_on == "last"
+    }
 
 
 def forget(state: Any) -> None:

@@ -17,7 +17,7 @@ from smachpy.events.introspection import TransitionRecord
 from smachpy.exceptions import did_you_mean, error_text
 from smachpy.machines.container import Container, control_of
 from smachpy.machines.guards import when
-from smachpy.machines.history import forget, remember
+from smachpy.machines.history import forget, places, remember
 from smachpy.machines.state import State, get_options, set_options
 from smachpy.machines.state_machine import StateMachine
 from smachpy.modes.table import ModesError, Table, name_of, rows_of, states_of
@@ -186,7 +186,7 @@ class Modes(StateMachine):
             return False
         values = data_of(self.userdata)
         with asking("program", by):
-            written: tuple[Step | None, str] | None = None
+            written: tuple[Step | None, str, dict[str, str]] | None = None
             while True:
                 with frame.run.lock:
                     stop = self.control.emergency()
@@ -195,23 +195,30 @@ class Modes(StateMachine):
                     if target is None or self.__frame is not frame:
                         return False
                     step: Step | None = frame.step
-                    if written == (step, target):
+                    left = self.__place_of(step, target)
+                    if written == (step, target, left):
                         self.__leave_for(frame, step, target)
                         break
                 # Written before it has an effect, and outside of the lock: then all is looked at
                 # again. A process that is killed between the two does this when it goes on.
-                self.__write(frame, step, target)
-                written = (step, target)
+                self.__write(frame, step, target, left)
+                written = (step, target, left)
             frame.run.flush_soon()
             if stop:
                 self.control.end_emergency(stop)
         return True
 
     @staticmethod
-    def __write(frame: Frame, step: Step | None, target: str) -> None:
-        """Write to the journal that `target` follows."""
+    def __write(frame: Frame, step: Step | None, target: str, left: dict[str, str]) -> None:
+        """Write to the journal that `target` follows, and where the present mission is left."""
         if step is not None:
-            frame.run.journal.asked_one(frame, step, Override(label=target))
+            frame.run.journal.asked_one(frame, step, Override(label=target), left)
+
+    def __place_of(self, step: Step | None, target: str) -> dict[str, str]:
+        """Return where the present mission is if it is to go on there; with the run's lock held."""
+        if step is None or not self.__table.modes[step.label].resume or target == step.label:
+            return {}
+        return places(step.state)
 
     def __leave_for(self, frame: Frame, step: Step | None, target: str) -> None:
         """Ask the present mode to stop, and begin `target` then; with the run's lock held."""
@@ -224,8 +231,7 @@ class Modes(StateMachine):
             if frame.visit is not None:
                 frame.visit.override = Override(label=target)
             return
-        if self.__table.modes[step.label].resume and target != step.label:
-            remember(step.state)
+        remember(step.state, step.path_in(frame), self.__place_of(step, target))
         ask_child(frame, step, Override(label=target))
 
     def emergency_stop(self, why: str = "") -> None:
@@ -259,7 +265,9 @@ class Modes(StateMachine):
             return False
         if frame is not None and target is not None:
             with asking("operator", by, "release"):
-                self.__write(frame, frame.step, target)
+                with frame.run.lock:
+                    left = self.__place_of(frame.step, target)
+                self.__write(frame, frame.step, target, left)
                 with frame.run.lock:
                     self.__leave_for(frame, frame.step, target)
                 frame.run.flush_soon()
@@ -322,13 +330,11 @@ class Modes(StateMachine):
 
     def _smachpy_run_children(self, frame: Frame, plan: Plan) -> str:
         data, journal = self._smachpy, frame.run.journal
-        label, data.next_initial = (
-            journal.resumed_label(frame) or data.next_initial or data.initial or "",
-            None,
-        )
+        resumed = journal.resumed_label(frame)
+        label, data.next_initial = resumed or data.next_initial or data.initial or "", None
         wanted = journal.wanted_label(frame) or ""  # what an event had led to before a resume
         frame.run.watched = frame.run.careful = True
-        for state in data.children.values():
+        for state in data.children.values() if resumed is None else ():
             forget(state)  # the last run ended in another mode
         with contextlib.ExitStack() as stack:
             stack.callback(self.__take_events, None, label)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import threading
 from typing import Any
@@ -9,8 +10,9 @@ from typing import Any
 import pytest
 
 import smachpy
-from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
 from smachpy import InvalidStateError, Sequence, State, StateMachine
+from smachpy.modes import Modes
 from smachpy.testing import mission_kit
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 
@@ -256,3 +258,102 @@ def test_killed_at_any_write_it_goes_on_in_the_same_state(reenter):
             # What was done and not written is done again, as ever.
             assert list(dict.fromkeys(deeds)) == calm, kill_at
             assert not written or deeds == calm, kill_at
+
+
+class Left(Once):
+    """Five seconds after its first begin it is left for something else."""
+
+    def __init__(self, deeds: list[str], store: KillingStore, leave: Any, left: list[str]) -> None:
+        super().__init__(deeds, "TWO", store)
+        self.leave, self.left = leave, left
+
+    def execute(self, userdata: Any) -> str:
+        current_clock().call_later(5.0, self.leave_once)
+        return super().execute(userdata)
+
+    def leave_once(self) -> None:
+        if not self.left and not self.store.dead:
+            self.left.append("left")
+            with contextlib.suppress(
+                Kill
+            ):  # the thread of the timer; that of the run is killed, too
+                self.leave()
+
+
+def check_kills(make: Any, outcome: str, calm: list[str]) -> None:
+    """Kill at any write; `make` gets the deeds, the store, and a list, empty until it is left."""
+    done, store = list[str](), KillingStore()
+    assert live(make(done, store, []), store) == outcome
+    assert done == calm
+    for kill_at in range(1, store.writes):
+        for written in (False, True):
+            hit, deeds, left = KillingStore(), list[str](), list[str]()
+            hit.arm(kill_at, written=written)
+            assert live(make(deeds, hit, left), hit) is None
+            hit.arm(0, written=False)
+            assert live(make(deeds, hit, left), hit) == outcome, kill_at
+            # If it was not written that it is left, nobody has left it.
+            expected = calm if "ELSEWHERE" in deeds else ["ONE", "TWO", "THREE"]
+            assert list(dict.fromkeys(deeds)) == expected, (kill_at, deeds)
+            assert not written or deeds == expected, (kill_at, deeds)
+
+
+@pytest.mark.parametrize("reenter", ["last", "deep"])
+def test_killed_at_any_write_it_goes_on_where_an_operator_has_left_it(reenter):
+    def make(deeds: list[str], store: KillingStore, left: list[str]) -> StateMachine:
+        two = Left(deeds, store, lambda: root.control.jump("/R/ELSEWHERE"), left)
+        works = [Once(deeds, "ONE", store), two, Once(deeds, "THREE", store)]
+        inner = inner_of(reenter if reenter == "last" else "first", *works)
+        if reenter == "deep":
+            deep = StateMachine(ENDS, userdata={"count": 0}, reenter="deep")
+            deep.add("DEEP", inner)
+            inner = deep
+        root = StateMachine(ENDS, name="R", userdata={"count": 0})
+        root.add("TOUR", inner)
+        root.add("ELSEWHERE", Once(deeds, "ELSEWHERE", store), {"done": "TOUR"})
+        return root
+
+    check_kills(make, "done", ["ONE", "ELSEWHERE", "TWO", "THREE"])
+
+
+class Ends(State):
+    """Ends the modes."""
+
+    def __init__(self, modes: list[Modes]) -> None:
+        super().__init__(["preempted"])
+        self.modes = modes
+
+    def execute(self, userdata: Any) -> str:
+        self.modes[0].request_preempt()
+        return "preempted"
+
+
+@pytest.mark.parametrize("cleanup", [False, True])
+def test_killed_at_any_write_modes_go_on_where_an_event_has_left_a_mission(cleanup):
+    def make(deeds: list[str], store: KillingStore, left: list[str]) -> Modes:
+        two = Left(deeds, store, lambda: modes.trigger("leave"), left)
+        inner = inner_of("first", Once(deeds, "ONE", store), two, Once(deeds, "THREE", store))
+        mission, elsewhere, last = (StateMachine(ENDS, userdata={"count": 0}) for _ in range(3))
+        mission.add("INNER", inner)
+        if cleanup:
+            mission.add_cleanup("DOCK", Work(2.0))
+        elsewhere.add("ELSEWHERE", Once(deeds, "ELSEWHERE", store))
+        last.add("ENDS", Ends(made))
+        modes = Modes(
+            [
+                {"name": "auto", "mission": mission, "resume": True},
+                {"name": "elsewhere", "mission": elsewhere},
+                {"name": "end", "mission": last},
+            ],
+            [
+                ["leave", "auto", "elsewhere"],
+                ["done", "elsewhere", "auto"],
+                ["done", "auto", "end"],
+            ],
+            name="M",
+        )
+        made[:] = [modes]
+        return modes
+
+    made: list[Modes] = []
+    check_kills(make, "preempted", ["ONE", "ELSEWHERE", "TWO", "THREE"])
