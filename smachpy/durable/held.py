@@ -58,6 +58,10 @@ class Held:
                     del self._before[resource]
                     self._store.let_go(self._lease, resource)
 
+    def former(self, resource: str) -> str | None:
+        """Return the state that held a resource before the resume, until it takes it again."""
+        return self._before.get(self._name(resource)) if self._before else None
+
     def take(
         self, resource: str, state: str, policy: Policy, stop: Callable[[str], object]
     ) -> str | None:

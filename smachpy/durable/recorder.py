@@ -681,6 +681,11 @@ class Recorder(RunJournal):
             self.stop(error)
             raise
 
+    def former_holder(self, resource: str, path: str) -> str | None:
+        former = self.held.former(resource)
+        is_back_soon = former in self._unresumed or former in self._resumed
+        return former if former != path and is_back_soon else None
+
     def give(self, resource: str) -> None:
         # A suspended mission keeps what it holds for the process that resumes it, and so does one
         # whose store is gone. A thread that was left behind may end after the mission.

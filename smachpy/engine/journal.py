@@ -138,6 +138,12 @@ class RunJournal:
             Who is in the way, for people; None if the mission holds the resource.
         """
 
+    def former_holder(self, resource: str, path: str) -> str | None:
+        """Return the state that held a resource before the resume and is about to take it again.
+
+        None if there is none, or it is the state at `path`.
+        """
+
     def give(self, resource: str) -> None:
         """Give a resource back to the missions of other processes, or wait no longer."""
 

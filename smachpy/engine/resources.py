@@ -92,7 +92,9 @@ def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | 
 
     forget = on_preempt(state, wake)
     try:
-        waited = _wait_here(frame, all_of, claim)
+        waited = _wait_for_former(frame, claim, asked)
+        if waited is not None:
+            waited = _wait_here(frame, all_of, claim, waited=waited)
         # The missions of this process come first: others see one holder in all of it.
         if waited is not None and not asked.is_set() and frame.run.journal.is_durable:
             waited = _wait_outside(frame, all_of, claim, asked, waited=waited)
@@ -111,14 +113,33 @@ def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | 
     return None
 
 
-def _wait_here(frame: Frame, all_of: Resources, claim: Claim) -> bool | None:
-    """Wait for the states of this process; return whether it did, None if the claim refuses to."""
+def _wait_for_former(frame: Frame, claim: Claim, asked: Event) -> bool | None:
+    """Let the state go first that held the resource before a resume; return as `_wait_here`.
+
+    Its goal may still move the robot.
+    """
+    path, journal = frame.here(), frame.run.journal
+    former = journal.former_holder(claim.resource, path)
+    if former is None:
+        return False
+    if _must_not_wait(frame, claim, former):
+        return None
+    while journal.former_holder(claim.resource, path) and not asked.wait(LOOK_S):
+        pass
+    return True
+
+
+def _wait_here(frame: Frame, all_of: Resources, claim: Claim, *, waited: bool) -> bool | None:
+    """Wait for the states of this process; return whether it did, None if the claim refuses to.
+
+    `waited`: it did before.
+    """
     try:
         holder = all_of.claim(claim)
     except CircleError as error:
         raise InvalidStateError(f"{frame.here()}: resource: {error}") from error
     if holder is None:
-        return False
+        return waited
     if _must_not_wait(frame, claim, holder.who()):
         return None
     if claim.policy == "preempt":

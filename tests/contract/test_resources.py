@@ -12,9 +12,12 @@ import pytest
 import smachpy
 from actionlib_core.clock import VirtualClock, use_clock
 from smachpy import Concurrence, InvalidStateError, Resource, State, StateMachine
+from smachpy.durable.store import Lease
+from smachpy.durable.store import ResourceUse as ResourceRow
 from smachpy.events import Event, PreemptRequested, ResourceUse
 from smachpy.states import Wait
 from smachpy.testing import explore, mission_kit
+from tests.smachpy.durable.killing_store import Kill, KillingStore
 
 ENDS = ["done", "refused", "aborted", "preempted"]
 
@@ -390,3 +393,69 @@ def _all_of(error: BaseException | None) -> str:
         return ""
     inner = "".join(map(_all_of, getattr(error, "exceptions", ())))
     return f"{error}{inner}{_all_of(error.__cause__)}"
+
+
+class Sharing(KillingStore):
+    """Keeps who holds resources, too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.held: dict[str, ResourceRow] = {}
+
+    def resources(self) -> list[Any]:
+        return list(self.held.values())
+
+    def hold(self, lease: Lease, resource: str, state: str, policy: str) -> None:
+        del policy  # there is no other mission
+        self.check()
+        self.held[resource] = ResourceRow(resource, lease.mission, state, True, False, None)
+
+    def let_go(self, lease: Lease, resource: str) -> None:
+        del lease
+        self.check()
+        self.held.pop(resource, None)
+
+    def check(self) -> None:
+        if self.dead:
+            raise Kill
+
+
+class Killed(Step):
+    """Works, and kills the process the first time."""
+
+    def __init__(self, store: Sharing, **options: Any) -> None:
+        super().__init__(10.0, **options)
+        self.store = store
+
+    def execute(self, userdata: Any) -> str:
+        if self.store.kill_at:
+            self.sleep(5.0)
+            self.store.dead = True
+            raise Kill
+        return super().execute(userdata)
+
+
+@pytest.mark.parametrize("again", [True, False])
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_former_holder_takes_it_first_after_a_kill(again: bool, order: int) -> None:
+    """Unless it is not executed again."""
+
+    def live() -> list[str]:
+        late = StateMachine(ENDS)
+        late.add("PAUSE", Step(1.0), {"done": "WAITS"})
+        late.add("WAITS", Step(2.0, resource="base"))
+        options = {} if again else {"resume": "skip:done"}
+        branches = [("LATE", late), ("HOLDS", Killed(store, resource="base", **options))]
+        machine, heard = together(**dict(branches[::order])), list[Event]()
+        machine.subscribe(heard.append)
+        with VirtualClock() as clock, use_clock(clock), contextlib.suppress(Kill):
+            assert smachpy.run_durable(machine, store, mission="m") == "done"
+        return [path for path, status, *_ in uses(heard) if status == "holds"]
+
+    store = Sharing()
+    store.arm(10_000, written=True)
+    assert live() == ["/C/HOLDS"]
+    assert store.held["base"].state == "/C/HOLDS"
+    store.arm(0, written=False)
+    assert live() == [*(["/C/HOLDS"] if again else []), "/C/LATE/WAITS"]
+    assert not store.held
