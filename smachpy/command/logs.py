@@ -52,18 +52,18 @@ def logging_as(args: argparse.Namespace) -> Iterator[None]:
     handlers: list[tuple[logging.Logger, logging.Handler]] = []
     root = logging.getLogger()
     before = root.level
-    if args.log_level is not None or args.log_file is not None:
-        level = (args.log_level or "warning").upper()
-        root.setLevel(level)
-        handlers.append((root, _Terminal(level)))
-    if args.log_file is not None:
-        level = (args.log_level or "info").upper()
-        root.setLevel(level)
-        kept = _File(args.log_file, level)
-        handlers += [(root, kept), (logging.getLogger(_ROSPY), kept)]
-    for logger, handler in handlers:
-        logger.addHandler(handler)
     try:
+        if args.log_level is not None or args.log_file is not None:
+            level = (args.log_level or "warning").upper()
+            root.setLevel(level)
+            handlers.append((root, _Terminal(level)))
+        if args.log_file is not None:
+            level = (args.log_level or "info").upper()
+            root.setLevel(level)
+            kept = _File(args.log_file, level)
+            handlers += [(root, kept), (logging.getLogger(_ROSPY), kept)]
+        for logger, handler in handlers:
+            logger.addHandler(handler)
         yield
     finally:
         for logger, handler in handlers:

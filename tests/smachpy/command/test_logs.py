@@ -114,9 +114,12 @@ def test_handlers_and_level_are_as_before_after_the_run(run):
 
 
 def test_a_file_that_cannot_be_written_is_an_error_before_the_run(run):
+    before = logging.getLogger().level
+
     said = run("--log-file", "nowhere/talks.log", expected=2)
 
     assert "--log-file nowhere/talks.log: got no file to write to (No such file" in said
+    assert logging.getLogger().level == before
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a disk that is always full")
