@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from smachpy.places.occupancy import OCCUPIED, UNKNOWN
+from smachpy.places.occupancy import OCCUPIED
 from smachpy_missions.explore.map_file import write_atomically
 from smachpy_missions.explore.scans import rays_of
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
     from smachpy.places.occupancy import OccupancyMap
@@ -83,10 +85,14 @@ def _background(grid: OccupancyMap | None, pose: Pose2D) -> Image.Image:
     rows = np.floor((c * dy - s * dx) / grid.resolution).astype(np.intp)
     inside = (rows >= 0) & (rows < grid.height) & (columns >= 0) & (columns < grid.width)
     cells = np.where(inside, grid.cells[np.where(inside, rows, 0), np.where(inside, columns, 0)], 0)
-    share = np.where(cells == UNKNOWN, 0.0, cells / OCCUPIED)[:, :, None]
-    return Image.fromarray(
-        (np.array(_FLOOR) * (1.0 - share) + np.array(_WALL) * share).astype(np.uint8)
-    )
+    return Image.fromarray(_colours()[cells])
+
+
+def _colours() -> NDArray[np.uint8]:
+    """Return the colour of each value of a cell; that of -1, which is unknown, is the last one."""
+    values = np.arange(256, dtype=np.uint8).view(np.int8)
+    share = np.clip(values, 0, OCCUPIED)[:, None] / OCCUPIED
+    return (np.array(_FLOOR) * (1.0 - share) + np.array(_WALL) * share).astype(np.uint8)
 
 
 def _pixel(dx: float, dy: float) -> tuple[float, float]:
