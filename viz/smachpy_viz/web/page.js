@@ -9577,7 +9577,7 @@ function countText({ rows, skip, total: total2 }) {
 }
 function lanesOf2(rows, now) {
   const begins = rows.flatMap((row) => row.began === null ? [] : [row.began / 1e9]);
-  const first = Math.min(...begins, now / 1e3);
+  const first = begins.length ? Math.min(...begins) : now / 1e3;
   const ends = rows.flatMap((row) => row.last === null ? [] : [row.last / 1e9]);
   const seconds = Math.max(1, Math.max(now / 1e3, ...ends) - first);
   return {
@@ -9904,6 +9904,7 @@ function Rows2({ rows, pins: pins2 }) {
   ] });
 }
 var UNNAMED = "SM_ROOT";
+var whoseText = (row) => row.robots.join(", ") || (row.live && row.name && row.name !== row.machine && row.name !== titleOf(row) ? row.name : "");
 var titleOf = (row) => row.machine === UNNAMED && row.name ? row.name : row.machine;
 function Row({ row, pinned, today }) {
   const kind = standing(row);
@@ -9942,7 +9943,7 @@ function Row({ row, pinned, today }) {
     /* @__PURE__ */ a4("td", { class: "what", children: [
       /* @__PURE__ */ a4("b", { children: shorten(titleOf(row), 40) }),
       " ",
-      /* @__PURE__ */ a4("span", { class: "hint", children: row.robots.join(", ") }),
+      /* @__PURE__ */ a4("span", { class: "hint", children: whoseText(row) }),
       outage && /* @__PURE__ */ a4("span", { class: "pill-text waiting", children: outage }),
       " ",
       /* @__PURE__ */ a4(MissionButtons, { row }),
@@ -16783,12 +16784,14 @@ function Questions({ page: page2 }) {
   ] });
 }
 var Elsewhere = ({ machine }) => /* @__PURE__ */ a4("div", { class: "question elsewhere", role: "status", children: [
-  /* @__PURE__ */ a4("b", { children: shorten(machine.label, 40) }),
-  /* @__PURE__ */ a4("span", { class: "hint", children: [
-    " ",
-    shorten(machine.name, 60)
+  /* @__PURE__ */ a4("span", { children: [
+    /* @__PURE__ */ a4("b", { children: shorten(machine.label, 40) }),
+    /* @__PURE__ */ a4("span", { class: "hint", children: [
+      " ",
+      shorten(machine.name, 60)
+    ] }),
+    " asks its operator"
   ] }),
-  " asks its operator",
   /* @__PURE__ */ a4("button", { onClick: () => choose(machine.name), children: "Show" })
 ] });
 function Card({ one, page: page2 }) {

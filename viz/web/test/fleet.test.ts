@@ -43,6 +43,18 @@ test("lanes share an axis, and what runs ends now", () => {
   assert.deepEqual(lanesOf([], 0), { seconds: 1, lanes: [] });
 });
 
+test("lanes of runs without a robot fill their axis, too: nothing but the runs tells their time", () => {
+  const { seconds, lanes } = lanesOf([row("a", 1.8e9, { last: 1.8e18 + 8e9 })], 0);
+  assert.equal(seconds, 8);
+  assert.deepEqual(
+    lanes[0].bars.map(({ from, to }) => [from, to]),
+    [
+      [0, 2],
+      [2, 8],
+    ],
+  );
+});
+
 test("robots of several runs are apart on one map", () => {
   const observed = fixture("observed.json").slice(0, 2);
   const goal = { kind: "GoalSent", path: "/P/GO", stamp_ns: 5e9, seq: 1, action: "move_base", goal_id: "1", goal: {} };

@@ -14,11 +14,11 @@ export function countText({ rows, skip, total }: FleetRuns) {
 
 /**
  * The states of each run as bars, on an axis that begins with the first run [s after that].
- * @param now [ms]
+ * @param now of the robots [ms]; 0 if there are none
  */
 export function lanesOf(rows: FleetRow[], now: number) {
   const begins = rows.flatMap((row) => (row.began === null ? [] : [row.began / 1e9]));
-  const first = Math.min(...begins, now / 1000);
+  const first = begins.length ? Math.min(...begins) : now / 1000;
   const ends = rows.flatMap((row) => (row.last === null ? [] : [row.last / 1e9]));
   const seconds = Math.max(1, Math.max(now / 1000, ...ends) - first);
   return {

@@ -70,8 +70,10 @@ export function Questions({ page }: { page: Page }) {
 /** A question of a machine that is not shown. */
 const Elsewhere = ({ machine }: { machine: MachineSummary }) => (
   <div class="question elsewhere" role="status">
-    <b>{shorten(machine.label, 40)}</b>
-    <span class="hint"> {shorten(machine.name, 60)}</span> asks its operator
+    <span>
+      <b>{shorten(machine.label, 40)}</b>
+      <span class="hint"> {shorten(machine.name, 60)}</span> asks its operator
+    </span>
     <button onClick={() => choose(machine.name)}>Show</button>
   </div>
 );

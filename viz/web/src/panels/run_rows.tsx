@@ -49,6 +49,10 @@ export function Rows({ rows, pins }: { rows: RunRow[]; pins: Set<string> }) {
 
 const UNNAMED = "SM_ROOT"; // what classic programs call every machine
 
+/** The robots of a run; without any, the name that tells a live run from others of its machine. */
+const whoseText = (row: RunRow) =>
+  row.robots.join(", ") ||
+  (row.live && row.name && row.name !== row.machine && row.name !== titleOf(row) ? row.name : "");
 const titleOf = (row: RunRow) => (row.machine === UNNAMED && row.name ? row.name : row.machine);
 
 function Row({ row, pinned, today }: { row: RunRow; pinned: boolean; today: Date }) {
@@ -87,7 +91,7 @@ function Row({ row, pinned, today }: { row: RunRow; pinned: boolean; today: Date
         </span>
       </td>
       <td class="what">
-        <b>{shorten(titleOf(row), 40)}</b> <span class="hint">{row.robots.join(", ")}</span>
+        <b>{shorten(titleOf(row), 40)}</b> <span class="hint">{whoseText(row)}</span>
         {outage && <span class="pill-text waiting">{outage}</span>} <MissionButtons row={row} />
         <small title={row.problem || row.reason}>{shorten(row.problem || row.reason, 110)}</small>
       </td>
