@@ -276,7 +276,8 @@ def look(chromium):
     contexts, errors = [], []
 
     def look(address, *, drawn=True, patient=True, **options):
-        context = chromium.new_context(viewport={"width": 1400, "height": 900}, **options)
+        options = {"viewport": {"width": 1400, "height": 900}, **options}
+        context = chromium.new_context(**options)
         context.set_default_timeout(120_000)
         if patient:
             context.add_init_script(PATIENT)

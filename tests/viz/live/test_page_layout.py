@@ -364,19 +364,49 @@ def test_an_outline_is_offered_where_names_are_small(served, look):
     outline.wait_for(state="detached")
 
 
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844), (844, 390)])
+def test_the_outline_of_one_level_is_tiles_with_larger_names_and_back(served, look, size):
+    served.add("long", labels=[f"STATE_{i}" for i in range(24)])
+    page = look(served.start(), viewport=dict(zip(("width", "height"), size, strict=True)))
+    arrows = all_levels(page)
+    outline = page.get_by_role("button", name="Outline")
+    outline.wait_for()
+    outline.click()
+    wait_for(page, "smachpy.store.view.overview.value && !smachpy.page.layouts.running")
+    assert page.locator("path.edge").count() == 0
+    assert page.evaluate("() => smachpy.page.view.k") > 1.25 * arrows["k"]
+    outline.click()
+    wait_for(page, "!smachpy.store.view.overview.value && !smachpy.page.layouts.running")
+    assert page.locator("path.edge").count() > 20
+
+
 @pytest.mark.parametrize(("width", "offered"), [(1024, True), (1440, False)])
-def test_where_the_tree_is_hidden_it_is_offered_for_small_names(served, look, width, offered):
-    served.add("long", labels=[f"STATE_{i}" for i in range(120)])
+def test_where_the_tree_is_hidden_it_is_offered_for_tiles_with_small_names(
+    served, look, width, offered
+):
+    served.add("long", labels=[f"STATE_{i}" for i in range(200)])
     page = look(served.start())
     page.set_viewport_size({"width": width, "height": 700})
     all_levels(page)
     wait_for(page, "smachpy.store.view.namesAreSmall.value")
-    outline = page.locator(".zoom .offer")
-    outline.wait_for(state="attached")
-    assert outline.is_visible() is offered  # else the tree stands beside the machine
+    tree = page.locator(".zoom .of-tree")
+    tree.wait_for(state="attached")
+    assert tree.is_visible() is offered  # else the tree stands beside the machine
     if offered:
-        outline.click()
+        tree.click()
         page.wait_for_selector(".with-tree .panel-tree", state="visible")
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844)])
+def test_the_first_look_has_no_more_levels_than_can_be_read(served, look, size):
+    served.add("deep", sm=nested(5, 2))
+    page = look(served.start(), viewport=dict(zip(("width", "height"), size, strict=True)))
+    k, levels = page.evaluate(
+        """async () => { const { page, store } = smachpy;
+          await page.layouts.relayout({ frame: true });
+          return [page.view.k, store.view.opened.value.size]; }"""
+    )
+    assert k >= 0.72 or levels == 1
 
 
 TITLES = """() => [...document.querySelectorAll('.diagram g.box')].map((box) => {

@@ -120,6 +120,23 @@ def test_the_buttons_have_one_place_and_are_never_cut_off(served, look, width):
     assert boxes(page) == running
 
 
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (900, 900), (390, 844), (844, 390)])
+def test_the_name_of_what_preempt_stops_is_shown_whole_in_two_lines(served, look, size):
+    served.add(
+        "one", label="GUIDED_RECOVERY", events=[("Started", "/GUIDED_RECOVERY")], control=FREE
+    )
+    viewport = {"width": size[0], "height": size[1]}
+    page = look(f"{served.start(token='t')}#token=t", viewport=viewport)
+    page.wait_for_selector("#preempt span:text-is('Preempt GUIDED_RECOVERY')")
+    span = """() => { const span = document.querySelector("#preempt span"), { top, bottom } = span.getBoundingClientRect();
+        const button = document.querySelector("#preempt").getBoundingClientRect();
+        return [span.scrollHeight - span.clientHeight, span.scrollWidth - span.clientWidth,
+            top - button.top, button.bottom - bottom]; }"""
+    below, right, over, under = page.evaluate(span)
+    assert max(below, right) <= 0
+    assert min(over, under) >= 0
+
+
 @pytest.mark.parametrize("size", [(844, 390), (667, 375)])
 def test_a_phone_held_sideways_shows_the_whole_name_and_leaves_nothing_empty(served, look, size):
     served.add("one", label="PATROL", events=[("Started", "/PATROL")], control=FREE)

@@ -146,6 +146,22 @@ def test_the_bar_can_be_used_on_a_phone(served, look):
     page.wait_for_function("() => smachpy.store.playback.playing.value !== null")
 
 
+KEY = """() => { const select = document.querySelector(".jumps select"), style = getComputedStyle(select);
+    const paper = document.createElement("canvas").getContext("2d");
+    paper.font = style.font;
+    const arrow = 16; // of the browser
+    const room = select.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight) - arrow;
+    return room - paper.measureText(select.selectedOptions[0].text).width; }"""
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844), (844, 390)])
+def test_a_short_name_of_a_key_is_shown_whole(served, look, size):
+    served.add("one", events=run())
+    page = look(served.start(), viewport={"width": size[0], "height": size[1]})
+    page.wait_for_selector(".jumps select:has-text('count')")
+    assert page.evaluate(KEY) >= 0
+
+
 def at(page, seconds, lane=10):
     """Where an instant is in the timeline."""
     return page.evaluate(

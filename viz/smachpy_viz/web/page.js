@@ -3350,6 +3350,8 @@ var View = class {
   // names of states in the diagram, under 11 px
   treeOpen = y3(false);
   // on small screens, where the tree covers the page
+  outline = y3(false);
+  // whether the user wants tiles without arrows, with larger names
   overview = y3(false);
   // whether states are tiles without arrows, because many are open
   laidOut = y3(null);
@@ -3398,6 +3400,7 @@ var View = class {
     const known2 = saved(`open.${next.root.label}`, []).filter(
       (path) => next.get(path)?.children.length
     );
+    this.outline.value = false;
     this.#autoDepth = known2.length ? 0 : next.readableDepth();
     this.opened.value = this.#autoDepth ? next.toDepth(this.#autoDepth) : new Set(known2);
   }
@@ -3417,6 +3420,7 @@ var View = class {
   }
   keepOpened(paths) {
     this.opened.value = paths;
+    this.outline.value = false;
     this.#autoDepth = 0;
   }
   setOpened(paths) {
@@ -5209,7 +5213,7 @@ var Elk = class {
 var GRID_FROM = 4;
 var FOLD_FROM = { closed: 5, open: 7 };
 var BUNDLE_FROM = 6;
-var FOLD_COST = 1.1;
+var FOLD_COST = 1.05;
 var nameOf = ({ dir, columns, folded }) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
 function shapesOf(node, inner, aspect) {
   const shapes = DIRECTIONS.map((dir) => ({ dir }));
@@ -5302,8 +5306,8 @@ var SPACING = {
   "elk.spacing.nodeNode": "18",
   "elk.spacing.edgeNode": "11",
   "elk.spacing.edgeEdge": "9",
-  "elk.layered.spacing.edgeNodeBetweenLayers": "11",
-  "elk.layered.spacing.edgeEdgeBetweenLayers": "9",
+  "elk.layered.spacing.edgeNodeBetweenLayers": "8",
+  "elk.layered.spacing.edgeEdgeBetweenLayers": "7",
   "elk.spacing.edgeLabel": "3",
   "elk.spacing.portPort": "10",
   "elk.spacing.componentComponent": "22"
@@ -5397,7 +5401,7 @@ var Plan = class {
         "elk.edgeRouting": "ORTHOGONAL",
         "elk.hierarchyHandling": "SEPARATE_CHILDREN",
         "elk.padding": `[top=14,left=14,bottom=${bottom},right=${right}]`,
-        "elk.layered.spacing.nodeNodeBetweenLayers": dir === "DOWN" ? "18" : "26",
+        "elk.layered.spacing.nodeNodeBetweenLayers": dir === "DOWN" ? "12" : "22",
         // The simplex method makes more arrows straight, but takes minutes if twelve states all lead to each other.
         "elk.layered.nodePlacement.strategy": hasOver(node, DENSE) ? "BRANDES_KOEPF" : "NETWORK_SIMPLEX",
         "elk.layered.nodePlacement.favorStraightEdges": "true",
@@ -5691,11 +5695,12 @@ var Layout = class {
   /**
    * Lay out everything below `root`, with the containers of `open` opened.
    * @param onProgress called with the number of states that are laid out
+   * @param asTiles whether states are to be tiles without arrows, however few they are
    * @throws ELK fails for the root; a container inside for which it fails is shown closed
    */
-  async run(root, open, onProgress) {
+  async run(root, open, onProgress, asTiles = false) {
     const all = countOf(root, open);
-    if (all > OVERVIEW_FROM || isTangled(root, open)) return overview(root, open, this.aspect);
+    if (asTiles || all > OVERVIEW_FROM || isTangled(root, open)) return overview(root, open, this.aspect);
     if (this.cache.size > MOST_CACHED) this.forget();
     const levels = [];
     const height = (node) => {
@@ -5818,7 +5823,7 @@ function keyOf2(node, open, keys2, inner) {
 
 // src/drawing/layout_controller.ts
 var OPENING_MS = 15e3;
-var READABLE3 = 0.55;
+var READABLE3 = 0.75;
 var SLOW_MS = 300;
 var LARGEST = 1.5;
 var LayoutController = class {
@@ -5894,7 +5899,7 @@ var LayoutController = class {
       if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
     let open = new Set(store.view.opened.value).add(model.root.path);
-    let result = await this.layout.run(model.root, open, progress);
+    let result = await this.layout.run(model.root, open, progress, store.view.outline.value);
     if (this.#after.frame === "follow")
       while (result && !isLegible(boxesOf(result), this.view)) {
         const less = oneLevelLess(open);
@@ -5992,6 +5997,17 @@ var LayoutController = class {
     store.view.setOpened(model.toDepth(levels));
     this.relayout({ frame: true });
   }
+  /** Show the outermost level with larger names: with its arrows, then as tiles without; or show the arrows again. */
+  toggleOutline() {
+    const { view: view2 } = store;
+    if (view2.opened.value.size > 1) {
+      this.setDepth(1);
+      return;
+    }
+    view2.follow.value = false;
+    view2.outline.value = !view2.outline.value;
+    this.refit();
+  }
   setImplicit(on2) {
     store.view.setImplicit(on2);
     this.layout?.clear();
@@ -5999,6 +6015,7 @@ var LayoutController = class {
   }
   setFollow(on2) {
     store.view.follow.value = on2;
+    store.view.outline.value = false;
     this.#follow.restart();
     this.follow();
   }
@@ -7202,6 +7219,7 @@ var Strip = class {
 // src/drawing/bars.ts
 var THINNEST = 0.5;
 var FAILED = 3;
+var LEAST_LETTERS = 2;
 var MOST_WIDTHS = 4e3;
 var Bars = class {
   context;
@@ -7379,7 +7397,7 @@ var Bars = class {
     g5.fillRect(px - 0.75, top, 1.5, bottom - top);
   }
   /**
-   * Write the longest of several texts that fits into a bar; of a running state its beginning.
+   * Write the longest of several texts that fits into a bar, or the beginning of the shortest.
    * @param texts the longest first
    */
   #text(texts, colour, { left, right, top, bottom }) {
@@ -7388,8 +7406,9 @@ var Bars = class {
     const g5 = this.context;
     const size = tall > 13 ? 11 : 9.5;
     g5.font = `${size}px Inter, Arial, sans-serif`;
-    const text2 = texts.find((one) => this.#widthOf(one, size) <= wide - 8) ?? "";
-    const shown = text2 || (wide > 26 ? texts.at(-1) ?? "" : "");
+    const widthOf = (one) => this.#widthOf(one, size);
+    const whole2 = texts.find((one) => widthOf(one) <= wide - 8);
+    const shown = whole2 ?? beginningOf(texts.at(-1) ?? "", wide - 8, widthOf);
     g5.fillStyle = this.colours.of(colour);
     g5.textAlign = "left";
     if (shown) clipped(g5, left, top, wide - 3, tall, () => g5.fillText(shown, left + 4, top + tall / 2 + 0.5));
@@ -7407,6 +7426,14 @@ var Bars = class {
     return width;
   }
 };
+function beginningOf(text2, width, widthOf) {
+  let length = Math.min(text2.length - 1, Math.ceil(text2.length * width / widthOf(text2)) + 1);
+  for (; length >= LEAST_LETTERS; length--) {
+    const short = `${text2.slice(0, length).replace(/[\s.,(]+$/, "")}…`;
+    if (widthOf(short) <= width) return short;
+  }
+  return "";
+}
 function rowOf(lanes, lane, node, t4, y5) {
   const rows = lanes.rowsOf(lane);
   const pitch = (lanes.heightOf(lane) - 3) / rows;
@@ -12138,8 +12165,12 @@ function Jumps() {
       /* @__PURE__ */ a4("span", { class: "kind", children: kind })
     ] })),
     keys2.length > 0 && /* @__PURE__ */ a4($, { children: [
-      /* @__PURE__ */ a4("select", { value: key, onChange: choose2, "aria-label": "key of userdata", title: "key of userdata", children: keys2.map((one) => /* @__PURE__ */ a4("option", { value: one, children: shorten(one, 24) })) }),
-      /* @__PURE__ */ a4(Jump, { name: `key ${key}`, letter: "K", children: "change" })
+      /* @__PURE__ */ a4("select", { value: key, onChange: choose2, "aria-label": "key of userdata", title: `key of userdata: ${key}`, children: keys2.map((one) => /* @__PURE__ */ a4("option", { value: one, children: shorten(one, 24) })) }),
+      /* @__PURE__ */ a4(Jump, { name: `key ${key}`, letter: "K", children: [
+        /* @__PURE__ */ a4("i", { children: "Δ" }),
+        " ",
+        /* @__PURE__ */ a4("span", { class: "kind", children: "change" })
+      ] })
     ] })
   ] });
 }
@@ -17394,7 +17425,7 @@ function Search({ page: page2 }) {
       "input",
       {
         id: "search",
-        placeholder: "Search states",
+        placeholder: "Search",
         "aria-label": "Search states",
         value: text2,
         autocomplete: "off",
@@ -17647,20 +17678,24 @@ function TimeTools() {
 }
 function ZoomButtons() {
   const { view: view2 } = store;
-  const outline = () => {
-    if (view2.opened.value.size > 1) page.layouts.setDepth(1);
-    else view2.treeOpen.value = true;
+  const small = view2.namesAreSmall.value;
+  const on2 = view2.outline.value;
+  const isLeast = view2.overview.value && view2.opened.value.size < 2;
+  const showTree = () => {
+    view2.treeOpen.value = true;
   };
   return /* @__PURE__ */ a4("span", { class: "zoom", children: [
-    view2.namesAreSmall.value && /* @__PURE__ */ a4(
+    (on2 || small && !isLeast) && /* @__PURE__ */ a4(
       "button",
       {
-        class: view2.opened.value.size > 1 ? "offer" : "offer of-tree",
-        title: "the names are small: show less of the machine",
-        onClick: outline,
+        class: on2 ? "offer on" : "offer",
+        "aria-pressed": on2,
+        title: on2 ? "show the arrows again" : "the names are small: show less of the machine",
+        onClick: () => page.layouts.toggleOutline(),
         children: "Outline"
       }
     ),
+    small && isLeast && /* @__PURE__ */ a4("button", { class: "offer of-tree", title: "the names are small: show the states as a tree", onClick: showTree, children: "States" }),
     /* @__PURE__ */ a4("button", { title: "smaller (-)", "aria-label": "zoom out", onClick: () => page.view.zoom(0.8), children: "−" }),
     /* @__PURE__ */ a4("button", { title: "larger (+)", "aria-label": "zoom in", onClick: () => page.view.zoom(1.25), children: "+" }),
     /* @__PURE__ */ a4("button", { title: "show everything (0)", onClick: () => page.layouts.refit(), children: "Fit" })

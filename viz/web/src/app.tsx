@@ -120,20 +120,27 @@ function TimeTools() {
 
 function ZoomButtons() {
   const { view } = store;
-  // The outermost level, or, if no more is open, the tree, where it is hidden (styles/narrow.css).
-  const outline = () => {
-    if (view.opened.value.size > 1) page.layouts.setDepth(1);
-    else view.treeOpen.value = true;
+  const small = view.namesAreSmall.value;
+  const on = view.outline.value;
+  const isLeast = view.overview.value && view.opened.value.size < 2; // the picture cannot show less
+  const showTree = () => {
+    view.treeOpen.value = true;
   };
   return (
     <span class="zoom">
-      {view.namesAreSmall.value && (
+      {(on || (small && !isLeast)) && (
         <button
-          class={view.opened.value.size > 1 ? "offer" : "offer of-tree"}
-          title="the names are small: show less of the machine"
-          onClick={outline}
+          class={on ? "offer on" : "offer"}
+          aria-pressed={on}
+          title={on ? "show the arrows again" : "the names are small: show less of the machine"}
+          onClick={() => page.layouts.toggleOutline()}
         >
           Outline
+        </button>
+      )}
+      {small && isLeast && (
+        <button class="offer of-tree" title="the names are small: show the states as a tree" onClick={showTree}>
+          States
         </button>
       )}
       <button title="smaller (-)" aria-label="zoom out" onClick={() => page.view.zoom(0.8)}>

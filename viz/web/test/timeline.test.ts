@@ -2,6 +2,7 @@ import "./browser.ts";
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 import { store } from "#core/store.ts";
+import { beginningOf } from "#drawing/bars.ts";
 import { MapView } from "#drawing/map.ts";
 import { Timeline } from "#drawing/timeline.ts";
 import { canvasOf, Paper } from "./browser.ts";
@@ -119,4 +120,12 @@ test("a night in which nothing happened is folded, and its length is told", () =
   store.clock.unfold(store.clock.idle()[0]);
   assert.ok(!drawn().paper.texts.includes("8 h 00"));
   store.clock.foldIdle(true);
+});
+
+test("a name that does not fit into its bar is cut with a sign, and left out if a letter would be left", () => {
+  const widthOf = (text: string) => 10 * text.length;
+  assert.equal(beginningOf("TRANSPORT", 60, widthOf), "TRANS\u2026");
+  assert.equal(beginningOf("→ (16.9, 15.6)", 80, widthOf), "→ (16.9\u2026");
+  assert.equal(beginningOf("TRANSPORT", 29, widthOf), "");
+  assert.equal(beginningOf("", 60, widthOf), "");
 });

@@ -14,6 +14,7 @@ import { type Colours, FONT } from "#drawing/theme.ts";
 // Sizes in CSS pixels
 const THINNEST = 0.5;
 const FAILED = 3; // narrowest bar of a failure
+const LEAST_LETTERS = 2; // of a name that is cut
 const MOST_WIDTHS = 4000; // texts whose widths are kept
 
 /** [px] */
@@ -206,7 +207,7 @@ export class Bars {
   }
 
   /**
-   * Write the longest of several texts that fits into a bar; of a running state its beginning.
+   * Write the longest of several texts that fits into a bar, or the beginning of the shortest.
    * @param texts the longest first
    */
   #text(texts: string[], colour: string, { left, right, top, bottom }: Bar) {
@@ -215,8 +216,9 @@ export class Bars {
     const g = this.context;
     const size = tall > 13 ? 11 : 9.5;
     g.font = `${size}px Inter, Arial, sans-serif`;
-    const text = texts.find((one) => this.#widthOf(one, size) <= wide - 8) ?? "";
-    const shown = text || (wide > 26 ? (texts.at(-1) ?? "") : "");
+    const widthOf = (one: string) => this.#widthOf(one, size);
+    const whole = texts.find((one) => widthOf(one) <= wide - 8);
+    const shown = whole ?? beginningOf(texts.at(-1) ?? "", wide - 8, widthOf);
     g.fillStyle = this.colours.of(colour);
     g.textAlign = "left";
     if (shown) clipped(g, left, top, wide - 3, tall, () => g.fillText(shown, left + 4, top + tall / 2 + 0.5));
@@ -234,6 +236,17 @@ export class Bars {
     }
     return width;
   }
+}
+
+/** As much of a text as fits into a width, with a sign that it goes on; "" if that would be a letter. */
+export function beginningOf(text: string, width: number, widthOf: (one: string) => number) {
+  // Few are measured: in most texts the letters are about equally wide.
+  let length = Math.min(text.length - 1, Math.ceil((text.length * width) / widthOf(text)) + 1);
+  for (; length >= LEAST_LETTERS; length--) {
+    const short = `${text.slice(0, length).replace(/[\s.,(]+$/, "")}\u2026`;
+    if (widthOf(short) <= width) return short;
+  }
+  return "";
 }
 
 /** The top and bottom of a state's row in its lane, which begins at y, at an instant t [ms]. */

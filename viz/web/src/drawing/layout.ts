@@ -59,11 +59,17 @@ export class Layout {
   /**
    * Lay out everything below `root`, with the containers of `open` opened.
    * @param onProgress called with the number of states that are laid out
+   * @param asTiles whether states are to be tiles without arrows, however few they are
    * @throws ELK fails for the root; a container inside for which it fails is shown closed
    */
-  async run(root: StateNode, open: Set<string>, onProgress?: (done: number, all: number) => void) {
+  async run(
+    root: StateNode,
+    open: Set<string>,
+    onProgress?: (done: number, all: number) => void,
+    asTiles: boolean = false,
+  ) {
     const all = countOf(root, open);
-    if (all > OVERVIEW_FROM || isTangled(root, open)) return overview(root, open, this.aspect);
+    if (asTiles || all > OVERVIEW_FROM || isTangled(root, open)) return overview(root, open, this.aspect);
     if (this.cache.size > MOST_CACHED) this.forget();
     const levels: StateNode[][] = []; // innermost containers first
     const height: (node: StateNode) => number = (node) => {

@@ -12,7 +12,7 @@ import { boxesOf } from "#drawing/placed.ts";
 import type { View, Viewport } from "#drawing/viewport.ts";
 
 const OPENING_MS = 15_000; // time after the arrival of a machine in which panels may still appear
-const READABLE = 0.55; // scale below which fewer levels are opened at first
+const READABLE = 0.75; // scale below which fewer levels are opened at first: names have 8 px there
 const SLOW_MS = 300; // a layout that takes longer shows its progress
 const LARGEST = 1.5; // scale to which a small machine is enlarged
 
@@ -91,7 +91,7 @@ export class LayoutController {
       if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
     let open = new Set(store.view.opened.value).add(model.root.path);
-    let result = await this.layout.run(model.root, open, progress);
+    let result = await this.layout.run(model.root, open, progress, store.view.outline.value);
     if (this.#after.frame === "follow")
       while (result && !isLegible(boxesOf(result), this.view)) {
         const less = oneLevelLess(open);
@@ -202,6 +202,18 @@ export class LayoutController {
     this.relayout({ frame: true });
   }
 
+  /** Show the outermost level with larger names: with its arrows, then as tiles without; or show the arrows again. */
+  toggleOutline() {
+    const { view } = store;
+    if (view.opened.value.size > 1) {
+      this.setDepth(1);
+      return;
+    }
+    view.follow.value = false;
+    view.outline.value = !view.outline.value;
+    this.refit();
+  }
+
   setImplicit(on: boolean) {
     store.view.setImplicit(on);
     this.layout?.clear();
@@ -210,6 +222,7 @@ export class LayoutController {
 
   setFollow(on: boolean) {
     store.view.follow.value = on;
+    store.view.outline.value = false;
     this.#follow.restart();
     this.follow();
   }

@@ -6,7 +6,7 @@ import { type ContainerLayout, DIRECTIONS, LEAF_H, leafWidth, SEP, type Shape } 
 const GRID_FROM = 4; // children of a concurrence from which a grid is tried
 const FOLD_FROM = { closed: 5, open: 7 }; // the same of another container for folding, all closed or one open
 const BUNDLE_FROM = 6; // states that lead to one outcome, from which they have no arrows of their own
-const FOLD_COST = 1.1; // factor on the cost of a folded shape, because its lines are longer
+const FOLD_COST = 1.05; // factor on the cost of a folded shape, because its lines are longer
 
 export const nameOf = ({ dir, columns, folded }: Shape) => `${dir}${columns ?? ""}${folded ? "~" : ""}`;
 

@@ -170,13 +170,13 @@ function Jumps() {
       ))}
       {keys.length > 0 && (
         <>
-          <select value={key} onChange={choose} aria-label="key of userdata" title="key of userdata">
+          <select value={key} onChange={choose} aria-label="key of userdata" title={`key of userdata: ${key}`}>
             {keys.map((one) => (
               <option value={one}>{shorten(one, 24)}</option>
             ))}
           </select>
           <Jump name={`key ${key}`} letter="K">
-            change
+            <i>{"\u0394"}</i> <span class="kind">change</span>
           </Jump>
         </>
       )}

@@ -220,7 +220,7 @@ function Search({ page }: { page: Page }) {
     <div class="search">
       <input
         id="search"
-        placeholder="Search states"
+        placeholder="Search"
         aria-label="Search states"
         value={text}
         autocomplete="off"

@@ -28,6 +28,7 @@ export class View {
   readonly tokenAsked = signal(false); // whether the viewer refused this page's token
   readonly namesAreSmall = signal(false); // names of states in the diagram, under 11 px
   readonly treeOpen = signal(false); // on small screens, where the tree covers the page
+  readonly outline = signal(false); // whether the user wants tiles without arrows, with larger names
   readonly overview = signal(false); // whether states are tiles without arrows, because many are open
   readonly laidOut: Signal<{ done: number; all: number } | null> = signal(null); // progress of a long layout [states]
   readonly dismissed: Signal<string | null> = signal(null); // the previous run whose notice was closed
@@ -72,6 +73,7 @@ export class View {
     const known: string[] = saved<string[]>(`open.${next.root.label}`, []).filter(
       (path: string) => next.get(path)?.children.length,
     );
+    this.outline.value = false;
     this.#autoDepth = known.length ? 0 : next.readableDepth();
     this.opened.value = this.#autoDepth ? next.toDepth(this.#autoDepth) : new Set(known);
   }
@@ -94,6 +96,7 @@ export class View {
 
   keepOpened(paths: Set<string>) {
     this.opened.value = paths;
+    this.outline.value = false;
     this.#autoDepth = 0;
   }
 
