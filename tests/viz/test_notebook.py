@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
 import threading
 import time
@@ -86,6 +87,24 @@ def test_its_close_ends_the_wait_for_the_next_picture(machine):
     wait_for(lambda: widget.status != "not started")
     widget.close()
     assert widget._executor.join(60.0)
+
+
+def test_its_close_gives_up_a_picture_that_takes_long(machine, monkeypatch, tmp_path):
+    widget = viz.MachineWidget(machine)
+    told = tmp_path / "pid"
+    dot = tmp_path / "dot"
+    dot.write_text(f"#!/bin/sh\necho $$ > {told}.new\nmv {told}.new {told}\nexec sleep 3600\n")
+    dot.chmod(0o755)
+    monkeypatch.setenv("SMACHPY_DOT", str(dot))
+    monkeypatch.setattr("smachpy_viz.pictures.graphviz_process.TIME_LIMIT", 3600.0)
+    machine["HELD"].go_on.set()
+    machine.execute()
+    wait_for(told.exists)
+    widget.close()
+    assert widget._executor.join(60.0)
+    assert widget.status == "not started"
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(told.read_text()), 0)
 
 
 def test_a_picture_that_cannot_be_drawn_stops_no_machine(machine, widget, monkeypatch):

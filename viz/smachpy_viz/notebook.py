@@ -22,6 +22,7 @@ from smachpy.exceptions import SmachError
 from smachpy_viz.model.history import History
 from smachpy_viz.model.labels import shorten
 from smachpy_viz.pictures.drawing import PictureError, picture
+from smachpy_viz.pictures.graphviz_process import until
 
 try:
     import anywidget
@@ -119,13 +120,14 @@ class MachineWidget(anywidget.AnyWidget):
     def close(self) -> None:
         """Stop showing the machine; a second call does nothing.
 
-        Blocks: until the picture that is being drawn is finished, at most 2 s.
+        A picture that is being drawn is given up.
+
+        Blocks: until that has happened, at most 2 s.
         """
         if self._forget is not None:  # ipywidgets also closes a widget whose __init__ raised
             self._forget()
         if self._executor is not None:
             self._closed.set()
-        if self._executor is not None:
             self._executor.join(CLOSE_S)
         super().close()
 
@@ -145,13 +147,17 @@ class MachineWidget(anywidget.AnyWidget):
         if self._closed.is_set():
             return
         try:
-            self._draw()
+            with until(self._closed):
+                self._draw()
         except SmachError as error:  # shown, because nobody calls this thread's function
-            self.status = str(error)
+            if not self._closed.is_set():
+                self.status = str(error)
         self._closed.wait(self._interval)
 
     def _draw(self) -> None:
         drawn = picture(self._machine, "svg", run=self._history, **self._looks)
+        if self._closed.is_set():
+            return
         self.status = _status(self._history)
         self.picture = drawn.decode("utf-8", "replace")
 

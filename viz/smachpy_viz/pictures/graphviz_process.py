@@ -15,6 +15,7 @@ import selectors
 import shutil
 import subprocess
 import tempfile
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
@@ -28,6 +29,8 @@ from smachpy.exceptions import SmachError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from actionlib_core.clock import Event
+
     Run = Callable[[Sequence[str]], list[dict[str, Any] | None]]
 
 DOT_VARIABLE = "SMACHPY_DOT"
@@ -40,6 +43,7 @@ END = "// end of graph"
 """The comment line after each DOT text, which separates the texts in a stream."""
 
 _JSON_END = b"\n}\n"
+_LOOK_S = 0.1  # time between two looks at whether nobody waits for a layout any more
 _REAL = RealClock()  # `dot` runs in real time, even if the machine's clock is virtual
 
 T = TypeVar("T")
@@ -79,6 +83,19 @@ def find_dot() -> tuple[str, ...]:
         "picture: no `dot` program found. Try: pip install 'smachpy[dot]', "
         "or: sudo apt-get install graphviz"
     )
+
+
+_unwanted: ContextVar[Event | None] = ContextVar("unwanted", default=None)
+
+
+@contextlib.contextmanager
+def until(unwanted: Event) -> Iterator[None]:
+    """Let layouts of this thread end with an `EngineError` once `unwanted` is set."""
+    token = _unwanted.set(unwanted)
+    try:
+        yield
+    finally:
+        _unwanted.reset(token)
 
 
 def lay_out(work: Callable[[Run], T]) -> T:
@@ -228,12 +245,16 @@ class _Layouts:
         """Write and read at the same time, so that a full pipe cannot block both sides."""
         output = bytearray()
         found = 0
+        unwanted = _unwanted.get()
         with selectors.DefaultSelector() as selector:
             selector.register(self._in, selectors.EVENT_WRITE)
             selector.register(self._out, selectors.EVENT_READ)
             while found < expected:
-                ready = selector.select(max(self._deadline - _REAL.now(), 0))
-                if not ready:
+                left = max(self._deadline - _REAL.now(), 0)
+                ready = selector.select(min(left, _LOOK_S) if unwanted else left)
+                if unwanted and unwanted.is_set():
+                    raise EngineError(f"picture: {self._command[0]}: nobody waits for it any more.")
+                if not ready and _REAL.now() >= self._deadline:
                     raise _TooSlowError
                 for key, _ in ready:
                     if key.fileobj is self._out:
