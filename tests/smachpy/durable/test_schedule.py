@@ -42,9 +42,9 @@ def test_a_schedule_begins_one_mission_however_long_nobody_looked(tmp_path):
     store.close()
 
 
-def test_a_due_time_that_has_had_its_mission_only_moves_the_schedule(tmp_path):
+def test_a_due_time_that_has_had_its_mission_only_moves_the_schedule(store_place):
     """The clock was put back, or the schedule was forgotten and made again: the runner ended."""
-    store = open_store(tmp_path / "journal.db")
+    store = open_store(store_place)
     store.create(row("night", due=NOW - 86400, every="0 9 * * *"))
     (found,) = store.look().schedules
     begun, due = next_of(found, NOW)
