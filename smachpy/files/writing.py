@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.inputs.yaml_text import MAX_YAML_LENGTH, load_yaml
@@ -21,10 +22,13 @@ from smachpy.machines.state_machine import Sequence, StateMachine
 from smachpy.userdata.user_data import ConstantKey, data_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from collections.abc import Sequence as SequenceOf
 
 PLAIN = (str, int, float, bool, type(None))
+_PARAMETER: Final = re.compile(r"\${(\w+)}")
+# Mappings whose order means something: which state is first, which rule counts, what is computed.
+_IN_ORDER: Final = ("states", "outcome_map", "with")
 
 
 class NotWrittenError(MissionError):
@@ -65,25 +69,16 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
     data = {"name": name, **shown, **writer.container(machine, f"/{name}")}
     if writer.problems:
         raise NotWrittenError(writer.problems)
-    if "parameters" in data:
-        # Where the file has the value now, the parameter would have no effect.
-        rest = repr({key: value for key, value in data.items() if key != "parameters"})
-        kept = {one: data["parameters"][one] for one in data["parameters"] if f"${{{one}}}" in rest}
-        data = {key: kept if key == "parameters" else data[key] for key in data}
-        if not kept:
-            del data["parameters"]
+    data["parameters"] = dict(data.get("parameters", {}))
+    _drop(data, [one for one in data["parameters"] if one not in _used(data)])
     yaml = YAML()
     yaml.width = 120
     old: Any = None if path is None else _there(Path(path), yaml)
+    text = ""
     if old:
-        for key in ("smachpy", "help", "parameters"):
-            if key in old:
-                data = {**data, key: old[key]}
-        _merge(old, data)
-        data = old
-    stream = io.StringIO()
-    yaml.dump(data, stream)
-    text = stream.getvalue()
+        data = {**{key: old[key] for key in ("smachpy", "help") if key in old}, **data}
+        text = _onto(old, data, yaml)
+    text = text or _dumped(data, yaml)
     if path is not None:
         whole = Path(path).resolve()
         part = whole.with_name(f".{whole.name}.{os.getpid()}")
@@ -117,17 +112,84 @@ def _there(path: Path, yaml: Any) -> Any:
     raise NotWrittenError([f"{path}: the file that is there is {problem}; {expected}"])
 
 
-def _merge(old: Any, new: Mapping[str, Any]) -> None:
-    """Make `old`, which has comments, equal to `new`."""
+def _dumped(data: Any, yaml: Any) -> str:
+    stream = io.StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
+
+
+def _used(data: Mapping[str, Any]) -> set[str]:
+    """Return the parameters that a file uses."""
+    rest = repr({key: value for key, value in data.items() if key != "parameters"})
+    return set(_PARAMETER.findall(rest))
+
+
+def _drop(data: Any, names: Iterable[str]) -> None:
+    """Drop parameters that nothing uses any more: they would have no effect."""
+    for name in names:
+        del data["parameters"][name]
+    if "parameters" in data and not data["parameters"]:
+        del data["parameters"]
+
+
+def _onto(old: Any, data: Mapping[str, Any], yaml: Any) -> str:
+    """Return the text of the file `old`, with its comments, as `data`; "" if it cannot be that."""
+    before, there = _used(old), old.get("parameters", {})
+    parameters = {**there, **data.get("parameters", {})} if isinstance(there, dict) else {}
+    if parameters:
+        data = {**data, "parameters": parameters}
+    values = {
+        name: one["default"]
+        for name, one in parameters.items()
+        if isinstance(one, dict) and "default" in one
+    }
+    _merge(old, data, values)
+    _drop(old, [name for name in before - _used(old) if name in old.get("parameters", {})])
+    text = _dumped(old, yaml)
+    # What stands in several places of `old` by an anchor has only one value, for example.
+    found: Any = load_yaml(text)
+    return (
+        text if _same({**found, "parameters": None}, {**data, "parameters": None}, values) else ""
+    )
+
+
+def _merge(old: Any, new: Mapping[str, Any], values: Mapping[str, Any], name: str = "") -> None:
+    """Make `old`, which has comments, equal to `new`; `values` are the defaults of parameters."""
     for key in [key for key in old if key not in new]:
         del old[key]
     for key, value in new.items():
         if isinstance(value, dict) and isinstance(old.get(key), dict):
-            _merge(old[key], value)
-        elif isinstance(old.get(key), str) and "${" in old[key]:
-            continue  # the value of a parameter
-        elif key not in old or old[key] != value:
+            _merge(old[key], value, values, key)
+        elif key not in old or not _same(old[key], value, values):
             old[key] = value
+    if name in _IN_ORDER and [*old] != [*new]:
+        for key in new:
+            old.move_to_end(key)
+
+
+def _same(there: Any, new: Any, values: Mapping[str, Any], name: str = "") -> bool:
+    """Return whether the file has a value: as it is, or in a text with the defaults filled in."""
+    if isinstance(there, str) and there != new:
+        there = _filled(there, values)
+    if isinstance(there, dict) and isinstance(new, dict):
+        order: Any = list if name in _IN_ORDER else set
+        return order(there) == order(new) and all(
+            _same(there[key], new[key], values, key) for key in new
+        )
+    if isinstance(there, list) and isinstance(new, (list, tuple)):
+        return len(there) == len(new) and all(
+            _same(*pair, values) for pair in zip(there, new, strict=True)
+        )
+    return bool(there == new) and isinstance(there, bool) is isinstance(new, bool)
+
+
+def _filled(text: str, values: Mapping[str, Any]) -> Any:
+    names = _PARAMETER.findall(text)
+    if not all(name in values for name in names):
+        return text
+    if text == "".join(f"${{{name}}}" for name in names[:1]):
+        return values[names[0]]
+    return _PARAMETER.sub(lambda match: str(values[match[1]]), text)
 
 
 class _Writer:

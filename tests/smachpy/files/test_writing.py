@@ -137,6 +137,72 @@ def test_comments_stay_on_rewriting(tmp_path):
     load(path)
 
 
+def of_waits(folder: Path, *waits: tuple[str, float], kind: str = "machine") -> StateMachine:
+    """A machine, or a sequence in one, of states that wait."""
+    follows = [*(label for label, _ in waits[1:]), "done"]
+    states = [
+        f"{label}: {{state: wait, with: {{seconds: {seconds}}}, on: {{done: {to}}}}}"
+        for (label, seconds), to in zip(waits, follows, strict=True)
+    ]
+    text = "name: M\noutcomes: [done, preempted]\nstates:\n"
+    inside = ", ".join(states)
+    if kind == "sequence":
+        inside = inside.replace(", on: {done: done}", "").replace(
+            f", on: {{done: {follows[0]}}}", ""
+        )
+        inside = f"S: {{sequence: {{connector: done, outcomes: [done, preempted], states: {{{inside}}}}}, on: {{done: done}}}}"
+    path = folder / "source.yaml"
+    path.write_text(f"{text}  {{{inside}}}\n")
+    return load(path)
+
+
+@pytest.mark.parametrize("kind", ["machine", "sequence"])
+def test_the_order_of_states_is_that_of_the_machine_over_an_older_file_too(tmp_path, kind):
+    """The old order stayed: another state was first, or the sequence was another one."""
+    path = tmp_path / "m.yaml"
+    write(of_waits(tmp_path, ("UNDOCK", 1.0), ("DRIVE", 2.0), kind=kind), path)
+    path.write_text(path.read_text().replace("UNDOCK:", "UNDOCK:  # leave", 1))
+    machine = of_waits(tmp_path, ("DRIVE", 2.0), ("UNDOCK", 1.0), kind=kind)
+    write(machine, path)
+    again = load(path)
+    assert facts(smachpy.describe(again)) == facts(smachpy.describe(machine))
+    inside: Any = again if kind == "machine" else again["S"]
+    assert [*inside.get_children()] == ["DRIVE", "UNDOCK"]
+    assert "# leave" in path.read_text()
+
+
+PARAMETER = """name: M
+outcomes: [done, preempted]
+parameters: {pause: {type: number, default: 5.0}}
+states:
+  A: {state: wait, with: {seconds: "${pause}"}, on: {done: done}}
+"""
+
+
+@pytest.mark.parametrize(("seconds", "stays"), [(5.0, True), (99.0, False)])
+def test_a_parameter_of_the_older_file_stays_if_its_default_is_the_value(tmp_path, seconds, stays):
+    """It stayed whatever the machine had: the written file waited for another time."""
+    path = tmp_path / "m.yaml"
+    path.write_text(PARAMETER)
+    write(of_waits(tmp_path, ("A", seconds)), path)
+    assert ("pause" in path.read_text()) is stays
+    (state,) = smachpy.describe(load(path)).children
+    assert dict(state.details)["waits"] == f"{seconds:g} s"
+
+
+def test_an_older_file_that_cannot_have_the_values_is_replaced(tmp_path):
+    """An anchor gave two states the value of the second one."""
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "name: M\noutcomes: [done, preempted]\nstates:\n"
+        "  A: {state: wait, with: &pause {seconds: 1.0}, on: {done: B}}\n"
+        "  B: {state: wait, with: *pause, on: {done: done}}\n"
+    )
+    write(of_waits(tmp_path, ("A", 3.0), ("B", 4.0)), path)
+    written = smachpy.describe(load(path))
+    assert [dict(child.details)["waits"] for child in written.children] == ["3 s", "4 s"]
+
+
 def test_what_cannot_be_written_is_told_all_at_once(tmp_path):
     sm = StateMachine(["done", "preempted"], name="M", userdata={"where": Path("x")})
     sm.add("A", Wait(3.0))
