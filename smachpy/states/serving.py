@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from smachpy.base.problems import Problems
-from smachpy.machines.state import State
+from smachpy.machines.state import State, get_options, set_options
 from smachpy.machines.state_machine import StateMachine
 
 if TYPE_CHECKING:
@@ -38,6 +38,8 @@ Server: TypeAlias = Closeable | Stoppable
 def serve_during(machine: Container, *makers: Callable[[], Server]) -> None:
     """Make servers when `machine` starts, and close them in reverse order when it has ended.
 
+    They are closed when it raises, too; one attempt of `retry` has servers of its own.
+
     Args:
         machine: The machine.
         *makers: Functions that make one server each.
@@ -49,13 +51,24 @@ def serve_during(machine: Container, *makers: Callable[[], Server]) -> None:
     stack = ExitStack()
 
     def start(_userdata: UserData, _initial: object) -> None:
+        stack.close()  # of an attempt that has raised
         _open(stack, makers)
 
     def end(_userdata: UserData, _final: object, _outcome: str) -> None:
         stack.close()
 
+    hook = get_options(machine).on_exit
+
+    def leave(userdata: UserData, outcome: str | None) -> None:
+        try:
+            if hook is not None:
+                hook(userdata, outcome)
+        finally:
+            stack.close()
+
     machine.register_start_cb(start)
     machine.register_termination_cb(end)
+    set_options(machine, on_exit=leave)  # termination callbacks are not called if it raises
 
 
 def _check(where: str, makers: Iterable[object]) -> None:

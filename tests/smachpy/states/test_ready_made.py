@@ -18,7 +18,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Bool, Header
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
-from smachpy import InvalidStateError, StateMachine
+from smachpy import InvalidStateError, State, StateMachine
 from smachpy.places.pose import quaternion_of
 from smachpy.states import (
     AwaitMessage,
@@ -332,3 +332,30 @@ def test_a_machine_whose_server_cannot_be_made_closes_the_others_when_it_ends(mi
     serve_during(machine, makers(told)[0], broken)
     mission(machine).assert_outcome("done")  # what a start callback raises is logged, as in SMACH
     assert told == ["make a", "close a"]
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_servers_are_closed_when_the_machine_raises(mission, nested):
+    """They stayed on the network, and the next run opened them a second time."""
+    told = []
+
+    class Broken(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def execute(self, userdata):
+            told.append("raise")
+            raise OSError("no motor")
+
+    def left(userdata, outcome):
+        told.append(f"left {outcome}")
+
+    machine = StateMachine(["done"], retry=(2, 0.0, [OSError]), on_exit=left)
+    machine.add("BROKEN", Broken())
+    serve_during(machine, *makers(told))
+    root = alone(machine) if nested else machine
+    with pytest.raises(Exception, match="no motor"):
+        mission(root)
+    once = ["make a", "make b", "raise", "stop b", "close a"]
+    assert [one for one in told if not one.startswith("left")] == once * 2
+    assert "left None" in told
