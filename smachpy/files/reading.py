@@ -527,8 +527,22 @@ class _Reader:
             arguments = [self._transitions(entry), remapping]
             if type(made) is StateMachine:
                 arguments.append(self._mapping(entry, "constants"))
+                self._check_constants(entry, state)
         entry.close()
         self._try(entry, lambda: made.add(label, state, *arguments), made, state)
+
+    def _check_constants(self, entry: Section, state: State | None) -> None:
+        """Refuse constants of a ready-made state that reads no key."""
+        from smachpy.states.by_name import BY_NAME
+
+        origin = None if state is None else state._smachpy.made_from
+        # States of others may read what they do not declare.
+        is_ours = isinstance(origin, Origin) and origin.kind == "state" and origin.name in BY_NAME
+        if state is None or not is_ours or state._smachpy.input_keys:
+            return
+        constants = entry.section("constants")
+        for key in constants:
+            constants.report(key, f"got {key!r}; expected none: the state reads no key.")
 
     def _try(self, entry: Section, call: Callable[[], object], *needed: object) -> None:
         """Add a state; report what the machine says of it."""

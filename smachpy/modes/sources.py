@@ -9,8 +9,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 from actionlib_core.clock import RealClock
-from actionlib_core.inputs.expression import Expression
+from actionlib_core.inputs.expression import WHOLE, Expression
 from smachpy.base import log
+from smachpy.base.problems import unknown_name
 from smachpy.modes.table import ModesError
 
 if TYPE_CHECKING:
@@ -96,11 +97,17 @@ def on_topic(topic: str, msg_type: Any, event: str, when: str = "") -> Source:
 
     Raises:
         ExpressionError: `when` cannot be parsed.
-        ModesError: `msg_type` is no class.
+        ModesError: `msg_type` is no class, or `when` names a field that it does not have.
     """
     if not isinstance(msg_type, type):
         raise ModesError([f"on_topic: msg_type: got {msg_type!r}; expected a class of messages."])
-    return _Topic(topic, msg_type, event, Expression(when) if when else None)
+    condition, known = Expression(when) if when else None, list(getattr(msg_type, "__slots__", ()))
+    if condition is not None and known:
+        unknown = sorted(condition.names - {*known, WHOLE})
+        problems = [unknown_name("on_topic: when: field", name, known) for name in unknown]
+        if problems:
+            raise ModesError(problems)
+    return _Topic(topic, msg_type, event, condition)
 
 
 def on_service(name: str, event: str) -> Source:

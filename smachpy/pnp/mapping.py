@@ -166,8 +166,14 @@ def _condition(conditions: Section, name: str, imports: bool) -> Any:
     if isinstance(conditions.value(name), bool):
         return conditions.value(name)
     section = conditions.section(name)
-    section.allow("topic", "type", "when", "userdata", "run", "every")
+    kinds = {"topic": ("type", "when"), "userdata": (), "run": ("every",)}
+    both = {*kinds, *(key for more in kinds.values() for key in more)}
+    section.allow(*both)
     section.close()
+    first = next((one for one in kinds if one in section), "")
+    for key in section if first else ():
+        if key in both - {first, *kinds[first]}:  # it would have no effect
+            section.report(key, f"got {key!r} beside {first!r}; expected one of them.")
     if "userdata" in section:
         return _expression(section, "userdata")
     if "run" in section:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any, Final, Literal
 
+from smachpy.base.problems import Problems, unknown_name
 from smachpy.exceptions import InvalidStateError
 from smachpy.machines.state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from actionlib_core.inputs.expression import Expression
     from smachpy.userdata.user_data import UserData
 
 
@@ -88,7 +90,7 @@ def drive_to(
     place: str | None = None,
     x: float | None = None,
     y: float | None = None,
-    yaw: float = 0.0,
+    yaw: float | None = None,
     action: str = "move_base",
     exec_timeout: float = 600.0,
 ) -> State:
@@ -98,16 +100,19 @@ def drive_to(
         place: The userdata key of a pose, or of a mapping with x, y and maybe yaw; or give x and y.
         x: Position in the map frame [m].
         y: Position in the map frame [m].
-        yaw: Heading there [rad].
+        yaw: Heading there [rad]; 0 unless given.
         action: Name of the action.
         exec_timeout: Longest drive [s].
     """
     from smachpy.places.pose import Pose2D
     from smachpy.states.driving import drive_to as driving
 
-    if (place is None) == (x is None or y is None):
-        raise InvalidStateError("drive_to: got both or none of place and x, y; expected one.")
-    where: Any = place if x is None or y is None else Pose2D(x, y, yaw)
+    given = [name for name, value in (("x", x), ("y", y), ("yaw", yaw)) if value is not None]
+    if place is not None and given:
+        raise InvalidStateError(f"drive_to: got place and {', '.join(given)}; expected one.")
+    if place is None and (x is None or y is None):
+        raise InvalidStateError("drive_to: got neither place nor x and y; expected one.")
+    where: Any = place if x is None or y is None else Pose2D(x, y, yaw or 0.0)
     return driving(where, action=action, exec_timeout=exec_timeout)
 
 
@@ -178,6 +183,8 @@ def action(
     from actionlib_core.wire.action_types import ActionTypes
     from smachpy.actions.simple_action_state import SimpleActionState
 
+    if goal is not None and goal_key is not None:
+        raise InvalidStateError("action: got goal and goal_key; expected one of them.")
     spec = _interface("action", type)
     made = None if goal is None else ActionTypes.of(spec).goal.from_dict(goal)
     return SimpleActionState(
@@ -210,12 +217,12 @@ def service(
         response_key: The userdata key that gets the response.
         timeout: Longest time for the call [s].
     """
-    from actionlib_core.inputs.expression import Expression
     from smachpy.actions.service_state import ServiceState
 
     spec = _interface("service", type)
     made = spec._request_class.from_dict(request or {})
-    holds = Expression(succeeded_if) if succeeded_if else None
+    response = spec._response_class
+    holds = _on_message("succeeded_if", succeeded_if, response) if succeeded_if else None
 
     def judge(_userdata: UserData, response: Any) -> str:
         return "succeeded" if holds is None or holds(response) else "aborted"
@@ -234,16 +241,16 @@ def monitor(topic: str, type: str, valid_while: str, timeout: float | None = Non
         valid_while: An expression over the message, such as `percentage >= 0.3`.
         timeout: Longest wait [s].
     """
-    from actionlib_core.inputs.expression import Expression
     from smachpy.actions.monitor_state import MonitorState
 
-    holds = Expression(valid_while)
+    kind = _interface("message", type)
+    holds = _on_message("valid_while", valid_while, kind)
 
     def check(_userdata: UserData, message: Any) -> bool:
         return bool(holds(message))
 
     check.__name__ = valid_while  # shown in pictures
-    return MonitorState(topic, _interface("message", type), check, timeout=timeout)
+    return MonitorState(topic, kind, check, timeout=timeout)
 
 
 def await_message(
@@ -262,15 +269,15 @@ def await_message(
         key: The userdata key that gets the message.
         timeout: Longest wait [s]; none: no limit.
     """
-    from actionlib_core.inputs.expression import Expression
     from smachpy.states.waiting import AwaitMessage
 
-    holds = Expression(until) if until else None
+    kind = _interface("message", type)
+    holds = _on_message("until", until, kind) if until else None
 
     def wanted(message: Any) -> bool:
         return holds is None or bool(holds(message))
 
-    return AwaitMessage(topic, _interface("message", type), wanted, key=key, timeout=timeout)
+    return AwaitMessage(topic, kind, wanted, key=key, timeout=timeout)
 
 
 def publish(
@@ -278,7 +285,7 @@ def publish(
     type: str,  # noqa: A002  its name in files
     message: Mapping[str, Any] | None = None,
     key: str | None = None,
-    subscribers: int = 1,
+    subscribers: int | None = None,
     latch: bool = False,
     timeout: float | None = 5.0,
 ) -> State:
@@ -289,18 +296,22 @@ def publish(
         type: Its type, such as `std_msgs/Bool`.
         message: The fields of the message; a header may be `auto`.
         key: The userdata key of the message or its fields, instead.
-        subscribers: How many subscribers to wait for; 0: none.
+        subscribers: How many subscribers to wait for, 1 unless given; 0: none.
         latch: Keep the message for later subscribers, and wait for none.
         timeout: Longest wait [s]; none: no limit.
     """
     from smachpy.states.topics import Publish
 
+    if latch and subscribers:
+        raise InvalidStateError(
+            f"publish: got latch and subscribers: {subscribers}; expected one of them."
+        )
     return Publish(
         topic,
         _interface("message", type),
         message,
         key=key,
-        subscribers=subscribers,
+        subscribers=1 if subscribers is None else subscribers,
         latch=latch,
         timeout=timeout,
     )
@@ -516,6 +527,23 @@ def set_lifecycle(node: str, state: str = "active", timeout: float | None = 60.0
     from smachpy.states.ros2_nodes import SetLifecycle
 
     return SetLifecycle(node, state, timeout=timeout)
+
+
+def _on_message(argument: str, text: str, kind: Any) -> Expression:
+    """Return an expression over messages of a class.
+
+    Raises:
+        ExpressionError: it cannot be parsed.
+        InvalidStateError: it names a field that they do not have.
+    """
+    from actionlib_core.inputs.expression import WHOLE, Expression
+
+    made, known = Expression(text), list(kind.__slots__)
+    problems = Problems("")
+    for name in sorted(made.names - {*known, WHOLE}):
+        problems.add(unknown_name(f"{argument}: field", name, known))
+    problems.raise_all()
+    return made
 
 
 def _interface(kind: str, name: str) -> Any:

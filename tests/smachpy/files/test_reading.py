@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -419,6 +420,51 @@ def test_the_code_of_a_plan_in_another_folder(file, tmp_path, monkeypatch, besid
     assert load(path).execute() == "goal"
     found = Path(sys.modules["robot_of_plan"].__file__)
     assert found.parent.name == ("plans" if beside == "plan" else tmp_path.name)
+
+
+@pytest.mark.parametrize(
+    ("entry", "problem"),
+    [
+        ("drive_to, with: {place: shelf, yaw: 1.5}", "drive_to: got place and yaw; expected one"),
+        ("drive_to, with: {place: shelf, x: 1}", "drive_to: got place and x; expected one"),
+        ("drive_to, with: {x: 1}", "drive_to: got neither place nor x and y"),
+        (
+            "publish, with: {topic: a, type: std_msgs/Bool, message: {}, latch: true, subscribers: 3}",
+            "publish: got latch and subscribers: 3; expected one",
+        ),
+        (
+            "action, with: {name: a, type: move_base_msgs/MoveBase, goal: {}, goal_key: shelf}",
+            "action: got goal and goal_key; expected one",
+        ),
+        (
+            "wait, with: {seconds: 5}, constants: {seconds: 7}",
+            "states.A.constants.seconds: got 'seconds'; expected none: the state reads no key",
+        ),
+        (
+            "service, with: {name: s, type: std_srvs/Trigger, succeeded_if: sucess}",
+            "3:63: states.A.with.succeeded_if: field: got 'sucess'; .*Did you mean 'success'",
+        ),
+        (
+            "monitor, with: {topic: b, type: std_msgs/Bool, valid_while: dta}",
+            "states.A.with.valid_while: field: got 'dta'; .*Did you mean 'data'",
+        ),
+        (
+            "await_message, with: {topic: b, type: std_msgs/Bool, until: m.data and dta}",
+            "states.A.with.until: field: got 'dta'",
+        ),
+    ],
+)
+def test_what_has_no_effect_or_names_no_field_is_refused(file, entry, problem):
+    (found,) = problems_of(
+        file(f"outcomes: [done]\nstates:\n  A: {{state: {entry}}}\nuserdata: {{shelf: {{}}}}\n")
+    )
+    assert re.search(problem, found), found
+
+
+@pytest.mark.parametrize("more", ["latch: true", "latch: true, subscribers: 0", "subscribers: 3"])
+def test_publish_waits_for_subscribers_or_latches(file, more):
+    text = f"{{state: publish, with: {{topic: a, type: std_msgs/Bool, message: {{}}, {more}}}}}"
+    load(file(f"outcomes: [succeeded, aborted, preempted]\nstates:\n  A: {text}\n"))
 
 
 def test_stop_others_names_states_of_the_concurrence(file):

@@ -608,6 +608,13 @@ def test_what_is_no_source_of_an_event_is_refused(make, problem):
         Modes(["a", "b"], [["start", "a", "b"]], listen=[make()])
 
 
+def test_a_misspelt_field_in_the_condition_of_a_topic_is_refused():
+    """It was an error in each message's callback."""
+    with pytest.raises(ModesError, match=r"on_topic: when: field: got 'percentge'.*'percentage'"):
+        on_topic("battery", BatteryState, "low", "percentge < 0.2")
+    on_topic("battery", BatteryState, "low", "m.percentage < 0.2")
+
+
 def test_what_is_no_machine_of_transitions_is_refused():
     with pytest.raises(ModesError, match="machine: got 5; expected one of the package"):
         Modes.from_machine(5)

@@ -118,6 +118,16 @@ def test_goals_are_typed_by_their_fields(folder):
     assert dict(state.describe_details()[1])["action"] == "move_base"
 
 
+def test_a_condition_of_two_kinds_is_refused(folder):
+    """All but one of them had no effect."""
+    text = MAPPING + "  low: {userdata: x > 0, topic: battery, every: 0.5}\n"
+    Path("actions.yaml").write_text(text)
+    with pytest.raises(PlanError) as caught:
+        read_mapping("actions.yaml")
+    assert [problem.element for problem in caught.value.found] == [
+        "conditions.low.userdata", "conditions.low.every"]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("old", "new", "text", "line"),
     [
