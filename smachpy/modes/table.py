@@ -129,6 +129,7 @@ class Table:
             self._unknown("initial", initial, known)
         if not self.problems:
             self._validate(plain, rows)
+            self._find_dead(rows)
         if self.problems:
             raise ModesError(self.problems)
         self.ways = self._compile(rows)
@@ -223,6 +224,19 @@ class Table:
             )
         except (MachineError, ValueError, KeyError) as error:
             self.problems.append(f"{error}; expected what the package 'transitions' takes.")
+
+    def _find_dead(self, rows: list[dict[str, Any]]) -> None:
+        """Report ways that are never taken, as an earlier one has no condition."""
+        always: dict[tuple[str, str], str] = {}  # (source, event) -> where it leads in any case
+        for row in rows:
+            for source in row["source"] if not row["when"] else ():
+                target = self._leaf(row["dest"])
+                first = always.setdefault((source, row["trigger"]), target)
+                if first != target:
+                    self.problems.append(
+                        f"transition {row['trigger']!r}: got ways from {source!r} to {first!r} and "
+                        f"to {target!r}; expected one, or a condition for the first."
+                    )
 
     def _leaf(self, name: str) -> str:
         """Return the innermost mode that is entered with a mode."""

@@ -566,6 +566,24 @@ def test_a_nested_machine_of_transitions_can_be_given(separator):
         Modes.from_machine(machine, {"manual_quick": mission})
 
 
+def test_a_second_way_without_a_condition_is_refused():
+    """It could never be taken."""
+    states = ["a", "b", {"name": "m", "children": ["x", "y"]}]
+    with pytest.raises(ModesError, match="'go': got ways from 'a' to 'b' and to 'm_x'; expected"):
+        Table(states, [["go", "a", "b"], ["go", ["b", "a"], "m"]])
+    Table(
+        states,
+        [
+            ["go", "a", "b", "ready"],
+            ["go", "a", "m"],
+            ["go", "*", "b"],  # for all others
+            ["go", "a", "m_x"],  # says the same again
+            ["back", "m", "a"],
+            ["back", "m_x", "b"],  # of the inner mode, which comes first
+        ],
+    )
+
+
 def test_a_way_is_not_for_a_mode_whose_name_only_begins_with_that_of_its_source():
     ways = [["stop", "auto", "idle"]]
     table = Table(["auto", "auto_return", {"name": "manual", "children": ["slow"]}, "idle"], ways)
