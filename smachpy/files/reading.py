@@ -438,7 +438,7 @@ class _Reader:
                 continue
             value = self._filled(section, name, section.value(name))
             if name == "retry" and isinstance(value, dict):
-                retry = section.section("retry")
+                retry = Section(section.file, section.path("retry"), value)
                 value = (
                     retry.integer("attempts", 2),
                     retry.number("backoff", 0.0),
@@ -446,7 +446,7 @@ class _Reader:
                 )
                 retry.close()
             if name == "resource" and isinstance(value, dict):
-                resource = section.section("resource")
+                resource = Section(section.file, section.path("resource"), value)
                 value = (resource.text("name", REQUIRED), resource.text("policy", "wait", POLICIES))
                 resource.close()
             found[name] = value

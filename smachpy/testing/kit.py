@@ -335,7 +335,7 @@ class MissionKit:
             visit: With `on`: at this visit of the state, from 1.
 
         Raises:
-            ValueError: neither or both of `at` and `on`.
+            ValueError: neither or both of `at` and `on`, or `after` or `visit` without `on`.
         """
         self._add_trigger("preempt", at, on, after, visit)
 
@@ -392,6 +392,10 @@ class MissionKit:
     ) -> None:
         if (at is None) == (on is None):
             raise ValueError(f"{what}: got at={at!r} and on={on!r}; expected one of them.")
+        if on is None and (after, visit) != (0.0, 1):
+            raise ValueError(
+                f"{what}: got after={after!r} and visit={visit!r} without on; expected a state."
+            )
 
         def ask(machine: Container) -> None:
             if what == "interrupt":

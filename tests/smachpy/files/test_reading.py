@@ -467,6 +467,22 @@ def test_publish_waits_for_subscribers_or_latches(file, more):
     load(file(f"outcomes: [succeeded, aborted, preempted]\nstates:\n  A: {text}\n"))
 
 
+def test_parameters_in_retry_and_resource(file):
+    """They were told to be no numbers."""
+    text = """outcomes: [done, preempted]
+parameters: {n: {type: whole, default: 3}, base: {default: arm}}
+states:
+  A:
+    state: wait
+    retry: {attempts: "${n}", on: [done]}
+    resource: {name: "${base}", policy: wait}
+"""
+    options = smachpy.get_options(load(file(text))["A"])
+    assert (options.retry.attempts, options.resource.name) == (3, "arm")
+    (problem,) = problems_of(file(text.replace("default: 3", "default: 0")))
+    assert "retry.attempts" in problem or "states.A.retry" in problem
+
+
 def test_stop_others_names_states_of_the_concurrence(file):
     text = "outcomes: [done, preempted]\nstates:\n  A: {concurrence: {outcomes: [done, preempted], default_outcome: done, stop_others: [LET], states: {LEFT: {state: wait}}}}\n"
     (problem,) = problems_of(file(text))

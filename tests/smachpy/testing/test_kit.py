@@ -319,6 +319,14 @@ def test_interrupt_is_a_shutdown_and_a_preempt(mission):
     assert shutdown.requested()
 
 
+@pytest.mark.parametrize("more", [{"after": 3.0}, {"visit": 7}])
+def test_arguments_of_a_state_without_one_are_refused(mission, more):
+    """They had no effect."""
+    for ask in (mission.preempt, mission.interrupt, lambda **given: mission.trigger("x", **given)):
+        with pytest.raises(ValueError, match="without on; expected a state"):
+            ask(at=2.0, **more)
+
+
 def test_neither_at_nor_on(mission):
     with pytest.raises(ValueError, match="one of them"):
         mission.preempt()
