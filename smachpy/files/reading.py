@@ -792,7 +792,7 @@ class _Reader:
         except SmachError as error:
             entry.report("state", str(error))
             return None
-        state._smachpy.made_from = origin
+        state._smachpy.made_from = replace(origin, loaded=state._smachpy.options)
         return state
 
     def _inside(self, name: str) -> Path:
@@ -877,7 +877,7 @@ class _Reader:
             return finish(load_plan(path), origin, options, place)
 
         if named:
-            plan._smachpy.made_from = _Pending(make, origin)
+            plan._smachpy.made_from = _Pending(make, plan._smachpy.made_from)
         return plan
 
 

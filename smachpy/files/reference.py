@@ -8,7 +8,7 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -24,6 +24,7 @@ from smachpy.machines.state import FunctionState, State, set_options
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from smachpy.engine.options import Options
     from smachpy.events.introspection import Kind
 
 GROUP: Final = "smachpy.states"
@@ -39,6 +40,7 @@ class Origin:
         arguments: The mapping `with`, as in the file.
         options: The options, as in the file.
         keys: The outcomes and keys that the file declares.
+        loaded: All options of the state as it was loaded; the program may have set others since.
     """
 
     kind: str
@@ -46,6 +48,7 @@ class Origin:
     arguments: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     keys: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    loaded: Options | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,5 +422,5 @@ def finish(state: State, origin: Origin, options: Mapping[str, Any], place: Nami
     if missing:
         problem = unknown_name("outcome", missing[0], state._smachpy.outcomes)
         raise MissionError(f"{place.where}: {origin.name}: {problem}")
-    state._smachpy.made_from = origin
+    state._smachpy.made_from = replace(origin, loaded=state._smachpy.options)
     return state

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from collections.abc import Sequence as SequenceOf
 
+    from smachpy.engine.options import Options
+
 PLAIN = (str, int, float, bool, type(None))
 _PARAMETER: Final = re.compile(r"\${(\w+)}")
 # Mappings whose order means something: which state is first, which rule counts, what is computed.
@@ -221,7 +223,7 @@ class _Writer:
             found["userdata"] = {
                 k: self._plain(v, f"{path}: userdata {k}") for k, v in values.items()
             }
-        found |= self._options(container, path)
+        found |= self._options(data.options, path)
         if isinstance(container, Iterator):
             return found | self._iterator(container, path) | self._cleanup(container, path)
         if isinstance(container, Concurrence):
@@ -314,7 +316,7 @@ class _Writer:
             found: dict[str, Any] = {origin.kind: origin.name}
             if origin.arguments:
                 found["with"] = dict(origin.arguments)
-            return {**found, **origin.keys, **origin.options}
+            return {**found, **origin.keys, **self._changed(state, origin, path)}
         if isinstance(state, Container):
             kinds = {
                 StateMachine: "machine",
@@ -335,7 +337,7 @@ class _Writer:
         return {
             "state": name,
             "outcomes": list(state._smachpy.outcomes),
-            **self._options(state, path),
+            **self._options(state._smachpy.options, path),
         }
 
     def _name(self, state: State) -> str | None:
@@ -358,8 +360,22 @@ class _Writer:
         same = own == plain and state._smachpy.outcomes == fresh._smachpy.outcomes
         return f"{kind.__module__}:{kind.__qualname__}" if same else None
 
-    def _options(self, state: State, path: str) -> dict[str, Any]:
-        options = state._smachpy.options
+    def _changed(self, state: State, origin: Origin, path: str) -> dict[str, Any]:
+        """Return the options as in the file, and those that the program has set since."""
+        found, loaded = dict(origin.options), origin.loaded
+        if loaded is None or loaded == state._smachpy.options:
+            return found
+        now = self._options(state._smachpy.options, path, loaded)
+        then = self._options(loaded, path, loaded)
+        for key in {**then, **now}:
+            if key in now and now[key] != then.get(key):
+                found[key] = now[key]
+            elif key not in now and found.pop(key, None) is None:
+                self._refuse(path, f"{key}: got none; expected that of {origin.name}.")
+        return found
+
+    def _options(self, options: Options, path: str, known: Options | None = None) -> dict[str, Any]:
+        """Return options as a file has them; code is refused unless `known` options have it."""
         found: dict[str, Any] = {}
         if options.timeout is not None:
             found |= {"timeout": options.timeout, "timeout_outcome": options.timeout_outcome}
@@ -373,7 +389,7 @@ class _Writer:
                 "on": self._plain(retry.on, f"{path}: retry: on"),
             }
         for name in ("on_exception", "on_enter", "on_exit", "on_resume"):
-            if getattr(options, name):
+            if getattr(options, name) and getattr(known, name, None) != getattr(options, name):
                 self._refuse(path, f"{name}: got code; expected none.")
         if options.resume is not None:
             found["resume"] = self._plain(options.resume, f"{path}: resume")

@@ -203,6 +203,28 @@ def test_an_older_file_that_cannot_have_the_values_is_replaced(tmp_path):
     assert [dict(child.details)["waits"] for child in written.children] == ["3 s", "4 s"]
 
 
+def test_options_that_were_set_after_loading_are_written(tmp_path):
+    """The file had those of before."""
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "name: M\noutcomes: [done, preempted]\nparameters: {n: {type: whole, default: 3}}\nstates:\n"
+        '  A: {state: wait, with: {seconds: 1}, retry: {attempts: "${n}", on: [done]}, on: {done: B}}\n'
+        "  B: {state: wait, with: {seconds: 1}, idempotent: true, on: {done: done}}\n"
+    )
+    machine = load(path)
+    smachpy.set_options(machine["A"], timeout=7.0, timeout_outcome="preempted")
+    smachpy.set_options(machine["B"], idempotent=False)
+    text = write(machine)
+    assert "${n}" in text
+    path.write_text(text)
+    again = load(path)
+    for label in ("A", "B"):
+        assert smachpy.get_options(again[label]) == smachpy.get_options(machine[label])
+    smachpy.set_options(machine["A"], on_exit=print)
+    with pytest.raises(NotWrittenError, match="on_exit: got code"):
+        write(machine)
+
+
 def test_what_cannot_be_written_is_told_all_at_once(tmp_path):
     sm = StateMachine(["done", "preempted"], name="M", userdata={"where": Path("x")})
     sm.add("A", Wait(3.0))
