@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from copy import deepcopy
+from functools import lru_cache
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,6 +22,9 @@ MAX_YAML_NESTING: Final = 200
 
 MAX_YAML_NUMBER: Final = 1000
 """Longest whole number [characters]: Python cannot write those of more than 4300 digits."""
+
+_KEPT_LENGTH: Final = 10_000
+"""Longest text whose data are kept for the next time [characters]."""
 
 
 class YamlTextError(ValueError):
@@ -67,6 +72,16 @@ def load_with_marks(text: str) -> tuple[object, dict[str, tuple[int, int]]]:
     Raises:
         YamlTextError: as for `load_yaml`.
     """
+    if len(text) > _KEPT_LENGTH:
+        return _parsed(text)
+    data, marks = _kept(text)
+    try:
+        return deepcopy(data), marks.copy()
+    except RecursionError as error:
+        raise YamlTextError("it is nested too deeply") from error
+
+
+def _parsed(text: str) -> tuple[object, dict[str, tuple[int, int]]]:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError
     from ruamel.yaml.reader import ReaderError
@@ -100,6 +115,11 @@ def load_with_marks(text: str) -> tuple[object, dict[str, tuple[int, int]]]:
         raise YamlTextError("it is nested too deeply") from error
     except Exception as error:  # ruamel.yaml: any exception, for a value that does not fit its tag
         raise YamlTextError(str(error) or type(error).__name__) from error
+
+
+# Each run of an exploration makes its mission, and so reads the same files again. The parser, which
+# is in Python, took most of the time of short runs.
+_kept = lru_cache(maxsize=64)(_parsed)
 
 
 def _check_depth(text: str) -> None:

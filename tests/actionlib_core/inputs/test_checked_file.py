@@ -8,6 +8,7 @@ from typing import Literal
 import pytest
 
 from actionlib_core.inputs.checked_file import REQUIRED, CheckedFile, Limits, Problem
+from actionlib_core.inputs.yaml_text import load_with_marks
 
 
 class WrongFileError(Exception):
@@ -300,3 +301,16 @@ def test_a_number_that_python_cannot_write_is_one_problem_too(read):
     file = read("a: 1\n", parse=lambda _file, _text: ({"a": 16**5000}, {"a": 1}))  # as TOML has it
     file.top.number("a", 1)
     assert texts_of(file) == ["1: a: got a number with too many digits; expected a number."]
+
+
+def test_data_and_places_of_a_text_that_was_read_before_are_the_callers_own():
+    text = "a: &one [{b: 1}]\nc: *one\n"
+    data, places = load_with_marks(text)
+    data["a"][0]["b"] = 2
+    places.clear()
+
+    again, places = load_with_marks(text)
+
+    assert again == {"a": [{"b": 1}], "c": [{"b": 1}]}
+    assert again["a"] is again["c"]
+    assert places["c"] == (2, 1)
