@@ -389,7 +389,10 @@ class Ros1Error(ActionlibError):
     Attributes:
         peer: The address of the master or node, or the node's name.
         reason: The problem.
+        refused: It has answered, and says no.
     """
+
+    refused = False
 
     def __init__(self, peer: str, reason: str) -> None:
         self.peer = peer

@@ -30,8 +30,15 @@ def read_answer(peer: str, method: str, answer: object) -> Any:
         raise Ros1Error(peer, f"{method}: got {answer!r:.200}; expected [code, text, value].")
     code, text, value = answer
     if code != SUCCESS:
-        raise Ros1Error(peer, f"{method}: refused: {text!s:.200}")
+        raise refusal(peer, method, text)
     return value
+
+
+def refusal(peer: str, method: str, text: object) -> Ros1Error:
+    """Return the error of a call that a master or node refuses with a text."""
+    error = Ros1Error(peer, f"{method}: refused: {text!s:.200}")
+    error.refused = True
+    return error
 
 
 def read_texts(peer: str, method: str, value: object) -> list[str]:

@@ -8,7 +8,8 @@ import threading
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.clock._serial import report_thread_exception
-from actionlib_core.exceptions import ActionlibError, Ros1Error
+from actionlib_core.exceptions import ActionlibError, InvalidNameError, Ros1Error
+from actionlib_core.names import check_name
 from actionlib_core.ros1.actions import ActionBridge
 from actionlib_core.ros1.answers import SystemState
 from actionlib_core.ros1.definitions import Definitions
@@ -236,7 +237,7 @@ class Ros1Bridge:
         elsewhere = set()
         for end in sorted(ends):
             name = self._sides.ros_name(end.name)
-            if name is None or end.session == own:
+            if name is None or end.session == own or not _is_name(name):
                 continue
             if end.session not in bridges:
                 found.setdefault(name, []).append(end)
@@ -312,6 +313,14 @@ class Ros1Bridge:
         for name, service in self._services.items():
             service.look(ends.get(name, []), served=services[name])
         self.plan = BridgePlan(actions, topics, services)
+
+
+def _is_name(name: str) -> bool:
+    """Return whether ROS 1 allows a name: anybody can invent a token."""
+    try:
+        return check_name(name) == name
+    except InvalidNameError:
+        return False
 
 
 def _keep(there: dict[str, B], wanted: Iterable[str], make: Callable[[str], B]) -> None:

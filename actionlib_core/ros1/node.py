@@ -508,7 +508,7 @@ class Ros1Node:
                 node.
 
         Raises:
-            Ros1Error: the master does not answer, or refuses; the next call continues.
+            Ros1Error: the master does not answer, or with nonsense; the next call continues.
         """
         with self._lock:
             published, subscribed = dict(self._published), dict(self._subscribed)
@@ -518,14 +518,16 @@ class Ros1Node:
         missing = wanted - there
         for topic in sorted(missing.published):
             type_name = published[topic].type or ANY
-            self.ask("registerPublisher", topic, type_name, self.uri)
+            self._ask_about(topic, "registerPublisher", type_name, self.uri)
         for name in sorted(missing.served):
-            self.ask("registerService", name, self._rosrpc, self.uri)
+            self._ask_about(name, "registerService", self._rosrpc, self.uri)
         for topic, subscription in subscribed.items():
             nodes = frozenset(state.publishers.get(topic, ())) - {self.name}
             if topic in missing.subscribed or nodes != subscription.nodes:
                 asked = subscription.publishers.ask()  # before the call: see `Publishers`
-                uris = self.ask("registerSubscriber", topic, ANY, self.uri)
+                uris = self._ask_about(topic, "registerSubscriber", ANY, self.uri)
+                if uris is None:
+                    continue
                 uris = read_texts(self.master, "registerSubscriber", uris)
                 subscription.apply(subscription.publishers.answer(asked, uris))
                 subscription.nodes = nodes
@@ -563,13 +565,23 @@ class Ros1Node:
             except Ros1Error as error:  # the node has died, or it is tried again later
                 log.debug("ROS 1 bridge %s: %s of %s: %s", self.name, topic, node, error)
 
+    def _ask_about(self, name: str, method: str, *args: Any, timeout: float | None = None) -> Any:
+        """Ask about one name. A refusal says nothing of others: it is reported and gives None."""
+        try:
+            return self.ask(method, name, *args, timeout=timeout)
+        except Ros1Error as error:
+            if not error.refused:
+                raise
+            self.report(f"{method} {name}", Ros1Error(name, str(error)))
+            return None
+
     def _unregister(self, names: Names, timeout: float | None = None) -> None:
         for topic in sorted(names.published):
-            self.ask("unregisterPublisher", topic, self.uri, timeout=timeout)
+            self._ask_about(topic, "unregisterPublisher", self.uri, timeout=timeout)
         for topic in sorted(names.subscribed):
-            self.ask("unregisterSubscriber", topic, self.uri, timeout=timeout)
+            self._ask_about(topic, "unregisterSubscriber", self.uri, timeout=timeout)
         for name in sorted(names.served):
-            self.ask("unregisterService", name, self._rosrpc, timeout=timeout)
+            self._ask_about(name, "unregisterService", self._rosrpc, timeout=timeout)
 
     def clean(self, state: SystemState, prefix: str) -> None:
         """Unregister bridges that were killed: subscribers would try to reach them for ever.

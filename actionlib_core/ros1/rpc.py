@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from xmlrpc.server import SimpleXMLRPCDispatcher, SimpleXMLRPCRequestHandler
 
 from actionlib_core.exceptions import Ros1Error
-from actionlib_core.ros1.answers import read_answer, split_address
+from actionlib_core.ros1.answers import read_answer, refusal, split_address
 from actionlib_core.ros1.links import TcpListener
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def call(uri: str, method: str, *args: Any, timeout: float = CALL_S) -> Any:
         with proxy:
             answer = getattr(proxy, method)(*args)
     except xmlrpc.client.Fault as error:
-        raise Ros1Error(uri, f"{method}: refused: {error.faultString:.200}") from error
+        raise refusal(uri, method, error.faultString) from error
     except TimeoutError as error:
         raise Ros1Error(uri, f"{method}: got no answer within {timeout:g} s.") from error
     except OSError as error:

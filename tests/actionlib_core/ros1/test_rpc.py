@@ -9,12 +9,19 @@ import pytest
 
 from actionlib_core.clock import RealClock
 from actionlib_core.exceptions import Ros1Error
+from actionlib_core.node import Node
 from actionlib_core.ros1 import links, rpc
 from actionlib_core.ros1 import node as node_module
+from actionlib_core.ros1.answers import SystemState
+from actionlib_core.ros1.bridging import Ros1Bridge
 from actionlib_core.ros1.frames import pack_frame
 from actionlib_core.ros1.links import Budget, Connection, TcpListener
 from actionlib_core.ros1.node import Ros1Node
+from actionlib_core.ros1.plan import Wanted
 from actionlib_core.ros1.rpc import RpcServer, call
+from actionlib_core.shutdown import Shutdown, use_shutdown
+from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.transport.tokens import Endpoint, Kind, token_key
 
 WAIT_S = 60.0
 ANSWERS = {
@@ -177,6 +184,97 @@ def test_connection_for_which_no_thread_can_be_started_is_refused_alone(listen, 
         assert refused.recv(1) == b""
     with socket.create_connection(("127.0.0.1", port), WAIT_S):
         assert heard.wait(WAIT_S)
+
+
+@pytest.mark.parametrize("refused", ["fault", "code"])
+def test_name_that_the_master_refuses_keeps_no_other_from_being_registered(
+    clock, caplog, refused, monkeypatch
+):
+    taken = []
+
+    def take(_caller, name, *_):
+        if " " in name:
+            raise ValueError(f"{name!r} is no name")
+        taken.append(name)
+        return []
+
+    words = ("registerPublisher", "registerSubscriber", "registerService", "unregisterSubscriber")
+    master = RpcServer("127.0.0.1", clock, dict.fromkeys(words, take))
+    if refused == "code":
+        dispatch = master._dispatch
+        bad = [-1, "is no name", 0]
+        monkeypatch.setattr(
+            master, "_dispatch", lambda word, args: bad if " " in args[1] else dispatch(word, args)
+        )
+    node = Ros1Node("/bridge", f"http://127.0.0.1:{master.port}", clock=clock)
+    made = [node.subscribe(name, lambda _header: None) for name in ("/a b", "/c")]
+    for name in ("/d e", "/f"):
+        made.append(
+            node.advertise(name, "x/Y", "1" * 32, "", latching=False, accept=lambda _header: bool)
+        )
+        made.append(node.provide(name, "x/Y", "1" * 32, lambda *_: b""))
+    left = SystemState(subscribers={"/g h": ["/bridge"], "/i": ["/bridge"]})
+    try:
+        for _ in range(2):
+            node.register(left)
+        assert sorted(set(taken)) == ["/c", "/f", "/i"]
+        told = [record.getMessage() for record in caplog.records]
+        assert len([text for text in told if "/a b" in text and "is no name" in text]) == 1
+    finally:
+        for each in made:
+            each.close()
+        node.close()
+        master.close(WAIT_S)
+
+
+def test_names_that_others_have_invented_are_not_bridged(clock):
+    asked, come = [], threading.Event()
+
+    def take(_caller, name, *_):
+        asked.append(name)
+        come.set()
+        return []
+
+    methods = dict.fromkeys(("registerPublisher", "registerSubscriber"), take)
+    methods |= {"getSystemState": lambda _: [[], [], []], "getTopicTypes": lambda _: []}
+    master = RpcServer("127.0.0.1", clock, methods)
+    network = MemoryNetwork(clock)
+    stranger, node = network.session(), Node("bridge", transport=network.session(), clock=clock)
+    invented = ["a b", "x:y", "ü", "fine"]
+    ends = [
+        Endpoint(Kind.PUBLISHER, name, "a/B", "1" * 32, stranger.session_id, "odd")
+        for name in invented
+    ]
+    tokens = [stranger.declare_alive(token_key(end)) for end in ends]
+    with use_shutdown(Shutdown()):
+        bridge = Ros1Bridge(node, f"http://127.0.0.1:{master.port}", Wanted(used=True))
+    try:
+        assert bridge.wait_for_master(WAIT_S)
+        assert come.wait(WAIT_S)
+        assert set(bridge.plan.topics) == set(asked) == {"/fine"}
+    finally:
+        for token in tokens:
+            token.close()
+        bridge.close()
+        stranger.close()
+        master.close(WAIT_S)
+
+
+def test_master_that_does_not_answer_is_asked_once_for_all_names(clock, monkeypatch):
+    node = Ros1Node("/bridge", "http://127.0.0.1:9", clock=clock)
+    made = [node.subscribe(name, lambda _header: None) for name in ("/a", "/b")]
+    asked = []
+    monkeypatch.setattr(
+        node_module, "call", lambda *args, **kw: asked.append(args) or call(*args, **kw)
+    )
+    try:
+        with pytest.raises(Ros1Error, match="cannot be reached"):
+            node.register(SystemState())
+        assert len(asked) == 1
+    finally:
+        for each in made:
+            each.close()
+        node.close()
 
 
 def test_one_call_with_many_publishers_starts_few_threads(clock, caplog):
