@@ -296,7 +296,11 @@ class Connection:
                 if sent == len(data):
                     return
                 rest = data[sent:]
-                self._sender = self._clock.spawn(lambda: self._send(rest), name="ros1-send")
+                try:
+                    self._sender = self._clock.spawn(lambda: self._send(rest), name="ros1-send")
+                except RuntimeError as error:  # no thread: the next message would be read as a rest
+                    log.warning("%s: %s: its connection ends", self.peer, error)
+                    self._end()
                 return
             self._waiting.append(data)
             self._size += len(data)
@@ -325,7 +329,11 @@ class Connection:
     def close(self) -> None:
         """End the connection: calls that wait on it return."""
         with self._lock:
-            self._closed = True
+            self._end()
+
+    def _end(self) -> None:
+        """End the connection. Needs the lock."""
+        self._closed = True
         # Not `close`: that would not wake a thread that waits on the socket, and the system could
         # give its number to another file.
         with contextlib.suppress(OSError):

@@ -124,6 +124,25 @@ def test_messages_for_one_who_does_not_read_are_dropped_and_counted(pair, monkey
     assert set(received[:-1]) == {message}
 
 
+def test_connection_for_whose_rest_of_a_message_no_thread_can_be_started_ends(pair, monkeypatch):
+    """The next message was read as the rest of the one before: wrong numbers at the robot."""
+    connection, theirs = pair
+
+    def fail(*_args, **_options):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(connection._clock, "spawn", fail)
+    message = b"x" * (1 << 24)
+    connection.put(message)
+    connection.put(b"next")
+    assert connection.read_frame() is None
+    theirs.settimeout(WAIT_S)
+    with theirs.makefile("rb") as file:
+        received = file.read()
+    assert 0 < len(received) < len(message)
+    assert received == pack_frame(message)[: len(received)]
+
+
 def test_waiting_until_all_has_been_taken_ends_with_the_connection(pair, clock):
     connection, theirs = pair
     theirs.sendall(b"\1\0\0\0x")
