@@ -65,7 +65,12 @@ class CallbackQueue:
             if self._helpers >= HELPERS:
                 return
             self._helpers += 1
-        self.spawn(self._help, self._name)
+        try:
+            self.spawn(self._help, self._name)
+        except BaseException:  # no thread is left: the next one may find one
+            with self._lock:
+                self._helpers -= 1
+            raise
 
     def _help(self) -> None:
         while True:

@@ -23,15 +23,17 @@ class Deadlines(Generic[T]):
     Args:
         counts: Returns whether an entry still counts, from its number and what is due.
 
-    Threads: none of its own, no lock; the owner calls it under its lock.
+    Threads: none of its own, no lock; the owner calls it under its lock, which may be reentrant: a
+        signal handler may call it in the middle of each method, wherever Python code runs.
     """
 
-    __slots__ = ("_counts", "_entries", "_room")
+    __slots__ = ("_cleaning", "_counts", "_entries", "_room")
 
     def __init__(self, counts: Callable[[int, T], bool]) -> None:
         self._counts = counts
         self._entries: list[tuple[float, int, T]] = []
         self._room = SPARE
+        self._cleaning = object()
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -46,9 +48,14 @@ class Deadlines(Generic[T]):
         """
         entries = self._entries
         if len(entries) >= self._room:
-            entries[:] = [entry for entry in entries if self._counts(entry[1], entry[2])]
-            heapq.heapify(entries)
-            self._room = 2 * len(entries) + SPARE
+            mine = self._cleaning = object()
+            kept = [entry for entry in entries if self._counts(entry[1], entry[2])]
+            heapq.heapify(kept)
+            if (
+                self._cleaning is mine
+            ):  # else a signal handler's `push` has come between, and cleaned
+                entries[:] = kept
+                self._room = 2 * len(kept) + SPARE
         heapq.heappush(entries, (due, number, what))
 
     def first(self) -> tuple[float, int, T] | None:
@@ -58,7 +65,8 @@ class Deadlines(Generic[T]):
             entry = entries[0]
             if self._counts(entry[1], entry[2]):
                 return entry
-            heapq.heappop(entries)
+            if entries and entries[0] is entry:  # a signal handler may have set an earlier one
+                heapq.heappop(entries)
         return None
 
     def pop(self) -> T:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import threading
 
 import pytest
 
+from actionlib_core.action._callbacks import HELPERS, CallbackQueue
 from actionlib_core.action.client import ActionClient, CommState
 from actionlib_core.action.goal_manager import CALLBACKS_S
 from actionlib_core.action.server import ActionServer
@@ -481,3 +483,26 @@ def test_cancel_is_heard_though_every_callback_of_the_mission_blocks():
         assert heard.wait(LONG_S)
         release.set()
         assert running.join(LONG_S)
+
+
+def test_urgent_callbacks_overtake_again_after_no_thread_could_be_started(world, monkeypatch):
+    told = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(str(args.exc_value)))
+    callbacks, ran, end = CallbackQueue(world.mission, "callbacks"), [], world.clock.event()
+    callbacks.call(end.wait, LONG_S)
+    world.clock.sleep(0.1)
+
+    def fail(*_args, **_options):
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as without:
+        without.setattr(callbacks, "spawn", fail)
+        for number in range(2 * HELPERS):
+            callbacks.call_urgently(ran.append, number)
+        world.clock.sleep(1.0)
+    assert ran == []
+    assert told == ["can't start new thread"] * 2 * HELPERS
+    callbacks.call_urgently(ran.append, "last")
+    world.clock.sleep(0.1)
+    assert ran == [*range(2 * HELPERS), "last"]
+    end.set()

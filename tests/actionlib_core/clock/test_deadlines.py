@@ -39,6 +39,30 @@ def test_what_counts_comes_in_order_of_time_and_then_of_number(entries):
     assert list(book.take()) == [number for _, number in sorted(expected)]
 
 
+@pytest.mark.parametrize("method", ["push", "first"])
+@pytest.mark.parametrize("due", [0.0, 9.0])
+def test_deadline_of_a_signal_handler_in_the_middle_of_another_call_is_not_lost(method, due):
+    class Interrupted(Book):
+        def counts(self, number, name):
+            if self.handler is not None:
+                self.handler, handler = None, self.handler
+                handler()
+            return super().counts(number, name)
+
+    book = Interrupted()
+    book.handler = None
+    for number in range(SPARE):
+        book.push(1.0 + number / SPARE, number, number)
+        book.cancelled.add(number)
+    book.handler = lambda: book.push(due, 1000, "of the handler")
+    if method == "push":
+        book.push(5.0, 1001, "kept")
+    else:
+        book.first()
+    assert book.handler is None
+    assert [name for name in book.take() if name != "kept"] == ["of the handler"]
+
+
 def test_size_follows_what_counts_at_a_constant_cost():
     book = Book()
     for number in range(100):
