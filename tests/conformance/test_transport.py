@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from functools import partial
 
 import pytest
 
@@ -214,6 +215,28 @@ def test_subscriber_of_the_same_session_gets_the_latched_message(network):
     inbox = network.inbox()
     a.subscribe(GOAL, inbox)
     assert payloads(inbox.wait_for(1)) == [b"1"]
+
+
+def test_latched_message_of_two_threads_is_the_one_that_came_last(network):
+    a, b = network.session(), network.session()
+    inbox = network.inbox()
+    b.subscribe(GOAL, inbox, history=False)
+    network.meet(a, b)
+    publisher = a.publisher(GOAL, "", LATCH)
+    network.meet(a, b)
+    sent = 100
+
+    def send(letter):
+        for number in range(sent):
+            publisher.put(b"%s%d" % (letter, number))
+
+    threads = [network.clock.spawn(partial(send, letter), name="sender") for letter in (b"a", b"b")]
+    for thread in threads:
+        thread.join(60.0)
+    last = payloads(inbox.wait_for(2 * sent))[-1]
+    late = network.inbox()
+    b.subscribe(GOAL, late)
+    assert payloads(late.wait_for(1)) == [last]
 
 
 def test_every_latched_publisher_is_heard(network):

@@ -234,7 +234,9 @@ class LatchedPublisher(Publisher):
         super().__init__(transport, key, encoding, quality)
         self._number = next(transport.numbers)
         self._encoding = encoding
-        self._lock = threading.Lock()
+        # Held while it sends: the last message that others hear is the one that is kept. Reentrant,
+        # as a signal's handler may publish while this thread does.
+        self._lock = threading.RLock()
         self._count = 0
         self._last: tuple[bytes, bytes] = b"", _pack_numbers(self._number, 0)
         self._own_key = f"{key}/@latch/{transport.session_id}/{self._number}"
@@ -247,7 +249,7 @@ class LatchedPublisher(Publisher):
             self._count += 1
             attachment = _pack_numbers(self._number, self._count)
             self._last = payload, attachment
-        super().put(payload, attachment)
+            super().put(payload, attachment)
 
     def _send(self, payload: bytes, attachment: bytes | None) -> None:
         self._port.put(payload, source_info=self._source, attachment=attachment)

@@ -736,3 +736,38 @@ def test_own_tokens_are_noted_before_the_network_tells_of_them(monkeypatch):
         assert seen == [(1, []), (-1, ["@test/a/1"])]
     finally:
         transport.close()
+
+
+def test_latched_message_that_comes_last_is_the_one_that_is_kept(monkeypatch):
+    transport = ZenohTransport()
+    try:
+        live, kept, news = [], [], CLOCK.event()
+
+        def see(seen, sample):
+            seen.append(sample.payload)
+            news.set()
+
+        def wait_for(seen, count):
+            while len(seen) < count:
+                assert news.wait(WAIT_S), seen
+                news.clear()
+
+        transport.subscribe("latched", partial(see, live), history=False)
+        publisher = transport.publisher("latched", "", Quality(latch=True))
+        other, send = threading.Thread(target=publisher.put, args=(b"2",)), publisher._send
+
+        def send_late(payload, attachment):
+            if payload == b"1":
+                other.start()
+                other.join(0.2)  # it may not overtake, so it waits for this one
+            send(payload, attachment)
+
+        monkeypatch.setattr(publisher, "_send", send_late)
+        publisher.put(b"1")
+        other.join(WAIT_S)
+        wait_for(live, 2)
+        transport.subscribe("latched", partial(see, kept))
+        wait_for(kept, 1)
+        assert kept == live[-1:]
+    finally:
+        transport.close()
