@@ -85,6 +85,19 @@ def test_the_report_begins_with_the_conclusion_and_links_to_the_runs(tmp_path):
     assert "<b>x" not in page
 
 
+def test_nothing_decides_where_all_runs_are_good(tmp_path):
+    values = {}
+    for number, speed in enumerate([0.5, 0.6]):
+        path = tmp_path / f"{number}.jsonl"
+        run(speed, path=path)
+        values[str(path)] = {"speed": speed}
+    runs = collect(map(read_recording, sorted(tmp_path.glob("*.jsonl"))))["JOB"]
+    page = report(runs, values=values)
+    assert "2 of 2 succeeded." in re.sub(r"<[^>]+>", "", page)
+    assert "<h2>What varied</h2>" in page
+    assert "<h2>What decides</h2>" not in page
+
+
 def test_where_a_run_ended_is_the_last_place_in_the_feedback_of_a_drive():
     record, story = run(0.3)
     position = {"$msg": "Point", "fields": {"x": 3.0, "y": 4.5, "z": 0.0}}

@@ -197,7 +197,9 @@ def _causes(runs: MachineRuns) -> str:
 def _scatter(runs: MachineRuns, numbers: list[dict[str, float]]) -> str:
     """The two varied values that part good runs and failures best, else the first two."""
     kinds = by_cause(runs.ends)
-    shared = bounds(runs.ends, kinds[0][1], numbers) if kinds else ()
+    if not kinds:
+        return ""  # no failure: nothing decides
+    shared = bounds(runs.ends, kinds[0][1], numbers)
     keys = list(dict.fromkeys([*(one.key for one in shared), *(k for n in numbers for k in n)]))
     there = [key for key in keys if all(key in one for one in numbers)][:2]
     return concluding.scatter(runs.ends, numbers, there, shared) if there else ""
