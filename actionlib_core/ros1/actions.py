@@ -340,7 +340,8 @@ class ServerInRos:
         if word == "result":
             self._subscriptions["feedback"].wait_idle(OVERTAKEN_S)
         try:
-            getattr(shown, f"on_{word}")(payload)
+            with contextlib.suppress(TransportError):  # withdrawn meanwhile
+                getattr(shown, f"on_{word}")(payload)
         except ValueError as error:
             about = f"{self._name}/{word} of {node}"
             self._sides.ros.report(about, Ros1Error(about, str(error)))
@@ -432,8 +433,7 @@ class _ShownServer:
         with self._lock:
             news = self._goals.on_statuses(entries, self._clock.now())
         if news:
-            with contextlib.suppress(TransportError):  # withdrawn meanwhile
-                self._status.put(payload)
+            self._status.put(payload)
 
     def on_feedback(self, payload: bytes) -> None:
         """Pass on feedback."""

@@ -16,6 +16,7 @@ from actionlib_core.goal.states import Status
 from actionlib_core.interfaces import get_action, get_message
 from actionlib_core.interfaces.actionlib.msg import (
     TestAction,
+    TestActionFeedback,
     TestActionGoal,
     TestActionResult,
     TestGoal,
@@ -491,3 +492,21 @@ def test_server_is_hidden_though_each_look_is_late():
             world.clock.sleep(20.0)
             shown.check_silence()
         assert not client.wait_for_server(Duration(0.1))
+
+
+@pytest.mark.parametrize("word", ["status", "feedback", "result"])
+def test_message_that_comes_while_its_server_is_being_hidden_does_not_end_its_link(word):
+    with TwoNodes() as world:
+        bridged = ServerInRos(
+            Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction"
+        )
+        for each, typed in types_of_test().items():
+            bridged.connect("/old", each, f"link for {each}", typed)
+        bridged._shown.close()  # as another thread does
+        listed = GoalStatus(goal_id=GoalID(id="g"), status=Status.ACTIVE)
+        messages = {
+            "status": GoalStatusArray(status_list=[listed]),
+            "feedback": TestActionFeedback(status=listed),
+            "result": TestActionResult(status=listed),
+        }
+        bridged.take("/old", word, f"link for {word}", messages[word].to_bytes())
