@@ -16,6 +16,7 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
     WaitTimeoutError,
 )
+from actionlib_core.goal.bounded import BYTES
 from actionlib_core.interfaces.geometry_msgs.msg import Point
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.node import Node, use_node
@@ -94,6 +95,24 @@ def test_slow_subscriber_drops_the_oldest_and_counts(nodes, clock):
     clock.sleep(100)
     assert heard == [0, 6, 7]
     assert subscriber.dropped == 5
+
+
+def test_with_queue_size_as_many_messages_wait_however_large_they_are(nodes, clock):
+    talker, listener = nodes
+    heard = []
+
+    def slow(message):
+        heard.append(message.data[0])
+        clock.sleep(10)
+
+    subscriber = Subscriber("images", String, slow, queue_size=3, node=listener)
+    publisher = Publisher("images", String, node=talker)
+    for number in range(4):
+        publisher.publish(str(number) * (BYTES // 2 + 1))
+        clock.sleep(1)
+    clock.sleep(100)
+    assert heard == ["0", "1", "2", "3"]
+    assert subscriber.dropped == 0
 
 
 def test_without_queue_size_nothing_is_dropped(nodes, clock):
