@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from smachpy.events.code import file_hash, own_files
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -36,6 +38,13 @@ def changes(recording: Recording, record: StateRecord, code: dict[str, Any]) -> 
     was, is_ = before.get("commit", ""), code["commit"]
     if was and was != is_:
         yield f"commit {is_[:10] or 'unknown'} now, was {was[:10]}"
+
+
+def code_has_changed(recording: Recording) -> bool:
+    """Return whether a file of the program is another one than it was."""
+    before = (recording.origin or {}).get("code", {}).get("files", {})
+    files = own_files()
+    return any(name in files and file_hash(files[name]) != was for name, was in before.items())
 
 
 def _first(found: Iterator[str]) -> Iterator[str]:

@@ -63,6 +63,12 @@ _BY_LIMIT: Final = 0.5
 _REMAPPED_S: Final = 0.6
 """A state that reads other keys may take another time: it counts from half of this [s]."""
 
+_SLEEPS_S: Final = 1.0
+"""A state of code that has changed differs if it takes longer than recorded by more than this [s].
+
+One that takes less does not: on the robot the code took time itself, and here it takes none.
+"""
+
 _NEAR_S: Final = 600.0
 """A value is a moment of the clock if it is nearer to now than this [s]."""
 
@@ -326,6 +332,17 @@ def limit_changes(old: StateRecord, new: StateRecord) -> dict[str, list[float]]:
     return found
 
 
+def own_states(record: StateRecord) -> set[str]:
+    """Return the paths of the states that only run the program's own code."""
+    return {state.path for state in record.walk() if state.kind in {"state", "callback"}}
+
+
+def _sleeps_longer(then: Step, now: Step, changed: Collection[str]) -> bool:
+    """Whether a state of which the code has changed took longer to come to its outcome."""
+    ended = then.kind == "Left" and dict(then.facts)["outcome"] != "preempted"
+    return ended and then.path in changed and now.took - then.took > _SLEEPS_S
+
+
 def _follows(then: Step, now: Step, limits: Mapping[str, Collection[float]]) -> bool:
     """Whether a state took longer or shorter as a limit of it has become."""
     later = now.took - then.took
@@ -407,6 +424,7 @@ def compare(
     *,
     is_complete: bool = True,
     limits: Mapping[str, Collection[float]] = MappingProxyType({}),
+    changed: Collection[str] = (),
     odds: Iterable[Odd] = (),
 ) -> Comparison:
     """Compare a run with its recording.
@@ -416,6 +434,8 @@ def compare(
         now: Those of the run.
         is_complete: The recording has the end of the run: nothing may follow.
         limits: What `limit_changes` returns: a state that takes another time for it differs.
+        changed: Paths of the states of which the code may have changed: one that takes longer
+            differs.
         odds: What differs besides the steps.
     """
     ours, theirs = _lanes(now), _lanes(recorded)
@@ -442,7 +462,11 @@ def compare(
         old, new = theirs.get(lane, []), ours.get(lane, [])
         pairs = enumerate(zip(old, new, strict=False))
         differs = (
-            n for n, (then, now_) in pairs if not then.is_same(now_) or _follows(then, now_, limits)
+            n
+            for n, (then, now_) in pairs
+            if not then.is_same(now_)
+            or _follows(then, now_, limits)
+            or _sleeps_longer(then, now_, changed)
         )
         at = next(differs, min(len(old), len(new)))
         if at == len(old) and (at == len(new) or not is_complete):

@@ -22,12 +22,13 @@ from smachpy.engine.journal import NO_JOURNAL, RunJournal
 from smachpy.events.code import code_facts
 from smachpy.events.introspection import describe
 from smachpy.exceptions import MissionError, SmachError, error_text
-from smachpy.reproduce.changes import changes
+from smachpy.reproduce.changes import changes, code_has_changed
 from smachpy.reproduce.compare import (
     compare,
     is_tolerated,
     limit_changes,
     odd_verdicts,
+    own_states,
     steps_of,
     unknown_tolerated,
 )
@@ -192,6 +193,7 @@ def reproduce(
         steps_of(now, record, cancelled, tolerate),
         is_complete=world.is_complete,
         limits=limit_changes(recording.record, record),
+        changed=own_states(record) if code_has_changed(recording) else (),
         odds=_odds(recording, player, now, tolerate),
     )
     is_same = comparison.difference is None

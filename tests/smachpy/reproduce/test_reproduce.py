@@ -264,6 +264,56 @@ def test_a_test_that_reads_its_recording_may_be_moved_with_it(night, monkeypatch
     names["test_round_as_recorded"]()
 
 
+@pytest.mark.parametrize(
+    ("seconds", "is_same"), [("2.0", True), ("2.4", True), ("3.5", False), ("0.5", True)]
+)
+def test_a_state_that_sleeps_longer_than_recorded_differs(tmp_path, monkeypatch, seconds, is_same):
+    """One that takes less time does not: its code itself took time on the robot."""
+    file, path = tmp_path / "nap.py", tmp_path / "nap.jsonl"
+    file.write_text(NAP)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    with mission_kit() as kit:
+        from smachpy.command.targets import load_target
+
+        machine = load_target(str(file)).build()
+        with Recorder(path, machine, origin={"target": str(file)}):
+            kit(machine)
+    file.write_text(NAP.replace("sleep(2.0)", f"sleep({seconds})"))
+    found = reproduce(read_recording(path), allow=[path.parent])
+    assert found.is_same == is_same, found.comparison
+    if not is_same:
+        difference = found.comparison.difference
+        assert difference.recorded == "NAP  done after 2.0 s"
+        assert difference.now == f"NAP  done after {seconds} s"
+        assert "module nap has changed" in found.changed
+        assert reproduce(
+            read_recording(path), allow=[path.parent], tolerate=["NAP", "AGAIN"]
+        ).is_same
+
+
+NAP = """
+import smachpy
+
+
+class Nap(smachpy.State):
+    def __init__(self):
+        super().__init__(["done"])
+
+    def execute(self, userdata):
+        self.sleep(2.0)
+        return "done"
+
+
+def mission():
+    sm = smachpy.StateMachine(["done", "preempted"], name="REST")
+    with sm:
+        sm.add("NAP", Nap(), {"done": "AGAIN"})
+        sm.add("AGAIN", Nap(), {"done": "done"})
+    return sm
+"""
+
+
 def test_a_folder_has_a_report_for_ci_whatever_the_number_of_processes(night, tmp_path, capfd):
     _, path = night
     folder = tmp_path / "runs"
