@@ -134,7 +134,9 @@ class Problems:
         """Check a dict from name to name, or to None where that is `optional`."""
         checked = self.mapping(argument, given, holds)
         for name, other in [*checked.items()]:
-            fits = isinstance(other, str) or (optional and other is None)
+            # Where None may be the other name, an empty one means the same.
+            is_text = isinstance(other, str) and (optional or other != "")
+            fits = is_text or (optional and other is None)
             if isinstance(name, str) and fits:
                 if type(name) is not str or type(other) is not str:
                     del checked[name]
@@ -302,7 +304,8 @@ def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
     """Return `names` without repeats, in their order.
 
     Raises:
-        InvalidStateError: `names` is a string or not iterable, or an item is not a string.
+        InvalidStateError: `names` is a string or not iterable, or an item is not a string, or
+            empty.
     """
     # A plain string is iterable too, and would silently become names of one letter each.
     if isinstance(names, str):
@@ -320,6 +323,10 @@ def unique_names(names: Iterable[str], what: str = "names") -> tuple[str, ...]:
         if not accepts(problem):
             raise InvalidStateError(problem)
         found = [str(name) for name in found]
+    if "" in found:
+        problem = f"{what}: got an empty string in it; expected names."
+        if not accepts(problem):
+            raise InvalidStateError(problem)
     return tuple(dict.fromkeys(map(plain, found)))
 
 

@@ -38,6 +38,9 @@ RULES: dict[str, CheckRule] = {
         CheckRule("wrong-signature", "error", "`execute` cannot be called as the machine calls it"),
         CheckRule("unreachable-state", "error", "no run can reach the state"),
         CheckRule("unmapped-outcome", "error", "an outcome of a state leads nowhere"),
+        CheckRule(
+            "ambiguous-target", "warning", "a transition to a state that is named as an outcome"
+        ),
         CheckRule("impossible-outcome", "warning", "a declared outcome that nothing can produce"),
         CheckRule("undeclared-outcome", "error", "code returns an outcome that is not declared"),
         CheckRule("dead-case", "warning", "a condition of a transition that decides nothing"),

@@ -37,6 +37,8 @@ def find(subject: Subject, graph: Graph) -> Iterator[Problem]:
         yield from _outcomes(subject, record, made[record.path])
         yield from _leaf(subject, record)
         yield from _cases(subject, record)
+        if record.kind == "machine":  # in a sequence, the order says where it leads
+            yield from _targets(subject, record)
         if record.kind == "concurrence":
             yield from _concurrence(subject, known, record)
         if record.is_container and record is not subject.root:  # after the root, nothing can go on
@@ -57,6 +59,19 @@ def _outcomes(subject: Subject, record: StateRecord, made: set[str | None]) -> I
             text = f"{record.path} declares outcome {outcome!r}, but {who}."
             hint = "Remove the outcome, or produce it."
             yield subject.problem("impossible-outcome", record, text, hint)
+
+
+def _targets(subject: Subject, record: StateRecord) -> Iterator[Problem]:
+    """Yield the states with the name of an outcome, if a transition leads to that name."""
+    for label in sorted(
+        {t.target for t in record.transitions if not t.target_is_outcome} & {*record.outcomes}
+    ):
+        text = (
+            f"{record.path} has a state and an outcome {label!r}: transitions to it lead to the "
+            "state."
+        )
+        hint = "Give the state another label."
+        yield subject.problem("ambiguous-target", record, text, hint)
 
 
 def _leaf(subject: Subject, record: StateRecord) -> Iterator[Problem]:

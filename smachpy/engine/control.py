@@ -169,6 +169,27 @@ class Control:
         Raises:
             ControlError: the machine has no such state, or the state no such outcome.
         """
+        self._check_breakpoint(path, outcome)
+        self._watch()
+        with self._lock:
+            self._breakpoints.add((path, outcome))
+        self._call_listeners()
+
+    def remove_breakpoint(self, path: str, outcome: str | None = None) -> None:
+        """Remove a breakpoint, if there is one.
+
+        Raises:
+            ControlError: there is none, and the machine has no such state, or the state no such
+                outcome.
+        """
+        with self._lock:
+            is_known = (path, outcome) in self._breakpoints
+            self._breakpoints.discard((path, outcome))
+        if not is_known:
+            self._check_breakpoint(path, outcome)
+        self._call_listeners()
+
+    def _check_breakpoint(self, path: str, outcome: str | None) -> None:
         known = dict(walk(self._machine, self._path()))
         del known[self._path()]  # nothing is before or after the machine itself
         if path not in known:
@@ -176,16 +197,6 @@ class Control:
         outcomes = known[path]._smachpy.outcomes
         if outcome is not None and outcome not in outcomes:
             raise _no_outcome(path, outcome, outcomes, self.active())
-        self._watch()
-        with self._lock:
-            self._breakpoints.add((path, outcome))
-        self._call_listeners()
-
-    def remove_breakpoint(self, path: str, outcome: str | None = None) -> None:
-        """Remove a breakpoint."""
-        with self._lock:
-            self._breakpoints.discard((path, outcome))
-        self._call_listeners()
 
     def breakpoints(self) -> tuple[tuple[str, str | None], ...]:
         """Return the breakpoints as pairs (path, outcome)."""

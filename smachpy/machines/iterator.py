@@ -99,7 +99,7 @@ class Iterator(Container):
     ) -> None:
         problems = Problems(type(self).__name__)
         exhausted = problems.word("exhausted_outcome", exhausted_outcome)
-        names = (*problems.names("outcomes", outcomes), exhausted)
+        names = (*problems.names("outcomes", outcomes), *filter(None, [exhausted]))
         with problems:
             super().__init__(
                 names,

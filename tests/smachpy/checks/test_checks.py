@@ -515,6 +515,22 @@ def test_what_no_recording_has_is_looked_for_when_somebody_asks():
     assert "/M/A uses os.environ.get, which no recording has" in found.message
 
 
+def test_a_transition_to_the_name_of_a_state_and_an_outcome():
+    def two(label):
+        leads = {"failed": "done"}
+        return machine(
+            ("A", CBState(print, outcomes=["ok"]), {"ok": label}),
+            (label, CBState(print, outcomes=["ok", "failed"]), {"ok": "done", **leads}),
+            outcomes=["done", "failed", "preempted"],
+        )
+
+    found = the(check(two("failed")), "ambiguous-target")
+    assert found.message == (
+        "/M has a state and an outcome 'failed': transitions to it lead to the state."
+    )
+    assert "ambiguous-target" not in rules(check(two("B")))
+
+
 def reads(code):
     """What the rule `outside` finds in the body of a state."""
     lines = [f"    {line}" for line in code.splitlines()]

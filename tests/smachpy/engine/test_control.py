@@ -159,6 +159,22 @@ def test_breakpoint_on_a_state_and_on_an_edge(clock):
     assert clock.now() - before == 4.0
 
 
+@pytest.mark.parametrize(
+    ("path", "outcome", "said"),
+    [
+        ("/P/NONE", None, "there is no such state"),
+        ("A", None, "there is no such state"),
+        ("/P/A", "none", "none"),
+    ],
+)
+def test_a_breakpoint_that_cannot_be_there_is_not_removed_in_silence(path, outcome, said):
+    control = mission().control
+    with pytest.raises(ControlError, match=said):
+        control.remove_breakpoint(path, outcome)
+    control.remove_breakpoint("/P/A")  # it could be there, and is not
+    assert control.breakpoints() == ()
+
+
 def test_breakpoint_on_an_outcome_holds_also_if_it_is_forced(clock):
     sm = mission()
     sm.control.add_breakpoint("/P/A", "ok")

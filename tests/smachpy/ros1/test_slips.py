@@ -93,7 +93,25 @@ def unknown_rules():
     return cc
 
 
+def empty_outcome():
+    sm = smachpy.StateMachine(outcomes=["done", ""])
+    with sm:
+        sm.add("A", smachpy.CBState(done, outcomes=["done", ""]))
+    return sm
+
+
+def led_to_nothing():
+    sm = smachpy.StateMachine(outcomes=["done"])
+    sm.userdata[""] = 1
+    with sm:
+        sm.add("A", Plain(input_keys=["seen"]), remapping={"seen": ""})
+    return sm
+
+
 SLIPS = {
+    "empty_outcome": (empty_outcome, InvalidStateError),
+    "empty_key": (lambda: machine(Plain(input_keys=[""])), InvalidStateError),
+    "empty_target": (led_to_nothing, InvalidStateError),
     "early_initial": (early_initial, InvalidStateError),
     "empty_label": (empty_label, InvalidStateError),
     "no_init": (lambda: machine(NoInit()), InvalidStateError),
