@@ -51,9 +51,20 @@ class Permissions:
 
 
 def decode_permissions(payload: bytes) -> Permissions:
-    """Return the `Permissions` that `Permissions.encode` has written."""
-    fields = json.loads(payload)
-    return Permissions(fields["who"], tuple(fields["allow"]), tuple(fields["deny"]))
+    """Return the `Permissions` that `Permissions.encode` has written.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    try:
+        fields = json.loads(payload)
+        who, allow, deny = (fields[word] for word in ("who", "allow", "deny"))
+    except (LookupError, TypeError, RecursionError) as error:
+        raise ValueError(f"got {payload[:80]!r}; expected who, allow and deny") from error
+    lists = isinstance(allow, list) and isinstance(deny, list)
+    if not (lists and all(isinstance(each, str) for each in (who, *allow, *deny))):
+        raise ValueError(f"got {payload[:80]!r}; expected a text and two lists of texts")
+    return Permissions(who, tuple(allow), tuple(deny))
 
 
 def find_permissions(rules: Iterable[AccessRule], user: str, certificate: str) -> Permissions:

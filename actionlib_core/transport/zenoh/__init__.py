@@ -17,6 +17,7 @@ import atexit
 import contextlib
 import itertools
 import json
+import logging
 import threading
 import weakref
 from functools import partial
@@ -71,6 +72,8 @@ __all__ = ["ZenohTransport"]
 
 D = TypeVar("D", bound=Declared)
 
+log = logging.getLogger("actionlib_core")
+
 CLOSE_S = 0.5  # longest wait for Zenoh to close a session; its thread is then left behind
 LET_GO_S = 2.0  # longest wait at exit for running callbacks and calls; long on a busy computer only
 LET_GO_PARTS = round(LET_GO_S / PART_S)
@@ -116,10 +119,14 @@ class ZenohTransport:
             with inside:
                 self._links = Links(self)
             self._declared[self._links] = None
-        if self.config.access:
-            self.queryable(ACCESS_KEY, self._send_permissions)
-        if self.config.connect:
-            self._permissions = self._ask_permissions()
+        try:
+            if self.config.access:
+                self.queryable(ACCESS_KEY, self._send_permissions)
+            if self.config.connect:
+                self._permissions = self._ask_permissions()
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def session_id(self) -> str:
@@ -359,8 +366,13 @@ class ZenohTransport:
         )
         done.wait(ACCESS_S)
         asking.close()
-        found = [decode_permissions(reply.payload) for reply in answers if not reply.error]
-        return found[0] if found else None
+        for reply in answers:
+            if not reply.error:
+                try:
+                    return decode_permissions(reply.payload)
+                except ValueError as error:  # anybody may answer
+                    log.warning("access rules of session %s: dropped: %s", reply.source, error)
+        return None
 
     def _check_access(self, key: str) -> None:
         permissions = self._permissions

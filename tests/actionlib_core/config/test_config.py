@@ -195,6 +195,26 @@ def test_permissions(user, certificate, key, allowed):
     assert decode_permissions(permissions.encode()) == permissions
 
 
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"",
+        b"junk",
+        b"\xff",
+        b"[]",
+        b"{}",
+        b"1",
+        b"[" * 100_000,
+        b'{"who": "x", "allow": [], "deny": [1]}',
+        b'{"who": "x", "allow": "all", "deny": []}',
+        b'{"who": 1, "allow": [], "deny": []}',
+    ],
+)
+def test_access_rules_that_are_none_are_refused(answer):
+    with pytest.raises(ValueError, match=r"got|Expecting|codec"):
+        decode_permissions(answer)
+
+
 def test_who_is_named():
     assert find_permissions(RULES, "alice", "").who == "user 'alice'"
     assert find_permissions(RULES, "", "robot_2").who == "certificate 'robot_2'"

@@ -19,6 +19,7 @@ from actionlib_core.config import Config, load_config
 from actionlib_core.exceptions import ConfigError, TransportError
 from actionlib_core.transport import Quality
 from actionlib_core.transport import zenoh as zenoh_transport
+from actionlib_core.transport._access import ACCESS_KEY
 from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 from actionlib_core.transport.zenoh._callbacks import Held
@@ -73,6 +74,7 @@ def child(code, **environment):
 START = """
 import sys, threading, time
 from actionlib_core.transport import Quality
+from actionlib_core.transport._access import ACCESS_KEY
 from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 t = ZenohTransport()
@@ -456,6 +458,7 @@ def test_router_command_serves_until_it_is_told_to_end():
 
 LETS_GO = """
 import threading
+from actionlib_core.transport._access import ACCESS_KEY
 from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 from actionlib_core.transport.zenoh._callbacks import held
@@ -493,6 +496,7 @@ _FORK = """
 import os, sys, time
 from actionlib_core import SimpleActionClient, SimpleActionServer, get_node
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal
+from actionlib_core.transport._access import ACCESS_KEY
 from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 
@@ -771,3 +775,24 @@ def test_latched_message_that_comes_last_is_the_one_that_is_kept(monkeypatch):
         assert kept == live[-1:]
     finally:
         transport.close()
+
+
+def test_answers_that_are_no_access_rules_keep_nobody_out(monkeypatch):
+    monkeypatch.setattr(zenoh_transport, "ACCESS_S", WAIT_S)
+    port = free_port()
+    endpoint = (f"tcp/127.0.0.1:{port}",)
+    router = ZenohTransport(Config(mode="router", listen=endpoint, discovery="off"))
+    try:
+
+        def answer(query):
+            query.reply(b"junk")
+            query.finish()
+
+        router.queryable(ACCESS_KEY, answer)
+        client = ZenohTransport(Config(mode="client", connect=endpoint, discovery="off"))
+        try:
+            client.publisher("some/name").put(b"")
+        finally:
+            client.close()
+    finally:
+        router.close()
