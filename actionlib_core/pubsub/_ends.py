@@ -14,6 +14,7 @@ from actionlib_core.shutdown import current_shutdown
 from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire import looked_for
 from actionlib_core.wire.absence import ABSENT_S
+from actionlib_core.wire.arrivals import REPORTED
 from actionlib_core.wire.end_port import make_end_port
 from actionlib_core.wire.presence import find_mismatch
 
@@ -155,6 +156,8 @@ class NameWatch:
             if end in self._mismatches:
                 return
             self._mismatches[end] = error
+            if len(self._mismatches) > REPORTED:  # a sender can invent ends without end
+                del self._mismatches[next(iter(self._mismatches))]
         logger.error("%s %s", self._end.own.kind.value, error)
         self.wake()
 

@@ -22,6 +22,8 @@ from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.node import Node, use_node
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
+from actionlib_core.transport.tokens import Endpoint, Kind
+from actionlib_core.wire.arrivals import REPORTED
 
 NODES = ("talker", "listener")
 
@@ -113,6 +115,15 @@ def test_with_queue_size_as_many_messages_wait_however_large_they_are(nodes, clo
     clock.sleep(100)
     assert heard == ["0", "1", "2", "3"]
     assert subscriber.dropped == 0
+
+
+def test_types_of_senders_that_are_invented_do_not_fill_the_memory(nodes):
+    subscriber = Subscriber("count", Int32, node=nodes[1])
+    for number in range(2 * REPORTED):
+        end = Endpoint(Kind.PUBLISHER, "count", "a/B", "1" * 32, f"session {number}", "odd")
+        error = TypeMismatchError("count", ("std_msgs/Int32", "2"), ("a/B", "1"), by=end.session)
+        subscriber._ends.note(error, end)
+    assert len(subscriber._ends.mismatches) == REPORTED
 
 
 def test_without_queue_size_nothing_is_dropped(nodes, clock):
