@@ -155,8 +155,7 @@ class VirtualClock:
                 self._deadlines.push(self._now + delay, next(self._count), timer)
         if self.rate is not None:  # a running pause may now be too long
             self._poke.set()
-        me = threading.get_ident()
-        if me not in self._participants and me != self._caller:
+        if not self.is_participant(threading.get_ident()):
             timer.real = REAL.call_later(delay, lambda: self._call_from_outside(timer))
         return timer
 
@@ -251,8 +250,11 @@ class VirtualClock:
     # -- for `patched()` ------------------------------------------------------------------------
 
     def is_participant(self, ident: int) -> bool:
-        """Return whether the thread `ident` is a participant of this clock."""
-        return ident in self._participants
+        """Return whether the thread `ident` is a participant of this clock, or runs a callback of it.
+
+        Callbacks run in the thread that gives the turn to others, which may be one that is ending.
+        """
+        return ident in self._participants or ident == self._caller
 
     def adopt(self, target: Callable[[], object], *, name: str) -> VirtualTask:
         """Make a participant for a thread of the caller, which calls `VirtualTask.run`."""

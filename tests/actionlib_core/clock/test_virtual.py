@@ -300,6 +300,19 @@ def test_a_deadlock_on_an_event_without_a_name_names_the_line(clock):
     assert f"an event at {__file__}:" in caught.value.waits["MainThread"]
 
 
+def test_a_callback_in_a_thread_that_is_ending_belongs_to_the_clock(clock):
+    # Symptom: a shutdown that a test requests at a time stopped the machine in a thread of real time, maybe too late.
+    called_by = []
+    ending = clock.spawn(lambda: clock.sleep(1.0), name="ending")
+    clock.call_later(2.0, lambda: called_by.append(threading.get_ident()))
+    clock.call_later(2.0, lambda: called_by.append(clock.is_participant(threading.get_ident())))
+    clock.sleep(3.0)
+    assert ending.join()
+    assert called_by[0] != threading.get_ident()
+    assert called_by[1]
+    assert not clock.is_participant(called_by[0])
+
+
 def test_a_closed_clock_holds_no_file_however_long_it_is_kept():
     kept = []
     before = len(os.listdir("/proc/self/fd"))
