@@ -250,7 +250,7 @@ class VirtualClock:
     # -- for `patched()` ------------------------------------------------------------------------
 
     def is_participant(self, ident: int) -> bool:
-        """Return whether the thread `ident` is a participant of this clock, or runs a callback of it.
+        """Return whether the thread `ident` is a participant, or calls a callback of this clock.
 
         Callbacks run in the thread that gives the turn to others, which may be one that is ending.
         """
