@@ -26,7 +26,7 @@ from actionlib_core.exceptions import (
     TypeMismatchError,
     WaitTimeoutError,
 )
-from actionlib_core.goal.bounded import Backlog
+from actionlib_core.goal.bounded import MESSAGES, Backlog
 from actionlib_core.inputs.arguments import (
     check_class,
     check_delay,
@@ -279,8 +279,9 @@ class Subscriber(_TopicEnd, Generic[M]):
         self.queue_size = queue_size
         self._lock = threading.Lock()  # guards `_waiting`
         # Whoever says how many messages wait gets so many, however large they are.
-        limits = (queue_size, sys.maxsize) if queue_size else ()
-        self._waiting: Backlog[Sample] = Backlog(*limits)
+        self._waiting: Backlog[Sample] = (
+            Backlog(queue_size, sys.maxsize) if queue_size else Backlog(MESSAGES)
+        )
         self._readable = Readable(logger)
         self._number = next(border.numbers)
         if self._is_input and border.listeners:
