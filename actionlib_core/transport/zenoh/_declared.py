@@ -37,6 +37,7 @@ log = logging.getLogger("actionlib_core")
 
 LATCH_RETRIES = 5  # queries to a latched publisher that cannot be reached yet
 LATCH_RETRY_S = 0.1  # between them
+LATCHED_REMEMBERED = 1000  # latched publishers whose last numbers a subscriber remembers
 HEARTBEAT_S = 0.5  # interval in which publishers with a cache send their last number, as in ROS 2
 _EPOCH = datetime.fromtimestamp(0, UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -188,20 +189,24 @@ def _pack_numbers(publisher: int, message: int) -> bytes:
 
 
 class _LatchFilter:
-    """Drops the second copy of a message that came both live and by a query."""
+    """Drops the second copy of a message that came both live and by a query.
+
+    It remembers the publishers that it has heard last: each start of a program has new ones, and
+    anybody can invent some.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         # By publisher: the number of the newest message, and of the one delivered from a query.
-        self._newest: dict[tuple[str, int], int] = {}
-        self._asked: dict[tuple[str, int], int] = {}
+        self._numbers: dict[tuple[str, int], tuple[int, int]] = {}
 
     def take_live(self, session: str, numbers: bytes) -> bool:
         """Return whether a live message is to be delivered."""
         who, message = _unpack(session, numbers)
         with self._lock:
-            self._newest[who] = max(message, self._newest.get(who, 0))
-            return message > self._asked.get(who, 0)
+            newest, asked = self._numbers.pop(who, (0, 0))
+            self._note(who, max(message, newest), asked)
+            return message > asked
 
     def take_asked(self, session: str, numbers: bytes) -> bool:
         """Return whether the answer of a latched publisher is to be delivered."""
@@ -209,10 +214,15 @@ class _LatchFilter:
             return False
         who, message = _unpack(session, numbers)
         with self._lock:
-            if message <= self._newest.get(who, 0):
-                return False  # it came live before, or nothing was published yet
-            self._newest[who] = self._asked[who] = message
-            return True
+            newest, asked = self._numbers.pop(who, (0, 0))
+            is_new = message > newest  # else it came live before, or nothing was published yet
+            self._note(who, max(message, newest), message if is_new else asked)
+            return is_new
+
+    def _note(self, who: tuple[str, int], newest: int, asked: int) -> None:
+        self._numbers[who] = newest, asked
+        if len(self._numbers) > LATCHED_REMEMBERED:
+            del self._numbers[next(iter(self._numbers))]  # the one not heard for longest
 
 
 def _unpack(session: str, numbers: bytes) -> tuple[tuple[str, int], int]:

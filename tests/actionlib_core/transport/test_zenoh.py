@@ -23,7 +23,12 @@ from actionlib_core.transport._access import ACCESS_KEY
 from actionlib_core.transport._inlet import Inside
 from actionlib_core.transport.zenoh import ZenohTransport
 from actionlib_core.transport.zenoh._callbacks import Held
-from actionlib_core.transport.zenoh._declared import Watcher
+from actionlib_core.transport.zenoh._declared import (
+    LATCHED_REMEMBERED,
+    Watcher,
+    _LatchFilter,
+    _pack_numbers,
+)
 from actionlib_core.transport.zenoh._shared import FEW
 from tests.free_port import free_port
 
@@ -796,3 +801,17 @@ def test_answers_that_are_no_access_rules_keep_nobody_out(monkeypatch):
             client.close()
     finally:
         router.close()
+
+
+def test_a_subscriber_of_a_latched_topic_remembers_a_bounded_number_of_publishers():
+    copies = _LatchFilter()
+    for publisher in range(3 * LATCHED_REMEMBERED):
+        assert copies.take_asked("robot", _pack_numbers(publisher, 2))
+        assert copies.take_live(
+            "steady", _pack_numbers(0, publisher + 1)
+        )  # it is heard all the time
+    assert len(copies._numbers) == LATCHED_REMEMBERED
+    newest = 3 * LATCHED_REMEMBERED - 1
+    assert not copies.take_live("robot", _pack_numbers(newest, 2))  # the copy
+    assert not copies.take_asked("steady", _pack_numbers(0, newest + 1))
+    assert copies.take_live("robot", _pack_numbers(newest, 3))
