@@ -51,9 +51,7 @@ class Deadlines(Generic[T]):
             mine = self._cleaning = object()
             kept = [entry for entry in entries if self._counts(entry[1], entry[2])]
             heapq.heapify(kept)
-            if (
-                self._cleaning is mine
-            ):  # else a signal handler's `push` has come between, and cleaned
+            if self._cleaning is mine:  # else the `push` of a signal handler has cleaned meanwhile
                 entries[:] = kept
                 self._room = 2 * len(kept) + SPARE
         heapq.heappush(entries, (due, number, what))
