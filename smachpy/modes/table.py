@@ -229,14 +229,16 @@ class Table:
         """Report ways that are never taken, as an earlier one has no condition."""
         always: dict[tuple[str, str], str] = {}  # (source, event) -> where it leads in any case
         for row in rows:
-            for source in row["source"] if not row["when"] else ():
-                target = self._leaf(row["dest"])
-                first = always.setdefault((source, row["trigger"]), target)
+            target = self._leaf(row["dest"])
+            for source in row["source"]:
+                first = always.get((source, row["trigger"]), target)
                 if first != target:
                     self.problems.append(
                         f"transition {row['trigger']!r}: got ways from {source!r} to {first!r} and "
                         f"to {target!r}; expected one, or a condition for the first."
                     )
+                elif not row["when"]:
+                    always[source, row["trigger"]] = target
 
     def _leaf(self, name: str) -> str:
         """Return the innermost mode that is entered with a mode."""

@@ -566,11 +566,13 @@ def test_a_nested_machine_of_transitions_can_be_given(separator):
         Modes.from_machine(machine, {"manual_quick": mission})
 
 
-def test_a_second_way_without_a_condition_is_refused():
+def test_a_way_after_one_without_a_condition_is_refused():
     """It could never be taken."""
     states = ["a", "b", {"name": "m", "children": ["x", "y"]}]
     with pytest.raises(ModesError, match="'go': got ways from 'a' to 'b' and to 'm_x'; expected"):
         Table(states, [["go", "a", "b"], ["go", ["b", "a"], "m"]])
+    with pytest.raises(ModesError, match="a condition for the first"):
+        Table(states, [["go", "a", "b"], ["go", "a", "m", "ready"]])
     Table(
         states,
         [
