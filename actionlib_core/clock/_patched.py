@@ -404,7 +404,8 @@ _FAKES = _replacements()
 
 def _replace() -> None:
     # All modules, as `from time import sleep` has put the function into a module's own globals.
-    for name, module in list(sys.modules.items()):
+    # A copy, as an import in another thread, or in a finalizer, may come between.
+    for name, module in sys.modules.copy().items():
         names = getattr(module, "__dict__", None)
         if type(names) is dict:
             for key, real in _search(name, names):

@@ -335,7 +335,7 @@ def _tell(runner: socket.socket, kind: str, *values: object) -> None:
 
 def _state_of_files() -> dict[str, tuple[int, int] | None]:
     """Return time of change and size of all files that are imported, and of what is installed."""
-    files = {getattr(module, "__file__", None) for module in list(sys.modules.values())}
+    files = {getattr(module, "__file__", None) for module in sys.modules.copy().values()}
     # A folder changes when a package is installed or removed.
     files |= {*site.getsitepackages(), site.getusersitepackages()}
     return {file: _state_of(file) for file in files if file}

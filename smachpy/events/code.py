@@ -59,7 +59,7 @@ def code_facts() -> dict[str, Any]:
 def own_files() -> dict[str, Path]:
     """Return the program's own modules that are loaded: name -> file, sorted."""
     found = {}
-    for name, module in list(sys.modules.items()):
+    for name, module in sys.modules.copy().items():
         file = getattr(module, "__file__", None)
         if not isinstance(file, str) or name.partition(".")[0] in _LIBRARY:
             continue
@@ -89,7 +89,7 @@ def own_constants(files: Mapping[str, Path]) -> dict[str, str]:
     """Return the constants of these modules: names in capitals with plain values."""
     names = {str(file): name for name, file in files.items()}
     found = {}
-    for module in list(sys.modules.values()):
+    for module in sys.modules.copy().values():
         name = names.get(str(getattr(module, "__file__", None)))
         for word, value in list(vars(module).items()) if name else ():
             if not (word.isupper() and _is_plain(value)):

@@ -225,7 +225,7 @@ class OldNames(MetaPathFinder):
     def open(self) -> None:
         """Begin; modules of ROS's names that are imported already are changed as well."""
         self._border.open()
-        for name, module in list(sys.modules.items()):
+        for name, module in sys.modules.copy().items():
             if self._home_of(name) is not None:
                 self._border.add(module)
 

@@ -88,7 +88,7 @@ def uninstall() -> None:
         made = _installed.pop()
         sys.meta_path.remove(made.finder)
         made.finder.close()
-        for name, module in list(sys.modules.items()):
+        for name, module in sys.modules.copy().items():
             if name not in made.before and made.finder.made(name, module):
                 del sys.modules[name]
         sys.modules.update(made.hidden)
