@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport import Closable
 
 WAIT_S = 2.0  # longest wait for the answer to a probe
-STOPPED = 2.0  # times the wait: a process that looks so late was stopped, and what came is unread
+LATE_S = 2.0  # a process that looks so late at the answer was stopped, and what came is unread
 
 
 class LinkProbe:
@@ -52,7 +52,6 @@ class LinkProbe:
         self.last_received = clock.now()
         self._clock = clock
         self._every = every
-        self._wait = min(every, WAIT_S)
         self._ask = ask
         self._wanted = wanted
         self._on_silent = on_silent
@@ -60,6 +59,7 @@ class LinkProbe:
         self._timer: Timer | None = None
         self._asked: Closable | None = None
         self._asked_at = 0.0
+        self._is_second = False  # the first probe was judged too late
         self._closed = False
 
     def note_received(self) -> None:
@@ -95,7 +95,7 @@ class LinkProbe:
             self._later(left, self._look)
         else:
             self._asked_at = self._clock.now()
-            self._later(self._wait, self._judge)
+            self._later(min(self._every, WAIT_S), self._judge)
             try:
                 self._keep(self._ask())
             except TransportError:  # the session is closed
@@ -104,9 +104,12 @@ class LinkProbe:
     def _judge(self) -> None:
         self._timer = None
         now = self._clock.now()
+        is_late = now - self._asked_at > min(self._every, WAIT_S) + LATE_S
+        again, self._is_second = is_late and not self._is_second, False
         if self.last_received >= self._asked_at:
             self._keep(None)
-        elif now - self._asked_at > STOPPED * self._wait:
+        elif again:
+            self._is_second = True
             self._look()  # and so probe once more
             return
         elif self._wanted():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections import deque
 
 import pytest
@@ -604,6 +605,33 @@ def test_process_that_stood_still_after_a_probe_judges_by_the_next_one(clock, an
     second = 70.0 if 1 in answered else 65.0
     assert asked == [pytest.approx(at) for at in (5.0, second) if at < 68.0]
     assert silent == ([] if answered else [pytest.approx(67.0)])
+
+
+class SlowClock(StoppedOnce):
+    """The clock of a busy process: whatever is due comes this much later [s]."""
+
+    def __init__(self, clock, late):
+        super().__init__(clock)
+        self._delays = itertools.repeat(late)
+
+    def call_later(self, delay, step):
+        return self._clock.call_later(delay + next(self._delays), step)
+
+
+@pytest.mark.parametrize(("late", "asks"), [(1.0, 1), (30.0, 2)])
+def test_process_that_is_late_each_time_judges_by_the_second_probe_at_the_latest(clock, late, asks):
+    asked, silent = [], []
+
+    def ask():
+        asked.append(clock.now())
+        return contextlib.ExitStack()
+
+    probe = LinkProbe(SlowClock(clock, late), 0.1, ask, lambda: True, silent.append)
+    probe.watch()
+    while not silent:
+        clock.sleep(1.0)
+    probe.close()
+    assert len(asked) == asks
 
 
 def test_look_that_rounding_makes_come_too_early_lets_time_pass(clock):
