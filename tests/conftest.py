@@ -16,13 +16,15 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.wire.private_network import FIRST_PRIVATE_DOMAIN
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
 # Test runs on one machine, and the workers of one run, do not find each other's processes.
 if "SMACHPY_DOMAIN" not in os.environ or "PYTEST_XDIST_WORKER" in os.environ:
-    os.environ["SMACHPY_DOMAIN"] = str(1 + os.getpid() % 9999)
+    # Below the private domains, of which another worker may take the one that has this number.
+    os.environ["SMACHPY_DOMAIN"] = str(1 + os.getpid() % (FIRST_PRIVATE_DOMAIN - 1))
 
 # Runs that are viewed are kept, but not those of tests; a folder that cannot be made keeps none.
 os.environ["SMACHPY_RUNS"] = os.devnull

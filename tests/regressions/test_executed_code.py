@@ -118,7 +118,7 @@ def folder(tmp_path_factory):
 
 def run(words, folder):
     program, *rest = words
-    environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state"), "SMACHPY_DOMAIN": "7841"}
+    environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
     environment.pop("PYTHONPATH", None)
     return subprocess.run(
         [Path(sys.executable).parent / program, *rest],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 
@@ -11,7 +10,6 @@ import pytest
 from smachpy.events.recording import read_recording
 from smachpy.reproduce.report import lines_of
 from smachpy.reproduce.run import reproduce
-from tests.free_port import free_port
 
 VIRTUAL = [
     "asking",
@@ -37,13 +35,11 @@ VIRTUAL = [
 
 
 def recorded(mission, path, *options):
-    """Run a mission in a process of its own, on a network of its own."""
+    """Run a mission in a process of its own."""
     command = [sys.executable, "-m", "smachpy", "run", mission, "--plain", "--record", str(path)]
-    environment = {**os.environ, "SMACHPY_DOMAIN": str(free_port() % 200 + 1)}
     done = subprocess.run(
         [*command, *options],
         cwd=path.parent,
-        env=environment,
         capture_output=True,
         text=True,
         timeout=250,
