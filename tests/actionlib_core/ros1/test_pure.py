@@ -451,16 +451,20 @@ def test_a_goal_whose_texts_are_not_utf_8_is_taken_once_and_ends_as_its_server_s
     assert len(sent) == 1
 
 
+def shown_and_found(world):
+    """Return a server of ROS 1 that the bridge shows, and a client that has found it."""
+    shown = ServerInRos(Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction")
+    for word, typed in types_of_test().items():
+        shown.connect("/old", word, f"link for {word}", typed)
+    client = SimpleActionClient("do", TestAction, node=world.mission)
+    assert client.wait_for_server()
+    return shown, client
+
+
 @pytest.mark.parametrize("heard", [True, False])
 def test_bridge_that_stood_still_hides_a_server_only_if_it_is_not_heard_afterwards(heard):
     with TwoNodes() as world:
-        shown = ServerInRos(
-            Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction"
-        )
-        for word, typed in types_of_test().items():
-            shown.connect("/old", word, f"link for {word}", typed)
-        client = SimpleActionClient("do", TestAction, node=world.mission)
-        assert client.wait_for_server()
+        shown, client = shown_and_found(world)
 
         def run(seconds, *, status):
             for _ in range(seconds):
@@ -481,13 +485,7 @@ def test_bridge_that_stood_still_hides_a_server_only_if_it_is_not_heard_afterwar
 
 def test_server_is_hidden_though_each_look_is_late():
     with TwoNodes() as world:
-        shown = ServerInRos(
-            Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction"
-        )
-        for word, typed in types_of_test().items():
-            shown.connect("/old", word, f"link for {word}", typed)
-        client = SimpleActionClient("do", TestAction, node=world.mission)
-        assert client.wait_for_server()
+        shown, client = shown_and_found(world)
         for _ in range(3):  # the master hangs
             world.clock.sleep(20.0)
             shown.check_silence()
@@ -497,11 +495,7 @@ def test_server_is_hidden_though_each_look_is_late():
 @pytest.mark.parametrize("word", ["status", "feedback", "result"])
 def test_message_that_comes_while_its_server_is_being_hidden_does_not_end_its_link(word):
     with TwoNodes() as world:
-        bridged = ServerInRos(
-            Sides(world.robot, Mock(), ""), "/do", Mock(), 5.0, "actionlib/TestAction"
-        )
-        for each, typed in types_of_test().items():
-            bridged.connect("/old", each, f"link for {each}", typed)
+        bridged, _ = shown_and_found(world)
         bridged._shown.close()  # as another thread does
         listed = GoalStatus(goal_id=GoalID(id="g"), status=Status.ACTIVE)
         messages = {
