@@ -30,6 +30,7 @@ test: stubs  ## Check everything: ruff, mypy, import-linter, the page's JavaScri
 
 slow-tests:  ## Run what the default selection leaves out: slow tests, a browser, ROS 1, rclpy, PostgreSQL
 	@.ci/venv dot,sim,test
+	@.ci/web tools
 	$(BIN)/python -m pytest -q $(WORKERS) $(SLOW_TESTS)
 
 # What the pages of docs show is executed once, by `make test`.
