@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.base.problems import Problems
+from smachpy.base.problems import Problems, unknown_name
 from smachpy.base.problems import name_of as name_of_code
 from smachpy.engine.child import run_child
 from smachpy.engine.preempt import ask_child, asking, choose
 from smachpy.engine.visit import Override, Why
 from smachpy.events import Jumped
 from smachpy.events.introspection import TransitionRecord
-from smachpy.exceptions import did_you_mean, error_text
+from smachpy.exceptions import error_text
 from smachpy.machines.container import Container, control_of
 from smachpy.machines.guards import when
 from smachpy.machines.history import forget, places, remember
@@ -173,8 +173,14 @@ class Modes(StateMachine):
             by: Who triggers it, for viewers and recordings.
 
         Threads: any, but no signal handler. It does not wait for the mode to change.
+
+        Raises:
+            ModesError: no way has such an event.
         """
         table = self.__table
+        known = {one for _, one in table.ways}
+        if event not in known:
+            raise ModesError([unknown_name("trigger: event", event, known)])
         return self.__go(
             lambda mode, values: table.next(mode, event, values), by or f"event {event}"
         )
@@ -382,15 +388,14 @@ def _check_sources(sources: Iterable[Any], events: Iterable[str]) -> None:
         ModesError: all problems.
     """
     problems = []
-    known = sorted(events)
+    known = {*events}
     for source in sources:
         event = getattr(source, "event", None)  # others may have several
         if not callable(getattr(source, "open", None)):
             expected = "expected on_topic(...), on_service(...) or on_signal(...)"
             problems.append(f"listen: got {source!r}; {expected}.")
         elif isinstance(event, str) and event not in known:
-            near = did_you_mean(event, known)
-            problems.append(f"listen: got event {event!r}; expected one of {known}.{near}")
+            problems.append(unknown_name("listen: event", event, known))
     if problems:
         raise ModesError(problems)
 

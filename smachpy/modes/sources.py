@@ -40,10 +40,9 @@ class _Topic:
         def take(message: Any) -> None:
             nonlocal before
             holds = self.when is None or bool(self.when(message))
-            # A condition triggers when it begins to hold: a joystick sends 50 times a second.
-            if holds and (self.when is None or not before):
-                trigger(self.event)
-            before = holds
+            # A condition triggers once while it holds: a joystick sends 50 times a second. Where
+            # the event means nothing yet, a later message triggers.
+            before = holds and (before or trigger(self.event)) and self.when is not None
 
         return Subscriber(self.topic, self.kind, take).unregister
 
@@ -92,8 +91,8 @@ def on_topic(topic: str, msg_type: Any, event: str, when: str = "") -> Source:
         topic: Name of the topic.
         msg_type: Its class.
         event: The event.
-        when: An expression over the message, such as "percentage < 0.2": triggers when it begins to
-            hold. "" triggers with every message.
+        when: An expression over the message, such as "percentage < 0.2": triggers once while it
+            holds, in a mode where the event means something. "" triggers with every message.
 
     Raises:
         ExpressionError: `when` cannot be parsed.

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from smachpy.actions.simple_action_state import SimpleActionState
 from smachpy.base import log
+from smachpy.base.context import current_frame
 from smachpy.base.problems import Problems
 from smachpy.engine.frame import clock_of_run
 from smachpy.events.outcome_classes import is_good
@@ -170,7 +171,6 @@ class ServerAction(SimpleActionState):
         )
 
     def _fill(self, _userdata: Any, goal: Any) -> None:
-        self._id = next(_ids) % 2**32
         self._describe(goal, "start")
 
     def _describe(self, goal: Any, function: str) -> None:
@@ -188,6 +188,9 @@ class ServerAction(SimpleActionState):
         asked: list[bool] = []
         node, clock = get_node(), clock_of_run()
         done = clock.event(f"the interruption of {self._call.name}")
+        frame = current_frame()
+        if frame is not None:  # the next process of a durable run follows the goal, too
+            self._id = frame.run.journal.once(frame, "id of PNP", lambda: next(_ids) % 2**32)
         # The robot would begin an action that it has been told to interrupt before.
         self._is_sent, self._told = False, clock.event(f"the goal of {self._call.name}")
 

@@ -132,6 +132,15 @@ def test_an_event_that_means_nothing_changes_nothing():
     assert not modes.trigger("start")
 
 
+def test_an_event_that_no_way_has_is_an_error():
+    """It said nothing, and a test with a misspelt event passed."""
+    expected = "trigger: event: got 'strat'.*Did you mean 'start'"
+    with pytest.raises(ModesError, match=expected):
+        robot().trigger("strat")
+    with pytest.raises(AssertionError, match=expected):
+        run_of(robot(), (1.0, "strat"), end=5.0)
+
+
 def test_the_last_of_several_events_counts():
     run = run_of(robot(), (1.0, "start"), (2.0, "joy"), (2.5, "free"), (3.0, "low"), end=60.0)
     assert leaves(run)[:4] == ["idle", "auto/A", "auto/DOCK", "charging/A"]
@@ -373,6 +382,23 @@ def test_a_topic_triggers_when_its_condition_begins_to_hold():
         run = kit(modes)
     assert leaves(run)[:2] == ["idle", "charging/A"]
     assert run.visits("charging") == 1
+
+
+@pytest.mark.parametrize("begins", [0.5, 9.0], ids=["in another mode", "where it is taken"])
+def test_a_condition_triggers_once_where_its_event_means_something(begins):
+    """One that began to hold in a mode without the event was used up."""
+    ways = [["take", "idle", "manual"], ["low", "idle", "charging"], ["back", "*", "idle"]]
+    listen = [on_topic("battery", BatteryState, "low", "percentage < 0.2")]
+    modes = Modes(["idle", "manual", "charging"], ways, listen=listen, name="ROBOT")
+    with mission_kit() as kit:
+        battery = kit.topic("battery", BatteryState)
+        for at in range(1, 30):
+            battery.publish_at(at, BatteryState(percentage=0.1 if at > begins else 0.5))
+        for at, event in [(0.5, "take"), (5.5, "back"), (15.5, "back")]:
+            kit.trigger(event, at=at)
+        kit.preempt(at=30.0)
+        run = kit(modes)
+    assert leaves(run) == ["idle", "manual", "idle", "charging", "idle"]
 
 
 def test_a_service_triggers_and_says_whether_it_meant_something():
@@ -617,7 +643,7 @@ def test_what_no_table_can_hold_is_refused(states, rows, problem):
     ("make", "problem"),
     [
         (lambda: 5, "listen: got 5"),
-        (lambda: on_service("s", "strat"), "listen: got event 'strat'; .* Did you mean 'start'"),
+        (lambda: on_service("s", "strat"), "listen: event: got 'strat'; .* Did you mean 'start'"),
         (lambda: on_signal(signal.SIGKILL, "start"), "on_signal: got <Signals.SIGKILL: 9>"),
         (lambda: on_signal("USR1", "start"), "on_signal: got 'USR1'; expected a signal"),
         (lambda: on_topic("t", "std_msgs/Bool", "start"), "msg_type: got 'std_msgs/Bool'"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+import smachpy
 from actionlib_core.action.server import ActionServer
 from actionlib_core.interfaces import get_action, get_service
 from actionlib_core.interfaces.std_msgs.msg import String
@@ -16,6 +17,8 @@ from smachpy.actions.goal_run import GoalFollower
 from smachpy.exceptions import InvalidStateError, InvalidUserCodeError
 from smachpy.pnp import PetriNetPlan, PlanError, PNPCmd, PNPServer, load_plan, write_pnml
 from smachpy.pnp.server import _ACTION, _CONDITION, ServerAction, _interface
+from tests.smachpy.durable.killing_store import Kill
+from tests.smachpy.durable.test_plans import Cut
 from tests.smachpy.pnp.nets import net_of
 from tests.two_nodes import TwoNodes
 
@@ -155,6 +158,33 @@ def test_an_interrupt_comes_after_the_goal_that_it_interrupts(
         assert plan.execute() == "preempted"
         assert robot.told == ["goto_kitchen start", "goto_kitchen interrupt"]
         assert robot.running == {}
+
+
+# What is left of a killed process fails, as its session is closed: nothing of it may get out.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_resumed_plan_interrupts_the_action_that_ran_before_the_kill() -> None:
+    """The interrupt named no action: the robot drove on after the end of the plan."""
+    store = Cut()
+    text = """
+    init* -> i j : fork
+    i -> goto_kitchen.exec : goto_kitchen.start
+    j -> wait_1.exec : wait_1.start
+    wait_1.exec -> a : wait_1.end
+    goto_kitchen.exec a -> goal : goto_kitchen.end
+    """
+    with Robot() as robot:
+        plan = PetriNetPlan(net_of(text), server=PNPServer(), name="PLAN")
+        robot.clock.call_later(0.5, lambda: store.arm(1, written=False))
+        store.on_kill = robot.mission.transport.close
+        with pytest.raises(Kill):
+            smachpy.run_durable(plan, store, mission="m")
+        store.arm(0, written=False)
+        with use_node(robot.node("mission_2")):
+            plan = PetriNetPlan(net_of(text), server=PNPServer(), name="PLAN")
+            robot.clock.call_later(0.1, plan.request_preempt)
+            assert smachpy.run_durable(plan, store, mission="m") == "preempted"
+        assert robot.told == ["goto_kitchen start", "goto_kitchen interrupt"]
+        assert robot.clock.now() == pytest.approx(1.1, abs=0.1)
 
 
 def test_no_interrupt_of_a_goal_that_was_not_sent(monkeypatch: pytest.MonkeyPatch) -> None:

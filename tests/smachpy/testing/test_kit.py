@@ -234,6 +234,13 @@ def test_preempt_on_a_later_visit(mission):
     assert mission(sm).duration == 31
 
 
+def test_what_the_function_of_a_trigger_raises_fails_the_test(mission):
+    """It was printed, and the test passed."""
+    mission.trigger(lambda machine: machine.no_such_method(), at=1.0)
+    with pytest.raises(AssertionError, match=r"trigger\(at=1\): AttributeError: .*no_such_method"):
+        mission(two_waits())
+
+
 def test_a_trigger_changes_nothing_before_it_acts(mission):
     """A run without triggers is only taken down; one with them has a listener until the last."""
     hearing = []
