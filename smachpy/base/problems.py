@@ -134,9 +134,7 @@ class Problems:
         """Check a dict from name to name, or to None where that is `optional`."""
         checked = self.mapping(argument, given, holds)
         for name, other in [*checked.items()]:
-            # Where None may be the other name, an empty one means the same.
-            is_text = isinstance(other, str) and (optional or other != "")
-            fits = is_text or (optional and other is None)
+            fits = (isinstance(other, str) and other != "") or (optional and other is None)
             if isinstance(name, str) and fits:
                 if type(name) is not str or type(other) is not str:
                     del checked[name]
@@ -145,7 +143,7 @@ class Problems:
             problem = f"{argument}: got {name!r}: {other!r} in it; expected {holds}."
             if accepts(problem):
                 del checked[name]
-                checked[str(name)] = None if optional and other is None else str(other)
+                checked[str(name)] = None if optional and not other else str(other)
             else:
                 self.add(problem)
         return checked

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NoReturn
 
 from smachpy.base.problems import unknown_name
+from smachpy.engine.options import NAMES
 from smachpy.engine.threads import OBSERVERS
 from smachpy.exceptions import MissionError, SmachError, error_text
 from smachpy.files.source import names_in
@@ -121,6 +122,7 @@ def resolve(machine: Container) -> Container:
     for container, label, reference in _references(machine):
         try:
             state = reference.make()
+            _set_since(state, container.get_children()[label], reference)
         except SmachError as error:
             problems.append(str(error))
             continue
@@ -137,6 +139,14 @@ def resolve(machine: Container) -> Container:
             container._smachpy_exchange(label, state)
         raise ResolveError(problems)
     return machine
+
+
+def _set_since(state: State, stand_in: State, reference: Any) -> None:
+    """Set the options that the program has set since the file was loaded."""
+    then = getattr(reference, "origin", stand_in._smachpy.made_from).loaded
+    now = stand_in._smachpy.options
+    new = {name: getattr(now, name) for name in NAMES if getattr(now, name) != getattr(then, name)}
+    set_options(state, **new)
 
 
 def _references(container: Container) -> Iterator[tuple[Container, str, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import re
@@ -75,11 +76,11 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
     _drop(data, [one for one in data["parameters"] if one not in _used(data)])
     yaml = YAML()
     yaml.width = 120
-    old: Any = None if path is None else _there(Path(path), yaml)
-    text = ""
-    if old:
+    text = "" if path is None else _there(Path(path))
+    if text:
+        old: Any = load_yaml(text)
         data = {**{key: old[key] for key in ("smachpy", "help") if key in old}, **data}
-        text = _onto(old, data, yaml)
+        text = _onto(text, data, yaml)
     text = text or _dumped(data, yaml)
     if path is not None:
         whole = Path(path).resolve()
@@ -92,15 +93,15 @@ def write(machine: StateMachine, path: str | Path | None = None) -> str:
     return text
 
 
-def _there(path: Path, yaml: Any) -> Any:
-    """Return the content of the file that is there, with its comments; None if there is none.
+def _there(path: Path) -> str:
+    """Return the text of the file that is there; "" if there is none, or nothing in it.
 
     Raises:
         NotWrittenError: it is no mission file.
         OSError: it cannot be read.
     """
     if not path.exists():
-        return None
+        return ""
     try:
         text = read_limited(path, MAX_YAML_LENGTH).decode("utf-8-sig")
         data = load_yaml(text)
@@ -109,7 +110,7 @@ def _there(path: Path, yaml: Any) -> Any:
     else:
         problem = "no mission"
         if data is None or (isinstance(data, dict) and "states" in data):
-            return yaml.load(text)
+            return text if data else ""
     expected = "expected a mission file or none. Try another name."
     raise NotWrittenError([f"{path}: the file that is there is {problem}; {expected}"])
 
@@ -134,8 +135,11 @@ def _drop(data: Any, names: Iterable[str]) -> None:
         del data["parameters"]
 
 
-def _onto(old: Any, data: Mapping[str, Any], yaml: Any) -> str:
-    """Return the text of the file `old`, with its comments, as `data`; "" if it cannot be that."""
+def _onto(text: str, data: Mapping[str, Any], yaml: Any) -> str:
+    """Return the text of a file, with its comments, as `data`; "" if it cannot be that."""
+    from ruamel.yaml.error import YAMLError
+
+    old = yaml.load(text)
     before, there = _used(old), old.get("parameters", {})
     parameters = {**there, **data.get("parameters", {})} if isinstance(there, dict) else {}
     if parameters:
@@ -145,6 +149,8 @@ def _onto(old: Any, data: Mapping[str, Any], yaml: Any) -> str:
         for name, one in parameters.items()
         if isinstance(one, dict) and "default" in one
     }
+    with contextlib.suppress(YAMLError):  # an alias before its anchor
+        old = yaml.load("".join(_Arranged(text, yaml).lines(old, data, 0, sys.maxsize)))
     _merge(old, data, values)
     _drop(old, [name for name in before - _used(old) if name in old.get("parameters", {})])
     text = _dumped(old, yaml)
@@ -164,9 +170,63 @@ def _merge(old: Any, new: Mapping[str, Any], values: Mapping[str, Any], name: st
             _merge(old[key], value, values, key)
         elif key not in old or not _same(old[key], value, values):
             old[key] = value
-    if name in _IN_ORDER and [*old] != [*new]:
+    if name in _IN_ORDER and [*old] != [*new]:  # all on one line, for example
         for key in new:
             old.move_to_end(key)
+
+
+class _Arranged:
+    """Puts the lines of a file in the order of its new content, each key with its comments.
+
+    For YAML's readers a comment above a key belongs to what is before it.
+    """
+
+    def __init__(self, text: str, yaml: Any) -> None:
+        self._lines = text.splitlines(keepends=True)
+        self._yaml = yaml
+
+    def lines(self, old: Any, new: Any, first: int, end: int, name: str = "") -> list[str]:
+        """Return the lines of a mapping.
+
+        Args:
+            old: It, as it was read.
+            new: What it is to become.
+            first: Number of its first line, from 0.
+            end: That of the first line behind it.
+            name: Its key.
+        """
+        as_it_is = self._lines[first:end]
+        if not isinstance(old, dict) or not isinstance(new, dict):
+            return as_it_is
+        known = old.lc.data or {}  # type: ignore[attr-defined]
+        places: dict[str, tuple[int, int]] = {key: known.get(key, (-1, 0))[:2] for key in old}
+        rows = [row for row, _ in places.values()]
+        if not rows or rows != sorted({*rows}) or not first <= rows[0] <= rows[-1] < end:
+            return as_it_is  # of an anchor elsewhere, or not on lines of its own
+        begins = [self._above(row, column, first) for row, column in places.values()]
+        if not name:
+            begins[0] = rows[0]  # what is above is about the file
+        parts = dict(zip(old, zip(begins, [*begins[1:], end], strict=True), strict=True))
+        column = next(iter(places.values()))[1]
+        found = self._lines[first : begins[0]]
+        for key in new if name in _IN_ORDER else [key for key in old if key in new]:
+            if key not in parts:
+                found.append(" " * column + _dumped({key: None}, self._yaml))
+                continue
+            inside = parts[key][0], places[key][0] + 1
+            found += self._lines[slice(*inside)]
+            found += self.lines(old[key], new[key], inside[1], parts[key][1], key)
+        return found
+
+    def _above(self, row: int, column: int, first: int) -> int:
+        """Return the first line of the comments above a key."""
+        while row > first:
+            text = self._lines[row - 1]
+            bare = text.strip()
+            if bare and not (bare.startswith("#") and text.index("#") <= column):
+                break
+            row -= 1
+        return row
 
 
 def _same(there: Any, new: Any, values: Mapping[str, Any], name: str = "") -> bool:

@@ -9,7 +9,7 @@ from actionlib_core.inputs.checked_file import read_limited
 from smachpy.exceptions import did_you_mean
 from smachpy.pnp.pnml import LARGEST_FILE, read_pnml
 from smachpy.pnp.problems import PlanError, PlanProblem, raise_errors
-from smachpy.pnp.text import parse_rules, plan_of_pddl, read_plan_text
+from smachpy.pnp.text import parse_rules, plan_of_pddl, read_plan_text, unmatched
 
 if TYPE_CHECKING:
     from smachpy.pnp.net import Net
@@ -48,20 +48,7 @@ def read_net(file: Path | str) -> tuple[Net, tuple[PlanProblem, ...]]:
         for rule in rules
         if rule.ignored
     ]
-    found += [
-        PlanProblem(
-            "unmatched",
-            "warning",
-            f"got {rule.action!r}; expected an action of the plan, one of {sorted(actions)}."
-            f"{did_you_mean(rule.action, actions)}",
-            f"rule for {rule.action!r}",
-            str(beside),
-            rule.line,
-        )
-        for rule in rules
-        if rule.action not in actions
-    ]
-    return net, tuple(found)
+    return net, (*found, *unmatched(rules, actions, str(beside)))
 
 
 def find_plan(folder: Path | str, name: str) -> Path | None:

@@ -13,6 +13,7 @@ Source: the generators of PetriNetPlans 1.4. A "#" begins a comment. No threads,
 from __future__ import annotations
 
 import re
+import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -83,8 +84,33 @@ def parse_plan(
 
     Raises:
         PlanError: it cannot be read; with the line.
+
+    Warns:
+        UserWarning: a rule is for no action of the plan.
     """
-    return read_plan_text(text, rules, name, file)[0]
+    net, actions = read_plan_text(text, rules, name, file)
+    for problem in unmatched(rules, actions):
+        warnings.warn(str(problem), stacklevel=2)
+    return net
+
+
+def unmatched(
+    rules: tuple[ExecutionRule, ...], actions: set[str], file: str = ""
+) -> list[PlanProblem]:
+    """Return the problems of rules for none of these actions."""
+    return [
+        PlanProblem(
+            "unmatched",
+            "warning",
+            f"got {rule.action!r}; expected an action of the plan, one of {sorted(actions)}."
+            f"{did_you_mean(rule.action, actions)}",
+            f"rule for {rule.action!r}",
+            file,
+            rule.line,
+        )
+        for rule in rules
+        if rule.action not in actions
+    ]
 
 
 def read_plan_text(
@@ -105,7 +131,7 @@ def parse_pddl(
     text: str, rules: tuple[ExecutionRule, ...] = (), *, name: str = "plan", file: str = ""
 ) -> Net:
     """Read a list of PDDL actions, one "(action p1 p2)" a line; arguments as for `parse_plan`."""
-    return read_plan_text(plan_of_pddl(text, file), rules, name, file)[0]
+    return parse_plan(plan_of_pddl(text, file), rules, name=name, file=file)
 
 
 def plan_of_pddl(text: str, file: str) -> str:

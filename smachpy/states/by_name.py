@@ -298,7 +298,7 @@ def publish(
         key: The userdata key of the message or its fields, instead.
         subscribers: How many subscribers to wait for, 1 unless given; 0: none.
         latch: Keep the message for later subscribers, and wait for none.
-        timeout: Longest wait [s]; none: no limit.
+        timeout: Longest wait for them [s]; none: no limit.
     """
     from smachpy.states.topics import Publish
 

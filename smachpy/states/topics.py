@@ -48,7 +48,7 @@ class Publish(State):
         subscribers: How many subscribers to wait for; 0: it publishes at once, and who listens
             later gets nothing unless it latches.
         latch: The message stays on the topic for later subscribers, until the program ends or the
-            state is visited again; then `subscribers` is 0.
+            state is visited again; it waits for none then.
         timeout: Longest wait for the subscribers [s]; None: no limit, 0: it looks once.
         **options: See `smachpy.machines.state.StateOptions`.
 
@@ -79,9 +79,16 @@ class Publish(State):
             problems.add("message, key: got both; expected one of them.")
         self.__key = key
         expected = "a number of subscribers, 0 or more"
-        self.__subscribers = 0 if latch else problems.whole("subscribers", subscribers, 0, expected)
+        self.__subscribers = problems.whole("subscribers", subscribers, 0, expected)
         self.__latch = latch
         self.__timeout_s = problems.seconds("timeout", timeout)
+        # A latched message waits for nobody: what differs from the defaults was meant for a wait.
+        for name, given, default in (
+            ("subscribers", self.__subscribers, (0, 1)),
+            ("timeout", self.__timeout_s, (SUBSCRIBER_S,)),
+        ):
+            if latch and given not in default:
+                problems.add(f"latch, {name}: got both; expected one of them.")
         problems.raise_all()
         with problems:
             _as_message("message", msg_type, message)

@@ -433,6 +433,10 @@ def test_the_code_of_a_plan_in_another_folder(file, tmp_path, monkeypatch, besid
             "publish: got latch and subscribers: 3; expected one",
         ),
         (
+            "publish, with: {topic: a, type: std_msgs/Bool, message: {}, latch: true, timeout: 60}",
+            "latch, timeout: got both; expected one",
+        ),
+        (
             "action, with: {name: a, type: move_base_msgs/MoveBase, goal: {}, goal_key: shelf}",
             "action: got goal and goal_key; expected one",
         ),
@@ -465,6 +469,19 @@ def test_what_has_no_effect_or_names_no_field_is_refused(file, entry, problem):
 def test_publish_waits_for_subscribers_or_latches(file, more):
     text = f"{{state: publish, with: {{topic: a, type: std_msgs/Bool, message: {{}}, {more}}}}}"
     load(file(f"outcomes: [succeeded, aborted, preempted]\nstates:\n  A: {text}\n"))
+
+
+def test_options_that_are_set_before_the_code_is_imported_are_kept(file, tmp_path):
+    """The stand-in had them, and the state that took its place had not."""
+    shutil.copy(HERE / "own_states.py", tmp_path / "states_of_options.py")
+    text = "outcomes: [done, late]\nstates:\n  A: {state: states_of_options:Up, retry: {attempts: 3, on: [a]}, on: {a: done, b: A}}\n"
+    machine = load(file(text))
+    smachpy.set_options(machine["A"], timeout=2.0, timeout_outcome="late", resource="base")
+    resolve(machine)
+    options = smachpy.get_options(machine["A"])
+    assert (options.timeout, options.resource, options.retry.attempts) == (2.0, Resource("base"), 3)
+    assert "late" in machine["A"].get_registered_outcomes()
+    assert "timeout: 2.0" in smachpy.files.write(machine)
 
 
 def test_parameters_in_retry_and_resource(file):

@@ -203,6 +203,65 @@ def test_an_older_file_that_cannot_have_the_values_is_replaced(tmp_path):
     assert [dict(child.details)["waits"] for child in written.children] == ["3 s", "4 s"]
 
 
+OLD = """\
+# about the file
+
+name: M
+outcomes: [done, preempted]
+states:
+  # about A
+  # and more
+  A: {state: wait, with: {seconds: 1}, on: {done: B}}   # behind A
+  # about B
+  B:
+    # in B
+    state: wait
+    with: {seconds: 2}
+    on: {done: C}
+
+  # about C
+  C: {state: wait, with: {seconds: 3}, on: {done: done}}
+# about the clean-up
+cleanup:
+  D: {state: wait}
+"""
+NEW = """\
+# about the file
+
+name: M
+outcomes: [done, preempted]
+states:
+
+  # about C
+  C: {state: wait, with: {seconds: 3}, on: {done: X}}
+  X:
+    state: wait
+    with:
+      seconds: 4
+    on:
+      done: B
+  # about B
+  B:
+    # in B
+    state: wait
+    with: {seconds: 2}
+    on: {done: done}
+# about the clean-up
+cleanup:
+  D: {state: wait}
+"""
+
+
+@pytest.mark.parametrize(("first", "second"), [(OLD, NEW), (NEW, NEW), (OLD, OLD)])
+def test_comments_stay_with_the_labels_that_they_are_about(tmp_path, first, second):
+    """After another order they stood above others, and with a label its successor's went."""
+    wanted, path = tmp_path / "wanted.yaml", tmp_path / "m.yaml"
+    wanted.write_text(second)
+    path.write_text(first)
+    write(load(wanted), path)
+    assert path.read_text() == second
+
+
 def test_options_that_were_set_after_loading_are_written(tmp_path):
     """The file had those of before."""
     path = tmp_path / "m.yaml"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +13,7 @@ from smachpy.machines.rules import all_of, any_of
 
 NAMES = st.sampled_from(["a", "b", "c", "A", "B", "C", "preempted"])
 OUTCOMES = st.lists(NAMES, max_size=3, unique=True).map(tuple)
-TARGETS = NAMES | st.none() | st.just("")
+TARGETS = NAMES | st.none()
 
 
 class Child(NamedTuple):
@@ -151,3 +152,10 @@ def test_a_loop_without_problems_ends_with_its_own_outcomes(
         good = named <= set(child.outcomes)
         good = good and {final.get(o, o) for o in (*ends, exhausted)} <= own
     assert good == (not problems)
+
+
+def test_an_empty_target_is_refused():
+    """It meant the outcome of the machine, and said nothing."""
+    sm = smachpy.StateMachine(["done"])
+    with pytest.raises(smachpy.InvalidStateError, match="transitions: got 'done': '' in it"):
+        sm.add("A", smachpy.CBState(lambda _ud: "done", outcomes=["done"]), {"done": ""})

@@ -186,6 +186,16 @@ def test_execution_rules(clock):
     assert (outcome, sorted(n for n, _ in log)) == ("goal", ["goto_x", "goto_x!", "r_1", "say_y"])
 
 
+@pytest.mark.parametrize("parse", [parse_plan, parse_pddl])
+def test_a_rule_for_no_action_of_the_plan_warns(parse):
+    """It vanished."""
+    rules = parse_rules("*if* obstacle *during* gto *do* goal\n*if* b *during* goto *do* goal")
+    text = "goto_x; wait_1" if parse is parse_plan else "(goto x)\n(wait 1)"
+    with pytest.warns(UserWarning, match="rule for 'gto': .*Did you mean 'goto'") as warned:
+        parse(text, rules)
+    assert len(warned) == 1
+
+
 def test_pddl(clock):
     net = parse_pddl("(goto kitchen)\n# comment\n0.0: (say hello you) [1.0]\n")
     assert [name for name, _ in ran(net, clock)[1]] == ["goto_kitchen", "say_hello_you"]

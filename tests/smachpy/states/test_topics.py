@@ -47,6 +47,8 @@ def other(mission):
         (lambda: Publish("a", Bool, Bool(), key="k"), "message, key: got both"),
         (lambda: Publish("a", Bool, subscribers=-1), "subscribers: got -1"),
         (lambda: Publish("a", Bool, timeout=-1), "timeout: got -1"),
+        (lambda: Publish("a", Bool, latch=True, subscribers=2), "latch, subscribers: got both"),
+        (lambda: Publish("a", Bool, latch=True, timeout=None), "latch, timeout: got both"),
         (lambda: LookUpTransform("", "cup"), "key: got ''"),
         (lambda: LookUpTransform("k", "cup", tf="a b"), "tf: got 'a b'"),
         (lambda: LookUpTransform("k", "cup", timeout="5"), "Try 5"),
