@@ -91,6 +91,7 @@ class PostgresStore(SqlStore):
         for_share=" FOR SHARE",
         skip_locked=" FOR UPDATE SKIP LOCKED",
         notify=f"SELECT pg_notify('{_CHANNEL}', '')",
+        bytewise=' COLLATE "C"',
     )
 
     def __init__(self, url: str, *, patience: float = 8.0) -> None:
@@ -160,6 +161,17 @@ class PostgresStore(SqlStore):
                 "Try a newer smachpy.",
                 reason="future",
             )
+        elif self._missing_indexes(cursor):
+            self._do(cursor, _ONE_MAKER)
+            self._add_indexes(cursor)
+
+    def _index_names(self, cursor: Cursor) -> set[str]:
+        self._do(
+            cursor,
+            "SELECT indexname FROM pg_indexes WHERE tablename = 'smachpy_missions' "
+            "AND schemaname = ANY (current_schemas(false))",
+        )
+        return {row[0] for row in cursor.fetchall()}
 
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:  # noqa: ARG002
         self._check_process()

@@ -75,9 +75,36 @@ _HELD: Final = "owner, mark, lease_end, lease_clock"
 _ROBOT: Final = "COALESCE({0}drives, {0}robot)"
 """The robot that a mission holds, as an expression; `drives` is null in rows of version 1."""
 
+_FREE: Final = "waits = 0 AND owner IS NULL"
+"""The condition of missions that may be taken, with a status."""
+
+_LATER: Final = "waits = 1 AND every IS NULL"
+"""The condition of missions that are due later."""
+
+_BREAK: Final = "\n"
+"""Stands between the parts of `Dialect.needs`: no robot and no group has one."""
+
+_LAST: Final = "\U0010ffff"
+"""No text comes after it, byte by byte."""
+
+_AFTER_BREAK: Final = "\v"
+"""The next character: what begins with a robot and `_BREAK` is before the robot and this."""
+
 MAX_LEFT_ROWS: Final = 500
 MAX_LEFT_SHAPES: Final = 50
 """The most missions, and targets, that `reserve` passes over: they are bound to a statement."""
+
+FRONT: Final = 16
+"""Missions that `reserve` looks at one by one; behind them it looks at what they need."""
+
+MAX_KINDS: Final = 10_000
+"""The most different needs whose first missions it compares: they are bound to a statement."""
+
+_FRONT: Final = (
+    "WITH front AS (SELECT id FROM smachpy_missions WHERE status = '{}' AND "
+    f"{_FREE} ORDER BY priority DESC, ready, id LIMIT {FRONT}) "
+    "SELECT m.id FROM front CROSS JOIN smachpy_missions AS m WHERE m.id = front.id"
+)
 
 PRUNED_AT_ONCE: Final = 500
 """Missions that `prune` deletes in one transaction: others write in between."""
@@ -94,6 +121,7 @@ class Dialect:
         skip_locked: End of a SELECT that locks its row, and passes over rows that others lock.
         clustered: End of a CREATE TABLE that stores rows in the order of their primary key.
         notify: A statement that wakes runners when its transaction is committed, or "".
+        bytewise: End of an expression that is compared byte by byte, whatever the language.
     """
 
     placeholder: str
@@ -105,6 +133,21 @@ class Dialect:
     skip_locked: str = ""
     clustered: str = ""
     notify: str = ""
+    bytewise: str = ""
+
+    def needs(self, table: str = "") -> str:
+        """Return what a mission needs as one text of SQL: its robot, group and target.
+
+        If a mission cannot begin as these are in use or not allowed, no other one with the same
+        needs can.
+
+        Args:
+            table: The name of the missions' table in the statement, with a dot.
+        """
+        robot = f"COALESCE({table}drives, {table}robot, '')"
+        words = (robot, f"COALESCE({table}grp, '')", f"{table}target")
+        text = f" || '{_BREAK}' || ".join(words)
+        return f"({text}){self.bytewise}"
 
     def tables(self) -> tuple[str, ...]:
         """Return the statements that create the tables of version 1."""
@@ -171,12 +214,21 @@ class Dialect:
             f"CREATE TABLE IF NOT EXISTS smachpy_resources ({resources}){self.clustered}",
             one_holder,
         )
-        indexes = (
-            f"CREATE {kind} IF NOT EXISTS smachpy_{name} ON smachpy_missions {columns}{where}"
-            for name, kind, columns, where in _INDEXES
-        )
         changes = (f"UPDATE smachpy_missions {change}" for change in _CHANGES)
-        return (table, *changes, *indexes, *held)
+        return (table, *changes, *self.indexes().values(), *held)
+
+    def indexes(self) -> dict[str, str]:
+        """Return the statements that create the indexes of the missions, by the indexes' names.
+
+        One that is new here needs no new version: a store without it gets it when it is opened.
+        """
+        columns = f"(status, ({self.needs()}), priority DESC, ready, id)"
+        needs = ("needs", "INDEX", columns, f" WHERE {_FREE}")
+        return {
+            f"smachpy_{name}": f"CREATE {kind} IF NOT EXISTS smachpy_{name} "
+            f"ON smachpy_missions {columns}{where}"
+            for name, kind, columns, where in (*_INDEXES, needs)
+        }
 
 
 _OPEN: Final = "status <> 'ended' AND status <> 'cancelled'"
@@ -190,8 +242,10 @@ _CHANGES: Final = (
 """What rows of version 1 need; each may be repeated."""
 
 _INDEXES: Final = (
-    ("free", "INDEX", "(status, priority DESC, ready, id)", " WHERE waits = 0 AND owner IS NULL"),
-    ("due", "INDEX", "(status, due)", " WHERE waits = 1"),
+    ("free", "INDEX", "(status, priority DESC, ready, id)", f" WHERE {_FREE}"),
+    ("once", "INDEX", "(status, due)", f" WHERE {_LATER}"),
+    ("robots_once", "INDEX", f"(status, ({_ROBOT.format('')}), due)", f" WHERE {_LATER}"),
+    ("often", "INDEX", "(status, due)", " WHERE waits = 1 AND every IS NOT NULL"),
     ("late", "INDEX", "(status, not_after)", " WHERE not_after IS NOT NULL"),
     ("held", "INDEX", "(owner)", " WHERE owner IS NOT NULL"),
     ("robots", "UNIQUE INDEX", f"(({_ROBOT.format('')}))", " WHERE owner IS NOT NULL"),
@@ -277,6 +331,19 @@ class SqlStore(ABC):
     @abstractmethod
     def _now_text(self) -> str:
         """Return that time as an expression of SQL."""
+
+    @abstractmethod
+    def _index_names(self, cursor: Cursor) -> set[str]:
+        """Return the names of the indexes that the database has."""
+
+    def _missing_indexes(self, cursor: Cursor) -> list[str]:
+        """Return the statements that create the indexes of the missions which are not there."""
+        known = self._index_names(cursor)
+        return [sql for name, sql in self.dialect.indexes().items() if name not in known]
+
+    def _add_indexes(self, cursor: Cursor) -> None:
+        for statement in self._missing_indexes(cursor):
+            self._do(cursor, statement)
 
     def _steady(self, seconds: float = 0.0) -> str | None:
         """Return the time in `seconds` [s] on a clock that is never set; None: there is none."""
@@ -438,7 +505,18 @@ class SqlStore(ABC):
 
     def look(self, *, robots: Collection[str] = ()) -> QueueNews:
         names = [robot_identity(robot) for robot in robots]
-        own = f" AND {_ROBOT.format('')} IN ({_places(names)})" if names else ""
+        given = _table([(name,) for name in names])
+        mine_due = (
+            "SELECT MIN(f.due) FROM (SELECT (SELECT MIN(due) FROM smachpy_missions "
+            f"WHERE status = 'queued' AND {_LATER} AND {_ROBOT.format('')} = g.column1) AS due "
+            f"FROM {given}) AS f"
+        )
+        needs = self.dialect.needs()
+        sql = f"SELECT 1 FROM smachpy_missions WHERE {_FREE} AND status = '{{}}'"
+        if names:
+            after, before = f"g.column1 || '{_BREAK}'", f"g.column1 || '{_AFTER_BREAK}'"
+            sql += f" AND {needs} > {after} AND {needs} < {before}"
+            sql = f"SELECT 1 FROM {given} WHERE EXISTS ({sql})"
 
         def read(cursor: Cursor, _: bool) -> tuple[Any, ...]:
             now = self._now(cursor)
@@ -450,18 +528,16 @@ class SqlStore(ABC):
             waiting = "FROM smachpy_missions WHERE status = 'queued' AND waits = 1"
             due = self._one(cursor, f"SELECT MIN(due) {waiting} AND every IS NULL")[0]
             mine = due
-            if own and due is not None:
-                sql = f"SELECT MIN(due) {waiting} AND every IS NULL{own}"
-                mine = self._one(cursor, sql, *names)[0]
+            if names and due is not None:
+                mine = self._one(cursor, mine_due, *names)[0]
             often = self._one(cursor, f"SELECT MIN(due) {waiting} AND every IS NOT NULL")[0]
             late = self._one(
                 cursor,
                 "SELECT MIN(not_after) FROM smachpy_missions "
                 "WHERE status = 'queued' AND not_after IS NOT NULL",
             )[0]
-            free = f"FROM smachpy_missions WHERE waits = 0 AND owner IS NULL{own} AND status ="
             is_free = any(
-                self._one(cursor, f"SELECT 1 {free} '{status}' LIMIT 1", *names)
+                self._one(cursor, f"{sql.format(status)} LIMIT 1", *names)
                 for status in (INTERRUPTED, QUEUED)
             )
             schedules: list[MissionRow] = []
@@ -546,55 +622,118 @@ class SqlStore(ABC):
     ) -> tuple[MissionRow, Lease] | None:
         check_lease_seconds(seconds)
         host_and_pid(runner)
-        leave, leave_targets = list(leave)[-MAX_LEFT_ROWS:], list(leave_targets)[-MAX_LEFT_ROWS:]
-        conditions = ""
-        values: list[object] = []
-        for column, word, given in (
-            (_ROBOT.format("m."), "IN", [robot_identity(robot) for robot in robots]),
-            ("m.id", "NOT IN", leave),
-            ("m.target", "NOT IN", leave_targets),
-        ):
-            if given:
-                conditions += f"AND {column} {word} ({_places(given)}) "
-                values += given
-        for target, shape in list(leave_shapes)[-MAX_LEFT_SHAPES:]:
-            conditions += "AND NOT (m.target = ? AND m.structure = ?) "
-            values += [target, shape]
-        # Evaluated once, unlike `NOT EXISTS`: a long queue may wait for one robot.
-        used = "SELECT {0} FROM smachpy_missions WHERE owner IS NOT NULL AND {0} IS NOT NULL"
-        begun = (
-            " UNION ALL SELECT {0} FROM smachpy_missions WHERE status = 'interrupted' "
-            "AND waits = 0 AND owner IS NULL AND {0} IS NOT NULL"
+        names = [robot_identity(robot) for robot in robots]
+        targets = list(leave_targets)[-MAX_LEFT_ROWS:]
+        # The conditions that differ between missions with the same needs, and the others.
+        single, singles = _passed_over(list(leave)[-MAX_LEFT_ROWS:], leave_shapes)
+        others = "".join(
+            f"AND {column} {word} ({_places(given)}) "
+            for column, word, given in (
+                (_ROBOT.format("m."), "IN", names),
+                ("m.target", "NOT IN", targets),
+            )
+            if given
         )
-        robot = _ROBOT.format("m.")
+        one_kind = f"SELECT m.id FROM smachpy_missions AS m WHERE {self.dialect.needs('m.')} = ?"
 
         # If the answer is lost, nobody uses the reservation; `look` frees it when it has expired.
         def work(cursor: Cursor, _: bool) -> tuple[MissionRow, Lease] | None:
             now = self._now_text()
-            for status in (INTERRUPTED, QUEUED):
-                late = f"AND (m.not_after IS NULL OR m.not_after > {now}) "
-                # The goals of a mission that was interrupted may still drive its robot: until it
-                # goes on or is cancelled, no other one begins there.
-                held = f"NOT IN ({used}{begun if status == QUEUED else ''})"
-                self._do(
+
+            def take(status: str, free: str, among: str, *needs: str) -> Any:
+                return self._one(
                     cursor,
                     "UPDATE smachpy_missions SET owner = ?, mark = ?, fence = fence + 1, "
                     f"lease_end = {now} + ?, lease_clock = ? "
-                    "WHERE id = (SELECT m.id FROM smachpy_missions AS m "
-                    f"WHERE m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL "
-                    f"{late if status == QUEUED else ''}{conditions}"
-                    f"AND ({robot} IS NULL OR {robot} {held.format(_ROBOT.format(''))}) "
-                    f"AND (m.grp IS NULL OR m.grp {held.format('grp')}) "
+                    f"WHERE id = ({among} AND {free} {others}"
+                    f"AND {_not_in_use(_ROBOT, status)} AND {_not_in_use('{}grp', status)} "
                     f"ORDER BY m.priority DESC, m.ready, m.id LIMIT 1{self.dialect.skip_locked}) "
                     f"RETURNING {_COLUMNS}, {_HELD}, fence",
-                    *(runner, self._mark, seconds, self._steady(seconds), *values),
+                    *(runner, self._mark, seconds, self._steady(seconds), *needs),
+                    *(*singles, *names, *targets),
                 )
-                row = cursor.fetchone()
+
+            for status in (INTERRUPTED, QUEUED):
+                free = f"m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL {single}"
+                if status == QUEUED:
+                    free += f"AND (m.not_after IS NULL OR m.not_after > {now}) "
+                # Those of some robots may all be far behind.
+                row = None if names else take(status, free, _FRONT.format(status))
+                kinds = [] if row else self._kinds(cursor, status, names, targets)
+                for needs in self._by_first(cursor, kinds, free, singles):
+                    row = row or take(status, free, one_kind, needs)
                 if row is not None:
                     return self._row(row[:-1], 0.0), Lease(row[0], row[-1], runner)
             return None
 
         return self._transact(work)
+
+    def _kinds(
+        self, cursor: Cursor, status: str, robots: Sequence[str], leave_targets: Collection[str]
+    ) -> list[str]:
+        """Return the different needs of the missions with a status, if these are free.
+
+        Args:
+            cursor: The cursor.
+            status: The missions' status.
+            robots: Only missions of these robots; empty: all.
+            leave_targets: Targets of missions that are passed over.
+        """
+        needs, end = self.dialect.needs(), self.dialect.bytewise
+        following = (
+            f"SELECT {needs} FROM smachpy_missions WHERE status = '{status}' AND {_FREE} "
+            f"AND {needs} > kinds.needs AND {needs} < kinds.before ORDER BY {needs} LIMIT 1"
+        )
+        ranges = [(name + _BREAK, name + _AFTER_BREAK) for name in robots] or [("", _LAST)]
+        # One step in the index for each kind, however many missions are of it.
+        self._do(
+            cursor,
+            "WITH RECURSIVE kinds(needs, before) AS ("
+            f"SELECT g.column1{end}, g.column2{end} FROM {_table(ranges)} "
+            f"UNION ALL SELECT ({following}), kinds.before FROM kinds "
+            "WHERE kinds.needs IS NOT NULL) SELECT needs FROM kinds WHERE needs IS NOT NULL",
+            *(value for pair in ranges for value in pair),
+        )
+        found = [row[0] for row in cursor.fetchall()]
+        kinds = {one: words for one in found if len(words := one.split(_BREAK, 2)) == 3}  # noqa: PLR2004
+        if not kinds:
+            return []
+        self._do(cursor, _in_use(f"{_ROBOT.format('')}, grp", status))
+        used = cursor.fetchall()
+        used_robots, used_groups = {row[0] for row in used}, {row[1] for row in used}
+        return [
+            one
+            for one, (robot, group, target) in kinds.items()
+            if robot not in used_robots and group not in used_groups and target not in leave_targets
+        ]
+
+    def _by_first(
+        self, cursor: Cursor, kinds: Sequence[str], free: str, values: Sequence[object]
+    ) -> list[str]:
+        """Return kinds in the order in which their first missions begin.
+
+        Args:
+            cursor: The cursor.
+            kinds: What missions need; kinds without a mission that may be taken are left out.
+            free: The condition of missions that may be taken.
+            values: Its values.
+        """
+        kinds = kinds[:MAX_KINDS]
+        if not kinds:
+            return []
+        order = "priority DESC, {0}ready, {0}id"
+        first = (
+            f"SELECT m.id FROM smachpy_missions AS m WHERE {self.dialect.needs('m.')} = g.column1 "
+            f"AND {free} ORDER BY m.{order.format('m.')} LIMIT 1"
+        )
+        self._do(
+            cursor,
+            f"SELECT g.column1 FROM {_table([(one,) for one in kinds])} "
+            "CROSS JOIN smachpy_missions AS b "
+            f"WHERE b.id = ({first}) ORDER BY b.{order.format('b.')}",
+            *(*kinds, *values),
+        )
+        return [str(row[0]) for row in cursor.fetchall()]
 
     # -- the missions of this process ----------------------------------------------------------
 
@@ -808,8 +947,8 @@ class SqlStore(ABC):
 
         def work(cursor: Cursor, _: bool) -> ResourceUse | None:
             self._fenced(cursor, lease)
-            over = f"mission NOT IN (SELECT id FROM smachpy_missions WHERE {_OPEN})"
-            delete = f"DELETE FROM smachpy_resources WHERE resource = ? AND {over}"
+            is_open = f"SELECT 1 FROM smachpy_missions WHERE id = mission AND {_OPEN}"
+            delete = f"DELETE FROM smachpy_resources WHERE resource = ? AND NOT EXISTS ({is_open})"
             self._do(cursor, delete, resource)
             users = self._users(cursor, resource)
             known = [one.mission for one in users]
@@ -1184,6 +1323,41 @@ def robot_identity(name: str) -> str:
 
 def _places(values: Collection[object]) -> str:
     return ", ".join("?" * len(values))
+
+
+def _passed_over(
+    ids: Sequence[str], shapes: Iterable[tuple[str, bytes]]
+) -> tuple[str, list[str | bytes]]:
+    """Return the condition that a mission `m` is none of those, and its values."""
+    condition = f"AND m.id NOT IN ({_places(ids)}) " if ids else ""
+    values: list[str | bytes] = [*ids]
+    for shape in list(shapes)[-MAX_LEFT_SHAPES:]:
+        condition += "AND NOT (m.target = ? AND m.structure = ?) "
+        values += shape
+    return condition, values
+
+
+def _table(rows: Sequence[Collection[object]]) -> str:
+    """Return a table `g` of values that are bound, with the columns `column1`, `column2`."""
+    return f"(VALUES {', '.join(f'({_places(row)})' for row in rows)}) AS g"
+
+
+def _in_use(columns: str, status: str) -> str:
+    """Return a query for the robots or groups that missions with a status cannot have now."""
+    query = f"SELECT {columns} FROM smachpy_missions WHERE"
+    used = f"{query} owner IS NOT NULL"
+    # The goals of a mission that was interrupted may still drive its robot: until it goes on or is
+    # cancelled, no other one begins there.
+    begun = f" UNION ALL {query} status = 'interrupted' AND {_FREE}"
+    return used if status == INTERRUPTED else used + begun
+
+
+def _not_in_use(column: str, status: str) -> str:
+    """Return the condition that a mission `m` with a status can have its robot, or group."""
+    mine, one = column.format("m."), column.format("")
+    # Evaluated once, unlike `NOT EXISTS`.
+    used = f"SELECT one FROM ({_in_use(f'{one} AS one', status)}) AS u WHERE one IS NOT NULL"
+    return f"({mine} IS NULL OR {mine} NOT IN ({used}))"
 
 
 _LATEST: Final = 1e11

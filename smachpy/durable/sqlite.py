@@ -141,6 +141,8 @@ class SQLiteStore(SqlStore):
             # A new or older file; or a process was killed inside `_mark_file`.
             if version != VERSION:
                 self._transact(self._create_tables)
+            elif self._transact(lambda cursor, _: self._missing_indexes(cursor), reads=True):
+                self._transact(lambda cursor, _: self._add_indexes(cursor))
         except (sqlite3.Error, UnicodeDecodeError) as error:
             self._connection.close()
             raise self._error(error) from error
@@ -285,6 +287,10 @@ class SQLiteStore(SqlStore):
         for statement in self.dialect.additions():
             cursor.execute(statement)
         cursor.execute(f"PRAGMA user_version = {VERSION}")
+
+    def _index_names(self, cursor: Cursor) -> set[str]:
+        cursor.execute("SELECT name FROM sqlite_master WHERE type = 'index'")
+        return {name for (name,) in cursor.fetchall()}
 
     def _transact(self, work: Callable[[Cursor, bool], T], *, reads: bool = False) -> T:
         self._check_process()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
+import random
 import signal
 import sqlite3
 import subprocess
@@ -46,6 +47,16 @@ def other(store_place):
 
 def put(store, id, **facts):  # noqa: A002
     return store.create(replace(ROW, id=id, **facts))
+
+
+def put_many(store, rows):
+    """Add missions in one transaction."""
+
+    def work(cursor, _):
+        for number, row in enumerate(rows):
+            store._insert(cursor, row, 1_000.0 + number)
+
+    store._transact(work)
 
 
 def taken(store, **options):
@@ -119,6 +130,131 @@ def test_what_a_runner_leaves_of_one_version_hides_no_other(store):
         put(store, name, target=target, structure=shape)
     assert taken(store, leave_shapes=[("m.py", b"{}"), ("o.py", b"[]")]) == ["b", "c"]
     assert taken(store) == ["a"]
+
+
+def test_what_can_begin_is_found_behind_a_long_queue_that_cannot(store):
+    put(store, "busy", robot="r1", group="lift")
+    store.claim("busy", this_runner(), seconds=LONG_S)
+    facts = [{"robot": "r1"}, {"group": "lift"}, {"target": "left.py"}, {"robot": "r2"}]
+    put_many(store, [replace(ROW, id=f"m{n:03}", priority=5, **facts[n % 3]) for n in range(90)])
+    for n, (name, which) in enumerate(
+        [("b", 3), ("low", 3), ("a", 3), ("group", 1), ("left", 2), ("robot", 0)]
+    ):
+        put(store, name, priority=-n if name != "a" else 1, **facts[which])
+    assert store.look().free
+    assert store.look(robots=["r2"]).free
+    assert not store.look(robots=["r3"]).free
+    assert taken(store, leave_targets=["left.py"]) == ["a"]  # one at a time has the robot r2
+    for mission, following in (("a", "b"), ("b", "low")):
+        end(store, mission)
+        assert taken(store, leave_targets=["left.py"], robots=["r2"]) == [following]
+    end(store, "low")
+    assert len(taken(store)) == 31  # nothing is left: all of that target
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mission_is_taken_as_if_all_were_looked_at_in_order(store, seed, monkeypatch):
+    monkeypatch.setattr(sql, "_FRONT", sql._FRONT.replace(f"LIMIT {sql.FRONT}", "LIMIT 2"))
+    chance = random.Random(seed)
+    some = {
+        "robot": [None, "r1", "r2", "r3", "r10"],
+        "group": [None, None, "lift", "door"],
+        "target": ["a.py", "b.py", "a.py b"],
+        "priority": [0, 0, 1, 2],
+        "structure": [b"{}", b"[]"],
+        "not_after": [None, None, None, 5.0],
+    }
+
+    def any_row(name):
+        return replace(ROW, id=name, **{key: chance.choice(of) for key, of in some.items()})
+
+    rows = [any_row(f"m{n:02}") for n in range(40)]
+    put_many(store, rows)
+    wanted = {
+        "leave": chance.sample([row.id for row in rows], 5),
+        "leave_targets": chance.sample(["a.py", "a.py b"], chance.randrange(2)),
+        "leave_shapes": [("b.py", b"[]")],
+        "robots": chance.choice([[], ["r1", "r10"], ["r2"]]),
+    }
+    robots, groups, expected = set(), set(), []
+    for row in sorted(rows, key=lambda row: -row.priority):  # stable: the oldest first
+        fits = (
+            row.id not in wanted["leave"]
+            and row.target not in wanted["leave_targets"]
+            and (row.target, row.structure) not in wanted["leave_shapes"]
+            and (not wanted["robots"] or row.robot in wanted["robots"])
+            and row.not_after is None
+        )
+        if fits and row.robot not in robots and row.group not in groups:
+            robots |= {row.robot} - {None}
+            groups |= {row.group} - {None}
+            expected.append(row.id)
+    assert taken(store, **wanted) == expected
+
+
+class Steps:
+    """The steps of SQLite's machine within a block: what its queries cost on any computer."""
+
+    def __init__(self, store):
+        self.store, self.count = store, 0
+
+    def __enter__(self):
+        self.store._connection.set_progress_handler(self._step, 1)
+        return self
+
+    def _step(self):
+        self.count += 1
+        return 0
+
+    def __exit__(self, *_):
+        self.store._connection.set_progress_handler(None, 0)
+
+
+@pytest.mark.parametrize(
+    ("facts", "options"),
+    [
+        ({"robot": "r1"}, {}),
+        ({"group": "lift"}, {}),
+        ({"target": "left.py"}, {"leave_targets": ["left.py"]}),
+        ({"robot": "r2"}, {"robots": ["r3"]}),
+        ({"robot": "r2", "due": 9e9}, {"robots": ["r3"]}),
+        ({"robot": "r3", "due": 9e9}, {"robots": ["r3"]}),
+        ({"every": "0 8 * * *", "due": 9e9}, {}),
+        ({"due": 9e9}, {}),
+    ],
+    ids=str,
+)
+def test_a_look_at_missions_that_cannot_begin_costs_the_same_however_many_wait(
+    tmp_path, facts, options
+):
+    store = open_store(tmp_path / "queue.db")
+    put(store, "busy", robot="r1", group="lift")
+    lease = store.claim("busy", this_runner(), seconds=LONG_S)
+    robots = options.get("robots", [])
+    costs = []
+    for count in (100, 2_000):
+        put_many(store, [replace(ROW, id=f"{count} {n}", **facts) for n in range(count)])
+        with Steps(store) as steps:
+            store.look(robots=robots)
+            assert store.reserve(this_runner(), seconds=LONG_S, **options) is None
+            assert store.hold(lease, "door", "A", "wait") is None
+        costs.append(steps.count)
+    assert costs[1] < 1.2 * costs[0]
+    store.close()
+
+
+def test_a_store_without_an_index_gets_it_when_it_is_opened(store_place):
+    """A newer smachpy has more indexes of the same version; an older one does not need them."""
+
+    def delete(cursor, _):
+        assert set(store.dialect.indexes()) <= store._index_names(cursor)
+        for name in ("smachpy_needs", "smachpy_once"):
+            cursor.execute(f"DROP INDEX {name}")
+
+    for _ in range(2):
+        store = open_store(store_place)
+        store._transact(delete)
+        store.close()
 
 
 def test_more_left_missions_than_a_statement_binds(store):
@@ -254,6 +390,8 @@ def counted(cursor, sql, *values):
 store._do = counted
 if act == "reserve":
     store.reserve(this_runner(), seconds=0.05)
+elif act == "reserve for a robot":
+    store.reserve(this_runner(), seconds=0.05, robots=["r1"])
 elif act == "claim":
     store.claim("a", this_runner(), seconds=0.05, reserved=lease)
 elif act == "release":
@@ -266,7 +404,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("act", ["reserve", "claim", "release", "look"])
+@pytest.mark.parametrize("act", ["reserve", "reserve for a robot", "claim", "release", "look"])
 def test_a_runner_killed_at_any_statement_leaves_the_mission_to_one_other(store, store_place, act):
     put(store, "a", robot="r1", group="lift", due=1.0)
     put(store, "b", robot="r1")
