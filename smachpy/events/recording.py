@@ -48,7 +48,7 @@ from smachpy.events.inputs import (
 )
 from smachpy.events.introspection import MAX_NESTING, Described, StateRecord, describe
 from smachpy.events.reading import OBSERVED, read_crossed, read_event, read_facts, read_observed
-from smachpy.events.run_state import RAISED
+from smachpy.events.run_state import RAISED, RunState
 from smachpy.events.steady import SteadyStamps, begun_root
 from smachpy.exceptions import SmachError
 
@@ -139,6 +139,12 @@ class Recording:
     run: str = ""
     inputs: list[dict[str, Any]] = field(default_factory=list)
     origin: dict[str, Any] | None = None
+
+    @property
+    def folded(self) -> int:
+        """Number of the oldest events that were folded into `base` when it was read."""
+        first = self.events[0] if self.events else {"seq": 1}
+        return int(first["seq"]) - int(first.get("dropped", 0)) - 1
 
     @property
     def dropped(self) -> int:
@@ -706,7 +712,9 @@ def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
         yield {**event, "seq": seq, **({"dropped": dropped} if dropped else {})}
 
 
-def read_recording(path: str | Path, *, stream: bool = False) -> Recording:
+def read_recording(
+    path: str | Path, *, stream: bool = False, newest: int | None = None
+) -> Recording:
     """Read a file.
 
     Data of robots' topics, and inputs, that have another form than `smachpy.events.reading` knows
@@ -716,6 +724,8 @@ def read_recording(path: str | Path, *, stream: bool = False) -> Recording:
         path: The file.
         stream: Whether the `events` of a large file may be `Streamed`, for readers that only
             iterate them; topics and definitions are left out then.
+        newest: The most events that are kept, and the most records of topics besides maps; those
+            before them are folded into `base`, and inputs are left out. None: all.
 
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event; with the line.
@@ -730,12 +740,12 @@ def read_recording(path: str | Path, *, stream: bool = False) -> Recording:
                 return replace(header, events=cast("list[dict[str, Any]]", Streamed(path)))
             if size > LARGEST:
                 raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
-            return _read(path, file)
+            return _read(path, file, newest)
     except OSError as error:
         raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
 
 
-def _read(path: Path, file: TextIO) -> Recording:
+def _read(path: Path, file: TextIO, newest: int | None) -> Recording:
     recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
     wrong = recording.wrong
 
@@ -745,7 +755,7 @@ def _read(path: Path, file: TextIO) -> Recording:
                 recording.cut = True
             elif record["kind"] in {OBSERVED, CROSSED}:
                 try:
-                    _add_data(recording, record)
+                    _add_data(recording, record, newest)
                 except DataError as error:
                     wrong.append(f"line {number}: {error}")
             elif record["kind"] == TYPES:
@@ -753,7 +763,8 @@ def _read(path: Path, file: TextIO) -> Recording:
             elif record["kind"] != END:
                 yield record
 
-    recording.events = list(_numbered(map(SteadyStamps().fix, events())))
+    numbered = _numbered(map(SteadyStamps().fix, events()))
+    recording.events = list(numbered if newest is None else _newest(recording, numbered, newest))
     if wrong:
         log.logwarn(
             f"recording {str(path)!r}: {len(wrong)} record(s) of topics or inputs are left out; "
@@ -762,13 +773,35 @@ def _read(path: Path, file: TextIO) -> Recording:
     return recording
 
 
-def _add_data(recording: Recording, record: dict[str, Any]) -> None:
+def _newest(
+    recording: Recording, events: Iterable[dict[str, Any]], newest: int
+) -> deque[dict[str, Any]]:
+    """Return the newest events; fold the others into the recording's `base`."""
+    kept: deque[dict[str, Any]] = deque()
+    before = RunState(recording.base)
+    for event in events:
+        kept.append(event)
+        if len(kept) > newest:
+            before.fold(kept.popleft())
+            recording.base = before.data
+    return kept
+
+
+def _add_data(recording: Recording, record: dict[str, Any], newest: int | None) -> None:
     """Add what is no event; raise `DataError` if it has a wrong form."""
     if record["kind"] == CROSSED:
-        recording.inputs.append(read_crossed(record))
-    else:
-        observed = read_observed(record)
-        recording.observed.append({**observed, "n": len(recording.observed) + 1})
+        crossed = read_crossed(record)
+        if newest is None:
+            recording.inputs.append(crossed)
+        return
+    observed = recording.observed
+    number = observed[-1]["n"] + 1 if observed else 1
+    observed.append({**read_observed(record), "n": number})
+    # Twice as many: they are gone through once in so many records.
+    if newest is not None and len(observed) > 2 * newest:
+        maps = (one for one in observed[:-newest] if one["what"] == "map")
+        newest_maps = {one["robot"]: one for one in maps}
+        observed[:-newest] = sorted(newest_maps.values(), key=itemgetter("n"))
 
 
 def _texts(given: Any) -> dict[str, str]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import contextlib
 import gc
+import gzip
 import json
 import math
 import os
 import queue
+import re
 import threading
 import weakref
+import zlib
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,7 +37,7 @@ from smachpy.events.recording import (
 from smachpy.events.run_state import RunState
 from smachpy_viz.live import machines
 from smachpy_viz.live.machines import Machine, Machines
-from smachpy_viz.runs import pruning
+from smachpy_viz.runs import html, pruning
 from smachpy_viz.runs.html import standalone_page
 from smachpy_viz.runs.statistics import (
     Statistics,
@@ -465,6 +469,55 @@ def test_a_large_recording_is_explained_event_by_event(record, monkeypatch, caps
     monkeypatch.setattr(recording_module, "_read", None)  # nothing is read whole
     assert main(["runs", "why", str(path)]) == 0
     assert capsys.readouterr().out == whole
+
+
+def test_of_a_large_recording_the_page_has_the_newest_events_and_says_so(
+    record, monkeypatch, tmp_path, capsys
+):
+    from smachpy.command import main
+
+    def exported():
+        assert main(["runs", "export", str(path), "-o", str(tmp_path / "run.html")]) == 0
+        [data] = re.findall('id="run-data">([^<]*)<', (tmp_path / "run.html").read_text())
+        return json.loads(gzip.decompress(base64.b64decode(data)))
+
+    path = record("run.jsonl", failing=True)
+    whole = exported()
+    events = whole["snap"]["events"]
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(html, "MOST_EVENTS", 4)
+    page = exported()
+    assert page["snap"]["events"] == events[-4:]
+    for part in ("why", "model"):  # the cause of the end is before these events
+        assert page[part] == whole[part]
+    told = capsys.readouterr().err
+    assert f"has the newest 4 of {len(events)} events" in told
+    before = RunState()
+    for event in events[:-4]:
+        before.fold(event)
+    assert page["snap"]["base"] == json.loads(json.dumps(before.data))
+
+
+def test_of_many_records_of_topics_the_newest_are_read_and_each_newest_map(record):
+    path = record("run.jsonl")
+    newest_events = read_recording(path, newest=2).events
+    assert newest_events == read_recording(path).events[-2:]
+    pose = {"what": "of a newer program"}
+    cells = base64.b64encode(zlib.compress(bytes(6))).decode()
+    a_map = {"what": "map", "resolution": 0.5, "width": 3, "height": 2, "origin": [0, 0, 0]}
+    a_map["cells"] = cells
+    lines = path.read_text().splitlines(keepends=True)
+    records = [a_map, *[pose] * 3, a_map, *[pose] * 40]
+    observed = [
+        json.dumps({"kind": "Observed", "path": "", "stamp_ns": 1, "robot": "", **one}) + "\n"
+        for one in records
+    ]
+    path.write_text("".join([lines[0], *observed, *lines[1:]]))
+    whole = read_recording(path)
+    assert len(whole.observed) == len(records), whole.wrong
+    few = read_recording(path, newest=4)
+    assert 4 < len(few.observed) <= 9
+    assert few.observed == [whole.observed[4], *whole.observed[-len(few.observed) + 1 :]]
 
 
 def test_names_that_a_recording_repeats_are_kept_once(record):

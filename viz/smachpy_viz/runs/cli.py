@@ -352,13 +352,15 @@ def _side(place: str) -> ComparedRun:
 
 def _export(args: argparse.Namespace) -> int:
     from smachpy.events.recording import read_recording
+    from smachpy_viz.runs import html
 
     if Path(args.file).is_dir():
         return _export_all(args.file, Path(args.output))
     output = Path(args.output)
-    # A picture needs the events one after the other, the others all at once.
+    # A picture needs the events one after the other, the others at once.
     is_picture = output.suffix not in {".html", ".mcap"}
-    recording = read_recording(args.file, stream=is_picture)
+    newest = html.MOST_EVENTS if output.suffix == ".html" else None
+    recording = read_recording(args.file, stream=is_picture, newest=newest)
     try:
         _write(recording, output, args.runs, args.map)
     except OSError as error:
@@ -366,6 +368,13 @@ def _export(args: argparse.Namespace) -> int:
             f"smachpy runs export: {args.output!r}: cannot write: {error.strerror or error}."
         ) from error
     print(printable(output))
+    if newest is not None and recording.folded:
+        tell(
+            "smachpy runs export",
+            f"{printable(output)}: has the newest {newest:,} of {recording.folded + newest:,} "
+            "events, and counts and newest values of those before. Try: smachpy view "
+            f"{printable(args.file)}",
+        )
     return 0
 
 

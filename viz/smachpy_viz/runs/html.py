@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from smachpy.events.recording import Streamed
 from smachpy_viz.live import assets
 from smachpy_viz.live.machines import Machine
 from smachpy_viz.model.why import why
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from smachpy.events.introspection import StateRecord
     from smachpy.events.recording import Recording
     from smachpy_viz.runs.notes import RunNote
+
+MOST_EVENTS = 100_000
+"""The most events in a page; of those before them it has the counts and newest values."""
 
 
 def standalone_page(
@@ -39,7 +43,10 @@ def standalone_page(
     machine = Machine(recording.path.name, lambda _machine: None, floor=map_of_file)
     machine.load(recording)
     statistics = StatisticsOfFiles(runs).of(recording.record)
-    return page_of(machine, recording.record, statistics, notes=read_notes(recording.path))
+    notes = read_notes(recording.path)
+    # The cause of the end may be among those that are not in the page.
+    events = Streamed(recording.path) if recording.folded else recording.events
+    return page_of(machine, recording.record, statistics, notes=notes, events=events)
 
 
 def page_of(
@@ -48,6 +55,7 @@ def page_of(
     statistics: dict[str, Any] | None = None,
     view: str = "",
     notes: Sequence[RunNote] = (),
+    events: Iterable[dict[str, Any]] | None = None,
 ) -> str:
     """Return the page of a machine as it is now.
 
@@ -57,6 +65,7 @@ def page_of(
         statistics: Those of recorded runs.
         view: What the page shows at first: the fragment of an address, with instant and notes.
         notes: The notes that all pages share.
+        events: The events that explain its end; None: those that it has kept.
     """
     run = {
         "model": assets.model(record),
@@ -65,6 +74,6 @@ def page_of(
         "statistics": statistics,
         "view": view,
         "notes": list(notes),
-        "why": why(record, machine.events()).to_json(),
+        "why": why(record, machine.events() if events is None else events).to_json(),
     }
     return assets.standalone(run, record.label)

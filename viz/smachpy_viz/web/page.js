@@ -10397,6 +10397,16 @@ function Log({ page: page2 }) {
       )
     );
   }
+  const oldest = store.data.run.events[0];
+  const before = oldest && i4 < 0 ? oldest.seq - 1 - (oldest.dropped ?? 0) : 0;
+  if (before > 0)
+    lines.push(
+      /* @__PURE__ */ a4("li", { class: "hint", children: [
+        "of ",
+        countOfEvents(before),
+        " before, only counts and newest values are kept"
+      ] }, "before")
+    );
   const all = end.toLocaleString("en");
   const nothing = `nothing more in the last ${(end - first).toLocaleString("en")} of ${all} events; look at older ones`;
   return /* @__PURE__ */ a4(Section, { title: "Log", children: [

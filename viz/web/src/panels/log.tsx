@@ -54,6 +54,14 @@ export function Log({ page }: { page: Page }) {
       </li>,
     );
   }
+  const oldest = store.data.run.events[0];
+  const before = oldest && i < 0 ? oldest.seq - 1 - (oldest.dropped ?? 0) : 0;
+  if (before > 0)
+    lines.push(
+      <li key="before" class="hint">
+        of {countOfEvents(before)} before, only counts and newest values are kept
+      </li>,
+    );
   const all = end.toLocaleString("en");
   const nothing = `nothing more in the last ${(end - first).toLocaleString("en")} of ${all} events; look at older ones`;
   return (
