@@ -241,8 +241,8 @@ class _Reader:
         draft = foreign.read(self._path, text, self._own.named, is_included=len(self._around) > 1)
         self._notes = tuple((place[0], text) for place, text in sorted(draft.notes))
         if draft.problems:
-            where = [(f"{self._path}:{line}:{column}", t) for (line, column), t in draft.problems]
-            raise MissionFileError([f"{place}: {text}" for place, text in where])
+            found = [f"{self._path}:{a}:{b}: {text}" for (a, b), text in draft.problems]
+            raise MissionFileError(found)
         marks = draft.marks()
         self._columns = {path: column for path, (_, column) in marks.items()}
         return draft.data(), {path: line for path, (line, _) in marks.items()}

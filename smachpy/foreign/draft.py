@@ -94,6 +94,25 @@ class Draft:
         if self._values > MAX_VALUES:
             raise TooMuchError(f"it stands for more than {MAX_VALUES:,} values.")
 
+    def add_state(self, states: Part, label: str, entry: Part, place: Place) -> None:
+        """Add a state; a second one of its label is a problem."""
+        if label in states:
+            self.problem(place, f"got {label!r} a second time; expected one.")
+        states.put(label, entry, place)
+
+    def finish(self, top: Part, name: str | None, about: str | None = None) -> None:
+        """Set the data, with a name and a help if there are some.
+
+        Raises:
+            TooMuchError: they are too many machines in each other.
+        """
+        if name:
+            top["name"] = name
+        if about:
+            top["help"] = about
+        _allow_preempt(top)
+        self.top = top
+
     def data(self) -> dict[str, Any]:
         """Return the data as plain mappings."""
         return _plain(self.top)  # type: ignore[no-any-return]
@@ -121,7 +140,7 @@ def _marks(value: Any, path: str, around: Place) -> Iterator[tuple[str, Place]]:
             yield from _marks(one, f"{path}[{number}]", place)
 
 
-def allow_preempt(part: Part, depth: int = 1) -> None:
+def _allow_preempt(part: Part, depth: int = 1) -> None:
     """Let all containers end with `preempted`: other tools have it without saying so.
 
     Raises:
@@ -131,10 +150,10 @@ def allow_preempt(part: Part, depth: int = 1) -> None:
         raise TooMuchError(f"got more than {MAX_DEPTH} machines in each other.")
     for kind in ("machine", "concurrence"):
         if kind in part:
-            allow_preempt(part[kind], depth + 1)
+            _allow_preempt(part[kind], depth + 1)
     if "states" in part:
         outcomes = part.get("outcomes", [])
         if isinstance(outcomes, list) and "preempted" not in outcomes:
             part["outcomes"] = [*outcomes, "preempted"]
         for entry in part["states"].values():
-            allow_preempt(entry, depth)
+            _allow_preempt(entry, depth)

@@ -8,8 +8,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.foreign.conditions import Conditions
-from smachpy.foreign.draft import Part, allow_preempt
+from smachpy.foreign.draft import Part
 from smachpy.foreign.literals import Known, NotPlainError, parse_python, plain, shown
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 MACHINES: Final = ("OperatableStateMachine", "PriorityContainer")
 CONCURRENCE: Final = "ConcurrencyContainer"
-LEVELS: Final = {"Off": 0, "Low": 1, "High": 2, "Full": 3, "Inherit": -1}
+LEVELS: Final = {"Low": 2, "High": 3, "Full": 4}  # as those of `confirm`
 KINDS: Final = {bool: "flag", int: "whole", float: "number", str: "text", list: "list"}
 _SET_UP: Final = ("initialize_ros", "initialize", "add_behavior", "__init__")
 
@@ -25,9 +24,9 @@ _SET_UP: Final = ("initialize_ros", "initialize", "add_behavior", "__init__")
 def behavior_in(tree: ast.Module) -> ast.ClassDef | None:
     """Return the behaviour of a file; None if it has none."""
     for node in tree.body:
-        if isinstance(node, ast.ClassDef) and _function(node, "create") is not None:
-            bases = (getattr(base, "id", getattr(base, "attr", "")) for base in node.bases)
-            if "Behavior" in bases:
+        if isinstance(node, ast.ClassDef):
+            bases = [getattr(base, "id", getattr(base, "attr", "")) for base in node.bases]
+            if "Behavior" in bases and "create" in [getattr(one, "name", "") for one in node.body]:
                 return node
     return None
 
@@ -43,17 +42,11 @@ def read(draft: Draft, text: str) -> None:
         expected = "expected a class with the base Behavior and a method create"
         draft.problem((1, 1), f"got no behaviour of FlexBE; {expected}.")
     except SyntaxError as error:
-        where = (error.lineno or 1, error.offset or 1)
-        draft.problem(where, f"not Python: {error.msg}.")
+        draft.problem((error.lineno or 1, error.offset or 1), f"not Python: {error.msg}.")
     except ValueError as error:  # a zero byte
         draft.problem((1, 1), f"not Python: {error}.")
     except (RecursionError, MemoryError):
         draft.problem((1, 1), "it is nested too deeply.")
-
-
-def _function(node: ast.ClassDef, name: str) -> ast.FunctionDef | None:
-    found = [one for one in node.body if isinstance(one, ast.FunctionDef) and one.name == name]
-    return found[0] if found else None
 
 
 def _place(node: ast.AST) -> Place:
@@ -64,11 +57,8 @@ class _Reader:
     def __init__(self, draft: Draft, tree: ast.Module) -> None:
         self._draft = draft
         self._known = Known(draft)
-        self._containers: dict[str, tuple[str, Part]] = {}
+        self._containers: dict[str, tuple[str, Part]] = {}  # those that are in no other one yet
         self._root = ""
-        self._used: set[str] = set()
-        self._conditions: dict[int, Conditions] = {}
-        self._ends: dict[int, list[str]] = {}
         self._imported: dict[str, tuple[str, str]] = {}
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):
@@ -78,27 +68,22 @@ class _Reader:
     def behavior(self, node: ast.ClassDef) -> None:
         """Read the whole."""
         name = node.name
-        for one in node.body:
-            if isinstance(one, ast.FunctionDef) and one.name == "__init__":
+        for one in (each for each in node.body if isinstance(each, ast.FunctionDef)):
+            if one.name == "__init__":
                 name = self._set_up(one) or name
-            elif isinstance(one, ast.FunctionDef) and one.name != "create":
-                self._draft.note(_place(one), f"the method {one.name}")
-            elif isinstance(one, ast.FunctionDef):
+            elif one.name == "create":
                 self._create(one)
-        if self._root in self._used or self._containers.get(self._root, ("",))[0] not in MACHINES:
+            else:
+                self._draft.note(_place(one), f"the method {one.name}")
+        if self._containers.get(self._root, ("",))[0] not in MACHINES:
             expected = "expected `return` with an OperatableStateMachine"
             self._draft.problem(_place(node), f"create: got {self._root or 'none'!r}; {expected}.")
             return
         top = self._containers[self._root][1]
-        if self._draft.problems:
-            return
-        top["name"] = name
-        if ast.get_docstring(node):
-            top["help"] = ast.get_docstring(node)
         if self._known.parameters:
             top["parameters"] = self._known.parameters
-        allow_preempt(top)
-        self._draft.top = top
+        if not self._draft.problems:
+            self._draft.finish(top, name, ast.get_docstring(node))
 
     def _note_code(self, node: ast.stmt) -> None:
         is_text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
@@ -121,10 +106,10 @@ class _Reader:
                 case _:
                     self._note_code(statement)
 
-    def _kind(self, node: ast.expr) -> str:
+    def _kind(self, node: ast.Call) -> str:
         """Return the name of what is called, as its module has it."""
-        name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
-        return self._imported[name][1] if name in self._imported else str(name)
+        name: str = getattr(node.func, "id", "")
+        return self._imported.get(name, ("", name))[1]
 
     def _assign(self, statement: ast.stmt, target: ast.expr, value: ast.expr) -> None:
         """Keep a literal that is given to a name, or to a key of the userdata."""
@@ -170,8 +155,7 @@ class _Reader:
         return found
 
     def _parameter(self, statement: ast.stmt, name: str, default: ast.expr) -> None:
-        where = _place(statement)
-        about = Part(where)
+        about = Part(where := _place(statement))
         try:
             about["default"] = plain(default)
             about["type"] = KINDS.get(type(about["default"]), "any")
@@ -179,10 +163,8 @@ class _Reader:
             self._draft.note(where, f"the default of the parameter {name!r}: {shown(default)}")
         self._known.parameters.put(name, about, where)
 
-    # -- machines ------------------------------------------------------------------------------
-
-    def _keywords(self, call: ast.Call) -> dict[str, Any]:
-        """Return the arguments with names that are plain; the others are noted."""
+    def _keywords(self, call: ast.Call, *, named: bool = False) -> dict[str, Any]:
+        """Return the plain arguments with names; the others are noted unless `named` is said."""
         found = {}
         for one in call.keywords:
             try:
@@ -190,26 +172,55 @@ class _Reader:
             except NotPlainError:
                 text = f"the argument {one.arg or '**'}: {shown(one.value)}"
                 self._draft.note(_place(one.value), text)
-        for each in call.args:
+        for each in () if named else call.args:
             self._draft.note(_place(each), f"an argument without a name: {shown(each)}")
         return found
 
     def _container(self, name: str, call: ast.Call) -> None:
         kind, part = self._kind(call), Part(_place(call), states=Part(_place(call)))
         given = self._keywords(call)
-        for key in ("outcomes", "input_keys", "output_keys"):
-            if key in given:
-                part[key] = given[key]
+        part |= {
+            key: given[key] for key in ("outcomes", "input_keys", "output_keys") if key in given
+        }
         if kind == "PriorityContainer":
             text = "the priority of a PriorityContainer: other branches go on meanwhile"
             self._draft.note(_place(call), text)
         if kind == CONCURRENCE:
-            conditions = Conditions(self._draft, part.place, given.get("conditions", []))
-            self._conditions[id(part)] = conditions
+            part["outcome_map"] = given.get("conditions", [])  # until its states are known
             ends = part.get("outcomes")
             part["default_outcome"] = ends[-1] if isinstance(ends, list) and ends else ""
-            part["outcome_map"] = conditions.rules
         self._containers[name] = (kind, part)
+
+    def _decide(self, part: Part, ends: dict[str, list[str]]) -> None:
+        """Set the rules of a concurrence, and which `ends` of its states stop the others.
+
+        In FlexBE it ends as soon as a condition holds, with the first one that is given.
+        """
+        found: dict[str, list[dict[str, str]]] = {}
+        try:
+            for outcome, wanted in part["outcome_map"]:
+                found.setdefault(str(outcome), []).append({str(k): str(v) for k, v in wanted})
+        except (TypeError, ValueError):
+            expected = "expected [(outcome, [(label, outcome), ...]), ...]"
+            self._draft.problem(part.place, f"conditions: got something else; {expected}.")
+        part["outcome_map"], alone = {}, dict[str, list[str]]()
+        for outcome, cases in reversed(found.items()):  # here the last rule that holds wins
+            single: dict[str, list[str]] = {}
+            for label, wanted in (pair for one in cases if len(one) == 1 for pair in one.items()):
+                single.setdefault(label, []).append(wanted)
+                alone.setdefault(label, []).append(wanted)
+            part["outcome_map"][outcome] = cases[0]
+            if len(cases) > 1 and all(len(one) == 1 for one in cases):
+                part["outcome_map"][outcome] = {"any": single}
+            elif len(cases) > 1:
+                self._draft.note(part.place, f"all but the first condition of {outcome!r}")
+        stops = [one for one in ends if ends[one] and {*alone.get(one, ())}.issuperset(ends[one])]
+        for label in ends.keys() & alone.keys() - {*stops}:
+            for outcome in {*alone[label]}:
+                text = f"the stop of the other states when {label} ends with {outcome!r}"
+                self._draft.note(part.place, text)
+        if stops:
+            part["stop_others"] = stops
 
     def _fill(self, name: str, body: list[ast.stmt], around: ast.stmt) -> None:
         if name not in self._containers:
@@ -217,6 +228,7 @@ class _Reader:
             self._draft.problem(_place(around), text)
             return
         kind, part = self._containers[name]
+        ends: dict[str, list[str]] = {}
         for statement in body:
             match statement:
                 case ast.Expr(
@@ -225,63 +237,50 @@ class _Reader:
                         args=[ast.Constant(value=str() as label), state],
                     ) as call
                 ):
-                    if label in part["states"]:
-                        text = f"got {label!r} a second time; expected one."
-                        self._draft.problem(_place(statement), text)
                     entry = self._state(state)
-                    self._connect(entry, call, kind == CONCURRENCE)
-                    part["states"].put(label, entry, _place(statement))
+                    ends[label] = self._connect(entry, call, kind == CONCURRENCE)
+                    self._draft.add_state(part["states"], label, entry, _place(statement))
                 case _:
                     self._draft.note(_place(statement), f"code: {shown(statement)}")
         if kind == CONCURRENCE:
-            ends = {label: self._ends.get(id(one), []) for label, one in part["states"].items()}
-            stops = self._conditions[id(part)].stops(ends)
-            if stops:
-                part["stop_others"] = stops
+            self._decide(part, ends)
 
-    def _connect(self, entry: Part, call: ast.Call, in_concurrence: bool) -> None:
-        """Read where a state leads to, and its keys."""
-        given = self._keywords(ast.Call(func=call.func, args=[], keywords=call.keywords))
+    def _connect(self, entry: Part, call: ast.Call, in_concurrence: bool) -> list[str]:
+        """Read where a state leads to, and its keys; return its outcomes."""
+        given = self._keywords(call, named=True)
         transitions, levels = (
             value if isinstance(value, dict) else {}
             for value in (given.get("transitions"), given.get("autonomy"))
         )
-        renamed = given.get("remapping")
         on = Part(_place(call))
         for outcome, target in transitions.items():
-            level = LEVELS.get(str(levels.get(outcome)), 0)
-            if level > 0 and in_concurrence:
+            level = LEVELS.get(str(levels.get(outcome)))
+            if level and in_concurrence:
                 text = f"the autonomy level of {outcome!r}, inside a concurrence"
                 self._draft.note(_place(call), text)
-            on[outcome] = Part(_place(call), to=target, confirm=level + 1) if level > 0 else target
-        if renamed:
-            entry["remapping"] = renamed
+            on[outcome] = Part(_place(call), to=target, confirm=level) if level else target
+        if given.get("remapping"):
+            entry["remapping"] = given["remapping"]
         if not in_concurrence:
             entry["on"] = on
         elif "state" in entry:
             entry["outcomes"] = list(on)
-        self._ends[id(entry)] = list(on)
+        return list(on)
 
     def _state(self, node: ast.expr) -> Part:
         """Return a state, without what its container does with it."""
         where = _place(node)
         match node:
             case ast.Name(id=name) if name in self._containers:
-                if name in self._used:
-                    text = f"got the machine {name} a second time; expected it once."
-                    self._draft.problem(where, text)
-                    return Part(where)
-                self._used.add(name)
-                kind, part = self._containers[name]
+                kind, part = self._containers.pop(name)
                 return Part(where, **{"concurrence" if kind == CONCURRENCE else "machine": part})
             case ast.Call(func=ast.Attribute(attr="use_behavior"), args=[ast.Name(id=name), *_]):
                 module, name = self._imported.get(name, ("", name))
                 file = f"{module.rpartition('.')[2]}.py"
-                if module and (self._draft.folder / file).is_file():
-                    entry = Part(where, mission=file)
-                else:
-                    entry = Part(where, state=self._draft.leaf(name))
-                given = self._keywords(ast.Call(func=node.func, args=[], keywords=node.keywords))
+                is_beside = module and (self._draft.folder / file).is_file()
+                own = {"mission": file} if is_beside else {"state": self._draft.leaf(name)}
+                entry = Part(where, **own)
+                given = self._keywords(node, named=True)
                 arguments = given.pop("parameters", None)
                 for key in given:
                     self._draft.note(where, f"the argument {key} of use_behavior")

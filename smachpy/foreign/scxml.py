@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.foreign.draft import Part, allow_preempt
+from smachpy.foreign.draft import Part
 from smachpy.foreign.literals import NotPlainError, read_condition, read_value, shown
 from smachpy.foreign.xml_text import identifier, local, needed, place
 
@@ -32,12 +32,9 @@ def read(draft: Draft, root: Element) -> None:
         if local(each) == "transition":
             draft.note(place(each), "<transition> of the whole")
     top = reader.machine(root)
-    if root.get("name"):
-        top["name"] = root.get("name")
     if reader.data:
         top["userdata"] = reader.data
-    allow_preempt(top)
-    draft.top = top
+    draft.finish(top, root.get("name"))
 
 
 class _Reader:
@@ -90,8 +87,6 @@ class _Reader:
         source = element.get("src", "")
         return source if re.fullmatch(r"\w+", source) else ""
 
-    # -- where transitions lead ----------------------------------------------------------------
-
     def _role(self, container: Element, name: str, role: str, at: Element) -> str:
         """Note why a container ends with an outcome; two reasons need two names."""
         known = self._roles.setdefault(container, {}).setdefault(name, role)
@@ -107,19 +102,24 @@ class _Reader:
             self._draft.problem(place(at), f"<transition>: got target {name!r}; expected an id.")
             return None
         container = self._around[state]
-        path = [target]
-        while path[-1] in self._around and self._around[path[-1]] is not container:
-            path.append(self._around[path[-1]])
-        near = path[-1]
-        if near not in self._around:  # it is outside
+        near = self._near(target, container, at)
+        if near is None:
             return self._role(container, name, "a target outside", at)
         if local(near) == "final":
             return self._role(container, near.get("id", ""), "an end", at)
-        if len(path) > 1:
-            text = f"the entry at {name!r}: {near.get('id')!r} begins where it says"
-            if local(target) != "history" or len(path) > 2:  # noqa: PLR2004  itself and its state
-                self._draft.note(place(at), text)
         return near.get("id", "")
+
+    def _near(self, target: Element, container: Element, at: Element) -> Element | None:
+        """Return what is directly in a container and is the target, or has it in it."""
+        near: Element | None = target
+        while near is not None and self._around.get(near) is not container:
+            near = self._around.get(near)
+        is_history = local(target) == "history" and self._around[target] is near
+        name, there = target.get("id", ""), None if near is None else near.get("id", "")
+        if there not in {None, name} and not is_history:
+            text = f"the entry at {name!r}: {there!r} begins where it says"
+            self._draft.note(place(at), text)
+        return near
 
     def _events(self, transition: Element, state: Element) -> Iterator[str]:
         """Yield the outcomes that a transition is for."""
@@ -139,20 +139,14 @@ class _Reader:
         for each in self._children(state, "transition"):
             targets = each.get("target", "").split()
             if len(targets) != 1:
-                text = f"<transition> with {len(targets) or 'no'} targets"
-                self._draft.note(place(each), text)
+                self._draft.note(place(each), f"<transition> with {len(targets) or 'no'} targets")
                 continue
             for outcome in self._events(each, state):
                 found.setdefault(outcome, []).append((each.get("cond", ""), targets[0], each))
         return found
 
-    def _on(self, state: Element, ends: list[str]) -> Part:
-        """Return the transitions of a state.
-
-        Args:
-            state: It.
-            ends: The ids of its ends, which are its outcomes instead of `done`.
-        """
+    def _on(self, state: Element) -> Part:
+        """Return the transitions of a state; its ends are its outcomes instead of `done`."""
         on = Part(place(state))
         for outcome, cases in self._cases(state).items():
             rows = []
@@ -169,11 +163,9 @@ class _Reader:
                 self._draft.note(place(cases[-1][2]), text)
                 rows.append(Part(place(cases[-1][2]), to=state.get("id", "")))
             value = rows if len(rows) > 1 else rows[0]["to"]
-            for name in ends if outcome == DONE and ends else (outcome,):
+            for name in (outcome == DONE and self._finals(state)) or [outcome]:
                 on.put(name, value, place(cases[0][2]))
         return on
-
-    # -- states --------------------------------------------------------------------------------
 
     def machine(self, element: Element) -> Part:
         """Return the section of a machine."""
@@ -192,8 +184,7 @@ class _Reader:
                     on[outcome] = target
             states.put(each.get("id", ""), entry, place(each))
         part = Part(place(element), outcomes=self._ends(element), states=states)
-        initial = self._initial(element)
-        if initial:
+        if initial := self._initial(element):
             part["initial"] = initial
         for each in self._children(element, "history"):
             part["reenter"] = "deep" if each.get("type") == "deep" else "last"
@@ -207,41 +198,33 @@ class _Reader:
         for each in self._children(element, "initial"):
             for one in self._children(each, "transition"):
                 given += one.get("target", "").split()
-        near = self._ids.get(given[0]) if given else None
-        while near is not None and self._around.get(near) is not element:
-            near = self._around.get(near)
-        if near is None:
-            return given[0] if given else ""
-        label = near.get("id", "")
-        if label != given[0]:
-            text = f"the entry at {given[0]!r}: {label!r} begins where it says"
-            self._draft.note(place(element), text)
-        return label
+        target = self._ids.get(given[0]) if given else None
+        near = None if target is None else self._near(target, element, element)
+        return near.get("id", "") if near is not None else "".join(given[:1])
+
+    def _finals(self, element: Element) -> list[str]:
+        known = () if local(element) == "parallel" else self._children(element, "final")
+        return [each.get("id", "") for each in known]
 
     def _ends(self, element: Element) -> list[str]:
-        finals = [each.get("id", "") for each in self._children(element, "final")]
-        for name in finals:
+        for name in self._finals(element):
             self._role(element, name, "an end", element)
-        return list(dict.fromkeys([*finals, *self._roles.get(element, {})]))
+        return list(dict.fromkeys([*self._finals(element), *self._roles.get(element, {})]))
 
     @staticmethod
     def _outcomes(entry: Part) -> list[str]:
-        for kind in ("machine", "concurrence"):
-            if kind in entry:
-                return list(entry[kind]["outcomes"])
-        return list(entry["outcomes"])
+        return list(entry.get("machine", entry.get("concurrence", entry))["outcomes"])
 
     def _entry(self, element: Element) -> tuple[Part, Part]:
         """Return a state and its transitions."""
         where = place(element)
         if local(element) == "parallel":
             part = self._concurrence(element)
-            return Part(where, concurrence=part), self._on(element, [])
+            return Part(where, concurrence=part), self._on(element)
         if next(self._children(element, *STATES), None) is not None:
             part = self.machine(element)
             part |= self._keys
-            finals = [each.get("id", "") for each in self._children(element, "final")]
-            return Part(where, machine=part), self._on(element, finals)
+            return Part(where, machine=part), self._on(element)
         name = element.get("id", "")
         entry = Part(where, state=self._draft.leaf(identifier(name), registered=False))
         for each in self._children(element, "invoke"):
@@ -251,9 +234,10 @@ class _Reader:
                 for one in self._children(each, "param"):
                     given.put(needed(self._draft, one, "name"), self._param(one), place(one))
                 entry["with"] = given
-        on = self._on(element, [])
-        events = dict.fromkeys([*on, *self._inherited(self._around[element])])
-        entry["outcomes"] = list(events) or [DONE]
+        on = self._on(element)
+        entry["outcomes"] = [*dict.fromkeys([*on, *self._inherited(self._around[element])])] or [
+            DONE
+        ]
         return entry, on
 
     def _param(self, element: Element) -> Any:
@@ -278,8 +262,7 @@ class _Reader:
     def _concurrence(self, element: Element) -> Part:
         states, rules = Part(place(element)), Part(place(element))
         labels = {one.get("id", "") for one in self._children(element, "state", "parallel")}
-        ends: list[str] = []
-        stopping: list[str] = []
+        ends, stopping = list[str](), list[str]()
         for each in self._children(element, "state", "parallel"):
             entry, on = self._entry(each)
             label = each.get("id", "")
@@ -296,8 +279,7 @@ class _Reader:
                     text = f"the transition of {outcome!r} of the region {label}, which ends"
                     self._draft.note(place(each), text)
             if not stops and len(outcomes) > 1:
-                text = f"the stop of the other regions at ends of {label}"
-                self._draft.note(place(each), text)
+                self._draft.note(place(each), f"the stop of the other regions at ends of {label}")
             states.put(label, entry, place(each))
             if stops:
                 stopping.append(label)

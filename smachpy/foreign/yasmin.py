@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.foreign.draft import Part, allow_preempt
+from smachpy.foreign.draft import Part
 from smachpy.foreign.xml_text import identifier, local, needed, place
 
 if TYPE_CHECKING:
@@ -48,16 +48,11 @@ def read(draft: Draft, root: Element) -> None:
         parameters.put(name, about, place(each))
         scope[name] = f"${{{name}}}"
     top = reader.machine(root, scope)
-    if root.get("name"):
-        top["name"] = root.get("name")
-    if root.get("description"):
-        top["help"] = root.get("description")
     if parameters:
         top["parameters"] = parameters
     if draft.is_included:
         top |= reader.keys
-    allow_preempt(top)
-    draft.top = top
+    draft.finish(top, root.get("name"), root.get("description"))
 
 
 class _Reader:
@@ -126,8 +121,6 @@ class _Reader:
             if local(each) not in STATES:
                 continue
             name = needed(self._draft, each, "name")
-            if name in states:
-                self._draft.problem(place(each), f"got {name!r} a second time; expected one.")
             entry = self._entry(each, scope)
             renamed = Part(place(each))
             for one in each.iterfind("Remap"):
@@ -137,7 +130,7 @@ class _Reader:
             if renamed:
                 entry["remapping"] = renamed
             self._transitions(each, entry, with_transitions)
-            states.put(name, entry, place(each))
+            self._draft.add_state(states, name, entry, place(each))
         return states
 
     def _transitions(self, element: Element, entry: Part, with_transitions: bool) -> None:

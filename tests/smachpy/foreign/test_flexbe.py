@@ -174,7 +174,7 @@ def test_only_a_file_with_a_behaviour_is_taken_for_one(tmp_path):
             "8:45: states.A.remapping: got 5; expected a mapping of names to values.",
         ),
         (
-            behavior(["m = ConcurrencyContainer(outcomes=['e'], conditions=5)"]),
+            behavior(["m = ConcurrencyContainer(outcomes=['e'], conditions=5)", "with m: pass"]),
             "6:13: conditions: got something else; expected [(outcome, [(label, outcome), ...]), ...].",
         ),
         (
