@@ -296,6 +296,28 @@ def test_retry_on_an_outcome(spec):
     ]
 
 
+def test_each_attempt_of_a_machine_hands_out_its_outputs_and_begins_with_its_own_userdata():
+    """As SMACH does at each end, whatever the outcome."""
+    seen = []
+
+    @smachpy.state(["done", "aborted"], io_keys=["count", "own"])
+    def work(userdata):
+        userdata.count += 1
+        userdata.own += 1
+        seen.append((userdata.count, userdata.own))
+        return "done" if userdata.count == 3 else "aborted"
+
+    inner = smachpy.StateMachine(
+        ["done", "aborted"], ["count"], ["count"], userdata={"own": 0}, retry=5
+    )
+    inner.add("WORK", work)
+    sm = smachpy.StateMachine(["done", "aborted"], userdata={"count": 0})
+    sm.add("INNER", inner)
+    assert sm.execute() == "done"
+    assert seen == [(1, 1), (2, 1), (3, 1)]
+    assert sm.userdata.count == 3
+
+
 def test_retry_on_an_exception_backs_off_twice_as_long_each_time(clock):
     state = Fails(3, retry=(4, 1.0, [ValueError]))
     assert run(state)[0] == "ok"
