@@ -13,6 +13,7 @@ import gc
 import json
 import subprocess
 import sys
+import tempfile
 import threading
 import tracemalloc
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ from actionlib_core.transport.memory import MemoryNetwork
 ROUNDS = 100
 GOALS = 50
 FEEDBACK = 200
+FILE_STATES = 300
 
 
 class Calls:
@@ -177,12 +179,45 @@ def of_modules() -> dict[str, float]:
     return {"modules imported by smachpy": float(done.stdout)}
 
 
+def of_mission_files() -> dict[str, float]:
+    """Calls that loading a file of 300 states takes, imports included."""
+    rows = ["outcomes: [done, preempted]", "states:"]
+    for i in range(FILE_STATES):
+        after = f"S{i + 1}" if i + 1 < FILE_STATES else "done"
+        rows += [
+            f"  S{i}:",
+            "    state: wait",
+            "    with: {seconds: 1.5}",
+            "    on:",
+            "      done:",
+        ]
+        rows += [f"        - {{when: 1 > 2, to: {after}}}", f"        - {{to: {after}}}"]
+    code = (
+        "import sys; sys.path[:0] = [{root!r}]; import smachpy; n = [0]\n"
+        "def note(_frame, event, _argument): n[0] += event == 'call'\n"
+        "sys.setprofile(note); smachpy.load({file!r}); sys.setprofile(None); print(n[0])"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "large.yaml"
+        file.write_text("\n".join(rows))
+        code = code.format(root=str(Path(smachpy.__file__).parents[1]), file=str(file))
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return {"calls per state of a mission file": float(done.stdout) / FILE_STATES}
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--quick", action="store_true", help="the same; it is quick")
     args = parser.parse_args()
-    found = {**of_transitions(), **of_memory(), **of_goals(), **of_modules()}
+    found = {
+        **of_transitions(),
+        **of_memory(),
+        **of_goals(),
+        **of_modules(),
+        **of_mission_files(),
+    }
     if args.json:
         print(json.dumps(found))
         return 0
