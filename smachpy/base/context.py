@@ -24,3 +24,9 @@ def current_path() -> str:
     frame = current_frame()
     path: str = "" if frame is None else frame.here()
     return path
+
+
+def is_left_behind() -> bool:
+    """Return whether this thread was left behind; in a forked copy it was not, although dead."""
+    first = THREAD.get()
+    return first is not None and first.dead and first.ended

@@ -328,8 +328,11 @@ class Visit:
         self.step.state._preempt_requested = False
 
     def take_back(self) -> None:
-        """Remove an interruption that has not been raised yet; with the run's lock held."""
-        if self._injected:
+        """Remove an interruption that has not been raised yet; with the run's lock held.
+
+        Not that of a thread which was left behind: it ends what still runs there.
+        """
+        if self._injected and not self._frame.dead:
             take_back(self._injected)
             self._injected = 0
 

@@ -19,7 +19,7 @@ from smachpy.engine.child import run_child
 from smachpy.engine.container import run_container
 from smachpy.engine.errors import already_runs
 from smachpy.engine.frame import Frame, Run
-from smachpy.engine.interrupt import Interruption, uninterrupted, use_signals
+from smachpy.engine.interrupt import Interruption, take_back, uninterrupted, use_signals
 from smachpy.engine.preempt import (
     FLAGS,
     REQUESTING,
@@ -78,6 +78,8 @@ class Branch(Frame):
                 if self.visit is not None and self.visit.override_call is not None:
                     self.visit.settle()
                 waiting = self.end(outcome, failure)
+                if self.dead:  # nothing of it is left for what this thread runs next
+                    take_back(self.thread)
             except Interruption:
                 continue
             # Before the container goes on, so that this thread holds nothing of a run that ends.

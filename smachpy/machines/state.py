@@ -17,7 +17,7 @@ from typing import (
 )
 
 from actionlib_core.clock import current_clock
-from smachpy.base.context import THREAD, current_path
+from smachpy.base.context import THREAD, current_path, is_left_behind
 from smachpy.base.problems import Problems, as_number, name_of, unique_names, unknown_arguments
 from smachpy.base.slips import accepts
 from smachpy.engine import frame as frames
@@ -321,8 +321,8 @@ class State:
         recall(self)
 
     def preempt_requested(self) -> bool:
-        """Return whether the state was asked to stop."""
-        return self._preempt_requested
+        """Return whether the state was asked to stop; True in a thread that was left behind."""
+        return self._preempt_requested or is_left_behind()
 
     def wait_preempt(self, timeout: float | None = None) -> bool:
         """Wait until the state is asked to stop.
@@ -507,7 +507,7 @@ def _wait_preempt(state: State, argument: str, seconds: float | None) -> bool:
         past = number is not None and number < 0  # `deadline - now` after the deadline: no error
         seconds = 0.0 if past else problems.seconds(argument, seconds)
         problems.raise_all()
-    if state._preempt_requested:
+    if state._preempt_requested or is_left_behind():
         return True
     first: Frame | None = THREAD.get()
     clock = current_clock() if first is None else first.run.clock

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 
 from actionlib_core.exceptions import TypeMismatchError
@@ -14,7 +16,14 @@ from actionlib_core.interfaces.std_srvs.srv import (
 )
 from actionlib_core.pubsub.service import Service
 from actionlib_core.time import Duration
-from smachpy import InvalidStateError, InvalidUserCodeError, StateMachine, UserData, cb_interface
+from smachpy import (
+    Concurrence,
+    InvalidStateError,
+    InvalidUserCodeError,
+    StateMachine,
+    UserData,
+    cb_interface,
+)
 from smachpy.actions.service_state import ServiceState
 from tests.two_nodes import TwoNodes
 
@@ -241,3 +250,20 @@ def test_a_program_that_ends_during_a_call_without_limit_preempts(world):
         assert machine.execute() == "preempted"
         assert world.clock.now() == 3.0
     world.clock.sleep(200.0)
+
+
+def test_a_request_callback_that_was_left_behind_calls_nothing(world):
+    world.serve()
+
+    def swallows(userdata, request):
+        until = world.clock.now() + 30.0
+        while world.clock.now() < until:
+            with contextlib.suppress(BaseException):
+                world.clock.sleep(1.0)
+
+    branches = Concurrence(["done", "preempted"], "done")
+    branches.add("A", world.state(request_cb=swallows, preempt_timeout=0.2))
+    world.clock.call_later(1.0, branches.request_preempt)
+    assert branches.execute() == "preempted"
+    world.clock.sleep(90.0)
+    assert world.requests == []

@@ -806,6 +806,7 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
                 started.set()
                 try:
                     release.acquire()
+                    late.append("went on")
                 finally:
                     late.append("ended")
                     userdata.x = "late"
@@ -840,8 +841,30 @@ def test_thread_blocked_in_c_is_left_behind_and_cannot_come_back(place, quiet):
     for thread in threading.enumerate():
         if thread is not threading.main_thread() and thread.name.startswith("/SM_ROOT"):
             thread.join(60)
+    assert late == ["started", "ended"]
     assert after.runs == runs
     assert "x" not in machine.userdata or machine.userdata.x != "late" or place == "root"
+
+
+@pytest.mark.parametrize("place", ["branch", "branch machine"])
+def test_what_was_left_behind_counts_as_asked_for_ever(clock, place, quiet):
+    heard = []
+
+    def goes_on():
+        until = clock.now() + 30.0
+        while clock.now() < until:
+            with contextlib.suppress(BaseException):
+                clock.sleep(1.0)
+        heard.append((leaf.preempt_requested(), leaf.sleep(5.0), leaf.wait_preempt()))
+
+    leaf = Ignores(goes_on)
+    both = smachpy.Concurrence(["done", "preempted"], "done")
+    both.add("M", chain(leaf) if place == "branch machine" else leaf)
+    clock.call_later(1.0, both.request_preempt)
+    assert both.execute() == "preempted"
+    assert not leaf.preempt_requested()  # a later run begins without a request
+    clock.sleep(60.0)
+    assert heard == [(True, True, True)]
 
 
 # -- other ways to listen ----------------------------------------------------------------------
