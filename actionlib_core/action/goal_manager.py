@@ -323,9 +323,8 @@ class GoalManager:
                 goal.on_offered(*receiver)
             else:
                 self._tell_absence_later()
-            self._look(handle)
-            self._goals[goal.id] = handle  # before sending: the answer may arrive at once
-            self._count(handle.owner, 1)
+            if not self._register(handle):  # before sending: the answer may arrive at once
+                return
         if receiver is not None:
             self.port.send_goal(
                 goal.id,
@@ -337,6 +336,19 @@ class GoalManager:
             )
         elif duty is Duty.ASK:
             self._fulfil(handle, duty)
+
+    def _register(self, handle: ClientGoalHandle) -> bool:
+        """Follow a goal from now on. Needs the lock, which a signal handler of this thread has too.
+
+        Returns:
+            Whether no such handler has cancelled it meanwhile.
+        """
+        self._look(handle)
+        self._goals[handle.goal.id] = handle
+        self._count(handle.owner, 1)
+        if handle.goal.over and self._goals.pop(handle.goal.id, None) is not None:
+            self._count(handle.owner, -1)  # as `_finish`, for which it came too early
+        return not handle.goal.over
 
     def give_up(self, handle: ClientGoalHandle) -> None:
         """Cancel a goal if `begin` was interrupted once it was followed: nobody has its handle.

@@ -44,14 +44,16 @@ def is_of_client(frame):
 
 
 class InterruptAt:
-    """Raises KeyboardInterrupt in this thread the n-th time that Python looks for signals.
+    """Calls `act` in this thread the n-th time that Python looks for signals.
 
-    It does so as a function begins and after a call of one written in C. Only in the client
-    classes, but not where the virtual clock calls them: in a program another thread does.
+    Without `act` it raises KeyboardInterrupt. Python looks as a function begins and after a call of
+    one written in C. Only in the client classes, but not where the virtual clock calls them: in a
+    program another thread does.
     """
 
-    def __init__(self, n):
+    def __init__(self, n, act=None):
         self.left = n
+        self.act = act
         self.raised = False
 
     def __call__(self, frame, event, _arg):
@@ -60,7 +62,9 @@ class InterruptAt:
             if self.left < 0:
                 self.raised = True
                 sys.setprofile(None)
-                raise KeyboardInterrupt
+                if self.act is None:
+                    raise KeyboardInterrupt
+                self.act()
 
     def __enter__(self):
         self.before = sys.getprofile()
@@ -134,6 +138,34 @@ def test_goal_whose_sending_is_interrupted_is_cancelled(make_client, send, ends)
             assert (n in robot.running) == (not interrupt.raised and not ends), n
             robot.close()
             if not interrupt.raised:
+                break
+            n += 1
+    assert n > 15
+
+
+def test_goal_that_a_signal_handler_cancels_as_it_is_sent_does_not_run():
+    """It was told to be RECALLED, and then sent."""
+    n = 0
+    with VirtualClock() as clock, use_clock(clock):
+        while True:
+            robot = Robot(clock, SimpleActionClient)
+            client, cancelled = robot.client, []
+
+            def cancel(client=client, cancelled=cancelled):
+                cancelled.append(client.gh is not None)  # else there is no goal yet
+                client.cancel_goal()
+
+            with InterruptAt(n, cancel) as at:
+                client.send_goal(msg.TestGoal(n))
+            clock.sleep(2.0)
+            followed = [
+                bool(client.action_client.manager._goals),
+                client.action_client._owner.running,
+            ]
+            ran_on = cancelled != [True]
+            assert ([n in robot.running, *followed]) == [ran_on, ran_on, int(ran_on)], n
+            robot.close()
+            if not at.raised:
                 break
             n += 1
     assert n > 15
