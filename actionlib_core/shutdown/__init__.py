@@ -41,7 +41,7 @@ LEAVE_S: Final = 2.0
 LAST_S: Final = 0.2
 """Time for the last cancels to leave this process before it ends [s]."""
 ECHO_S: Final = 0.5
-"""A SIGHUP this soon after another signal is no second request [s]."""
+"""A signal this soon after another one, of which one is SIGHUP, is no second request [s]."""
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 SIGNALS: Final = tuple(signal.Signals[name] for name in _NAMES if hasattr(signal, name))
@@ -324,6 +324,7 @@ class SignalHandler:
     __slots__ = (
         "_before",
         "_blocked",
+        "_first",
         "_first_at",
         "_has_raised",
         "_interrupted",
@@ -340,6 +341,7 @@ class SignalHandler:
         self._shutdown = shutdown
         self._signals = signals
         self._interrupted = interrupted
+        self._first = 0
         self._first_at: float | None = None
         self._has_raised = False
         self._before: list[tuple[int, Any]] = []
@@ -379,10 +381,10 @@ class SignalHandler:
     def __call__(self, number: int, _frame: FrameType | None) -> None:
         """Handle a signal."""
         now = RealClock.now()
-        is_hangup = number == getattr(signal, "SIGHUP", 0)
-        is_closed = is_hangup and leave_closed_terminals()
+        hangup = getattr(signal, "SIGHUP", 0)
+        is_closed = number == hangup and leave_closed_terminals()
         if self._first_at is None:
-            self._first_at = now
+            self._first, self._first_at = number, now
             alone = self._interrupted if number == signal.SIGINT and _is_interactive() else None
             if alone is None:
                 self._shutdown.note(signal.Signals(number).name)
@@ -390,9 +392,12 @@ class SignalHandler:
         elif number == signal.SIGINT and not self._has_raised:
             self._has_raised = True
             raise KeyboardInterrupt
-        elif not (is_hangup and (is_closed or now - self._first_at < ECHO_S)):
+        elif not is_closed and (
+            hangup not in {number, self._first} or now - self._first_at >= ECHO_S
+        ):
             # Not for the echo of another signal. When a terminal is closed, its shell sends SIGHUP,
-            # and the system once more; some services are stopped by SIGTERM and SIGHUP together.
+            # and the system once more; some services are stopped by SIGTERM and SIGHUP together,
+            # of which Python handles SIGHUP first.
             self._end(number)
 
     def _start(self, function: Callable[[], object]) -> None:
@@ -567,14 +572,24 @@ def terminable() -> Iterator[None]:
     """Raise `Terminated` on the signals that end a program by default, inside the `with` block.
 
     They would end Python at once, without any `finally` of the command. Ctrl-C raises
-    KeyboardInterrupt anyway. In a thread that may not handle signals nothing is done.
+    KeyboardInterrupt anyway. A signal within `ECHO_S` of the first is its echo, as when a terminal
+    is closed: it would end what the first has begun. In a thread that may not handle signals
+    nothing is done.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
+    first_at: float | None = None
+
     def on_signal(number: int, _frame: object) -> None:
+        nonlocal first_at
         leave_closed_terminals()
+        now = RealClock.now()
+        if first_at is None:
+            first_at = now
+        elif now - first_at < ECHO_S:
+            return
         raise Terminated(number)
 
     taken = [number for number in default_signals() if number != signal.SIGINT]
@@ -600,13 +615,20 @@ def exits_on_signals() -> Iterator[None]:
     """Leave the program by `SystemExit` on the signals that end it by default, in a `with` block.
 
     By default they end Python at once, without `finally` and `atexit`: servers would not stop what
-    their goals have started. A second signal ends it at once. The exit code is that of commands.
+    their goals have started. A second signal ends it at once, but not SIGHUP: that comes twice when
+    a terminal is closed, or with SIGTERM. The exit code is that of commands.
     """
-    if not set(default_signals()) - {signal.SIGINT}:  # another one handles them
+    taken = set(default_signals()) - {signal.SIGINT}
+    if not taken:  # another one handles them
         yield
         return
     try:
         with terminable():
-            yield
+            try:
+                yield
+            except Terminated:  # in here: the echo may come at once
+                if signal.SIGHUP in taken:
+                    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+                raise
     except Terminated as error:
         raise SystemExit(EXIT_SIGNAL + error.number) from None

@@ -203,6 +203,33 @@ def test_every_signal_that_ends_programs_stops_the_robot(robot, folder, way, num
         assert "Traceback" not in output
 
 
+TOGETHER = """
+import importlib, sys
+from actionlib_core import shutdown
+
+shutdown.ECHO_S = 60.0  # on a busy computer, much time may pass between two signals
+sys.exit(importlib.import_module(sys.argv[1]).main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "way"),
+    [("actionlib_core.cli", "send_goal"), ("smachpy.command", "smachpy run --plain")],
+)
+def test_two_signals_that_come_together_count_once(robot, folder, module, way):
+    """The second one ended `actionlib send_goal` before its cancel, and a mission's clean-up."""
+    words = [sys.executable, "-c", TOGETHER, module, *WAYS[way][1:]]
+    with started(words, folder) as process:
+        assert robot.began.wait(LONG_S)
+        process.send_signal(signal.SIGSTOP)
+        os.waitpid(process.pid, os.WUNTRACED)
+        for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGCONT):
+            process.send_signal(number)
+        assert robot.stopped.wait(LONG_S)
+        output = process.communicate(timeout=LONG_S)[0]
+        assert process.returncode in {128 + signal.SIGTERM, 128 + signal.SIGHUP}, output
+
+
 @pytest.mark.parametrize("way", ["smachpy run", "script"])
 def test_a_mission_under_nohup_goes_on_without_its_terminal(robot, folder, way):
     with InTerminal(["/usr/bin/nohup", *WAYS[way]], folder) as shown:
@@ -366,6 +393,7 @@ def test_the_end_of_a_runner_suspends_its_missions(robot, folder, number):
 
 
 DEVICE = """
+import os
 import signal
 import sys
 from actionlib_core import Service, SimpleActionClient, server
@@ -384,6 +412,7 @@ def lift(goal, ctx):
             pass
         return TestResult(1)
     finally:
+        os.kill(os.getpid(), signal.SIGHUP)  # the echo, as of a closed terminal
         print("stands", flush=True)
 
 running = lift.start()

@@ -133,14 +133,56 @@ def test_signals_that_the_parent_had_blocked_are_handled(end):
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def test_the_echo_of_a_closed_terminal_is_no_second_request(end, monkeypatch):
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        (signal.SIGTERM, signal.SIGHUP, signal.SIGHUP),
+        (signal.SIGHUP, signal.SIGHUP),
+        (signal.SIGHUP, signal.SIGTERM),
+    ],
+)
+def test_the_echo_of_a_closed_terminal_is_no_second_request(end, monkeypatch, numbers):
     """A shell sends SIGHUP to its jobs, and the system sends one more as the shell ends."""
     monkeypatch.setattr(shutdown, "ECHO_S", 60.0)  # a busy computer may be long between two signals
+    ended = []
+    monkeypatch.setattr(shutdown, "_end_process", ended.append)
     clock = RealClock()
     with shutdown.handle_signals():
-        for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGHUP):
+        for number in numbers:
             os.kill(os.getpid(), number)
         assert shutdown.event(clock).wait(60)
+    assert not ended
+
+
+def test_two_signals_at_once_raise_once(monkeypatch):
+    """The second one ended what the first had begun: the cancel of a goal."""
+    monkeypatch.setattr(shutdown, "ECHO_S", 60.0)
+    both = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.SIG_DFL) for number in both]
+    raised = []
+    with shutdown.terminable():
+        try:
+            for number in both:
+                signal.raise_signal(number)
+        except shutdown.Terminated as error:
+            raised.append(error.number)
+            for number in both:
+                signal.raise_signal(number)
+            raised.append("cancelled")
+    for number, handler in zip(both, before, strict=True):
+        signal.signal(number, handler)
+    assert raised == [signal.SIGTERM, "cancelled"]
+
+
+def test_a_server_that_ends_by_a_signal_is_not_ended_by_its_echo():
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    try:
+        with pytest.raises(SystemExit) as ended, shutdown.exits_on_signals():
+            signal.raise_signal(signal.SIGHUP)
+        assert ended.value.code == 128 + signal.SIGHUP
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_request_from_outside_of_virtual_time_does_not_wait_for_a_busy_thread(end, clock):
