@@ -75,6 +75,7 @@ class Shutdown:
         cancels: Called when the process is about to end although runs go on, because of a second
             signal or the program's end: each cancels a goal that nobody would follow any more, and
             does not block.
+        is_last: They have been called, or are just now: what is added from now on is not.
 
     Threads: every method may be called from any thread; `note` from a signal handler too.
     """
@@ -93,6 +94,7 @@ class Shutdown:
         self._count = 0
         self.runs: set[Stoppable] = set()
         self.cancels: set[Callable[[], object]] = set()
+        self.is_last = False
         self._at_exit: dict[int, Callable[[], object]] = {}
         self._nothing_runs: Event | None = None  # only while `leave` waits
 
@@ -223,8 +225,9 @@ class Shutdown:
 
         Blocks: for `LAST_S` if there are any.
         """
+        self.is_last = True  # first: a goal that begins now is in the set, or cancels itself
         cancels, self.cancels = self.cancels, set()
-        for cancel in cancels:
+        for cancel in tuple(cancels):  # a thread that has read the old set may still add to it
             try:
                 cancel()
             except Exception:  # noqa: BLE001  reported; the others are called too
@@ -274,7 +277,7 @@ class Shutdown:
         """Withdraw the request, for a program that continues."""
         with self._lock:
             self._reason = None
-            self._delivered = False
+            self._delivered = self.is_last = False
             for event in self._events.values():
                 event.clear()
 

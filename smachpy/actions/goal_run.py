@@ -339,6 +339,8 @@ class GoalFollower:
         handle.wants_feedback = self._wants_feedback
         if not self._journal.is_durable:  # else the next process follows the goal
             self._ending.cancels.add(self.cancel)
+            if self._ending.is_last:
+                self.cancel()  # the process is about to end: the goal is not sent
         handle.manager.begin(handle)
         self.goal_id = handle.goal.id
         self._inside = True

@@ -7,6 +7,7 @@ import threading
 
 import pytest
 
+from actionlib_core import shutdown
 from actionlib_core.action.server import ActionServer
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.exceptions import ActionException, TypeMismatchError
@@ -749,3 +750,16 @@ def test_a_goal_callback_that_was_left_behind_sends_no_goal(world):
     assert branches.execute() == "preempted"
     world.clock.sleep(90.0)
     assert world.goals == []
+
+
+def test_no_goal_is_sent_once_the_last_ones_are_cancelled(world, monkeypatch):
+    """A second signal cancelled the goal; the next state's drove on without its process."""
+    monkeypatch.setattr(shutdown, "LAST_S", 0.0)
+    world.serve(count)
+    machine = StateMachine(OUTCOMES)
+    machine.add("HOME", world.state(), {"aborted": "OTHER"})
+    machine.add("OTHER", world.state())
+    with shutdown.use_shutdown(shutdown.Shutdown()) as end:
+        world.clock.call_later(1.0, end.cancel_all)
+        assert machine.execute() == "aborted"
+    assert len(world.goals) == 1
