@@ -30,6 +30,8 @@ __all__ = ["ActionServer", "OnClientLost", "OnRestart", "ServerGoalHandle", "nop
 
 OnRestart = Literal["abort", "resume"]
 
+STOP_GRACE_S = 0.4  # `stop` gives the code of goals this time to end what they have begun
+
 
 def nop_cb(goal_handle: ServerGoalHandle) -> None:
     """Do nothing; the default callback."""
@@ -123,6 +125,7 @@ class ActionServer:
             resumes=on_restart == "resume",
         )
         self._on_stopped = on_stopped
+        self._stopping = direct  # whether the goals were asked to stop; else the owner asks them
         self.lock = self.keeper.lock
         self._forget: Callable[[], None] | None = None
         self._started = False
@@ -169,18 +172,23 @@ class ActionServer:
         self.keeper.settle(kept)  # after `open`, without which clients would not get its messages
 
     def stop(self) -> None:
-        """End all goals (ABORTED, or REJECTED when not yet accepted) and withdraw.
+        """Ask all goals to stop, end them (ABORTED, or REJECTED if not accepted), and withdraw.
 
         Clients receive the result of each goal, then the server's absence; goals that came too late
         are sent to the next server. A second call does nothing, nor does one before `start`. A
         stopped server cannot be started again.
 
-        Blocks: until the clients have acknowledged that, 0.7 s at most.
+        Blocks: until the cancel callbacks have returned, 0.4 s at most, and then until the clients
+            have acknowledged the ends of all goals, 0.7 s at most.
         """
         with self.lock:
             if self.keeper.stopped or not self._started:
                 return
         try:
+            if self._ask_to_stop() and not self.callback_queue.is_inside():
+                told = self.node.clock.event(f"the cancel callbacks of {self.ns}")
+                self.callback_queue.call_urgently(told.set)
+                told.wait(STOP_GRACE_S)
             self.keeper.stop()
         finally:
             if self._forget is not None:
@@ -287,10 +295,23 @@ class ActionServer:
 
     # -- callbacks -----------------------------------------------------------------------------
 
+    def _ask_to_stop(self) -> list[ServerGoalHandle]:
+        """Ask all goals to stop, as no cancel will come any more; return those that were asked."""
+        with self.lock:
+            if self._stopping:
+                return []
+            self._stopping = True
+        self.keeper.close_to_goals()
+        asked = [handle for handle in self.status_list if self.keeper.request_cancel(handle)]
+        for handle in asked:
+            self._deliver_cancel(handle)
+        return asked
+
     def _note_stopped(self) -> None:
         """Unregister from the node and notify the owner: the server has stopped by itself."""
         if self._forget is not None:
             self._forget()
+        self._ask_to_stop()
         if self._on_stopped is not None:
             self._on_stopped()
 

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actionlib_core.action.goal_keeper import TEXT_STOPPED, OnClientLost
-from actionlib_core.action.server import ActionServer, OnRestart
+from actionlib_core.action.server import STOP_GRACE_S, ActionServer, OnRestart
 from actionlib_core.exceptions import (
     ActionException,
     IllegalTransitionError,
@@ -47,7 +47,6 @@ F = TypeVar("F")
 log = logging.getLogger(__name__)
 
 LINGER_S = 0.1  # the thread that runs goals waits for the next goal before it ends
-STOP_GRACE_S = 0.4  # `stop` gives the execute callback this time to return
 
 TEXT_ACCEPTED = "This goal has been accepted by the simple action server"
 TEXT_NEWER = "This goal was canceled because another goal was received by the simple action server"

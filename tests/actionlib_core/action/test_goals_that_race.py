@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core import SimpleActionClient, SimpleActionServer, server
+from actionlib_core import ActionServer, SimpleActionClient, SimpleActionServer, server
 from actionlib_core.exceptions import ServerConflictError
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
@@ -112,6 +112,34 @@ def end(world, action_server, stop, how):
         world.robot.close()
     else:
         action_server.keeper.on_conflict(ServerConflictError("a", ("robot", "2"), ("robot", "1")))
+
+
+@pytest.mark.parametrize("how", ["stop", "close", "conflict"])
+def test_the_goals_of_a_server_that_stops_are_asked_to_stop_once(world, how):
+    """Their code heard nothing, and no cancel could reach it any more."""
+    running, asked = [], []
+
+    def take(goal):
+        goal.set_accepted()
+        running.append(goal)
+
+    def stop(goal):
+        asked.append(goal.get_goal_id().id)
+        goal.set_canceled()
+
+    action_server = ActionServer("a", TestAction, take, stop, node=world.robot)
+    client(world).send_goal(TestGoal(1))
+    world.clock.sleep(1.0)
+    (goal,) = running
+    assert goal.record.status is Status.ACTIVE
+
+    end(world, action_server, action_server.stop, how)
+    world.clock.sleep(1.0)
+    action_server.stop()
+    world.clock.sleep(1.0)
+
+    assert asked == [goal.get_goal_id().id]
+    assert goal.record.status is Status.PREEMPTED
 
 
 @pytest.mark.parametrize("how", ["stop", "close", "conflict"])
