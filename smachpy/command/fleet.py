@@ -502,17 +502,14 @@ class Runner:
 
     def _waits_here(self) -> bool:
         """Return whether a mission waits that this runner could take and has not given up."""
-        from smachpy.durable.sql import robot_identity
         from smachpy.durable.store import INTERRUPTED, QUEUED
 
-        robots = {robot_identity(name) for name in self._robots}
+        # One list for each robot: those of others may be as many as a list has.
         waiting = [
             row
-            for row in self._store.missions(statuses=(QUEUED, INTERRUPTED))
-            if row.every is None
-            and row.owner is None
-            and row.id not in self._given_up
-            and (not robots or row.held_robot in robots)
+            for robot in self._robots or (None,)
+            for row in self._store.missions(statuses=(QUEUED, INTERRUPTED), robot=robot)
+            if row.every is None and row.owner is None and row.id not in self._given_up
         ]
         self._left = [row.id for row in waiting if self._allowed.problem(row.target)]
         return len(self._left) < len(waiting)

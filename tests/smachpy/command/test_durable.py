@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from smachpy.command import main
 from smachpy.command.fleet import Runner
 from smachpy.command.pruning import size_text
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store
+from smachpy.durable.store import PAGE, open_store
 from smachpy.events.recording import read_recording
 from smachpy_viz.runs.listing import run_row
 from smachpy_viz.runs.statistics import Statistics
@@ -402,6 +403,27 @@ def test_a_mission_is_not_begun_again_before_its_process_has_ended() -> None:
         runner._processes["m1"] = None
         assert not runner._take()
         assert store.mission("m1").owner is None
+
+
+def test_an_empty_queue_is_not_one_whose_newest_missions_are_of_other_robots() -> None:
+    """A list has 1,000 missions: the one that waits for its robot was not among them."""
+    words = ["submit", "errand.py", "--db", "q.db", "--robot=r1"]
+    for name in ("begun", "waits"):
+        assert main([*words, f"--mission={name}"]) == 0
+    with contextlib.closing(open_store("q.db")) as store:
+        store.claim("begun", this_runner(), seconds=60)
+        others = replace(store.mission("waits"), robot="r2")
+
+        def fill(cursor: Any, _: bool) -> None:
+            for number in range(PAGE):
+                store._insert(cursor, replace(others, id=f"{number}"), 4e9)
+
+        store._transact(fill)
+        runner = Runner(
+            store, "q.db", robots=["r1"], at_once=1, lease_s=15.0, allow=["."], until_empty=True
+        )
+        runner.look()
+        assert not runner.idle
 
 
 @pytest.mark.parametrize("text", ["", "30", "d", "-1d", "nan", "1e9d", "30 d"])
