@@ -49,6 +49,8 @@ START_S = 60.0
 VALUE = 200_000  # characters
 TIMERS = 2_000
 TURNS = 150
+CLIENT_PROCESSES = 4
+GOALS = 8_000  # of all clients together
 ERRAND = """import smachpy
 
 
@@ -167,6 +169,9 @@ def of_queue(place: str, sizes: Sequence[int]) -> dict[str, float]:
             "look": lambda: store.look(robots=["r7"]),
             "look for any robot": store.look,
             "reserve and release": take,
+            "reserve, none allowed": lambda: store.reserve(
+                this_runner(), seconds=LEASE_S, leave_targets=["errand.py"]
+            ),
         }
         return growth(store, sizes, "queued", looks)
 
@@ -471,6 +476,95 @@ def start_servers(count: int) -> dict[str, float]:
     return {"zenoh": alone, "start": started - begun, "stop": stopped - started}
 
 
+def of_clients(counts: Sequence[int]) -> dict[str, float]:
+    """CPU time of a goal, at its server and clients, with more and more clients of one action."""
+    found: dict[str, float] = {}
+    costs = []
+    for count in counts:
+        os.environ["SMACHPY_DOMAIN"] = str(1_000 + os.getpid() % 3_000)
+        each = [str(count // CLIENT_PROCESSES), str(GOALS // count)]
+        with contextlib.ExitStack() as processes:
+
+            def start(*words: str, processes: Any = processes) -> subprocess.Popen[str]:
+                command = [sys.executable, __file__, *words]
+                pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+                one = subprocess.Popen(command, text=True, **pipes)
+                processes.callback(one.wait)
+                processes.callback(one.kill)
+                assert one.stdout is not None
+                assert one.stdout.readline() == "ready\n"
+                return one
+
+            server = start("--serve")
+            clients = [start("--clients", *each) for _ in range(CLIENT_PROCESSES)]
+            begun = time.perf_counter()
+            for one in (server, *clients):
+                tell(one)
+            cpu = sum(float(one.stdout.readline()) for one in clients if one.stdout)
+            seconds = time.perf_counter() - begun
+            tell(server)
+            assert server.stdout is not None
+            cpu += float(server.stdout.readline())
+        goals = CLIENT_PROCESSES * int(each[0]) * int(each[1])
+        costs.append(cpu / goals)
+        found[f"{count} clients: CPU ms of a goal"] = 1e3 * cpu / goals
+        found[f"{count} clients: goals/s"] = goals / seconds
+    found["CPU of a goal, most clients / fewest"] = costs[-1] / costs[0]
+    return found
+
+
+def tell(process: subprocess.Popen[str]) -> None:
+    """Let a process go on that reads a line."""
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
+
+
+def serve() -> None:
+    """Serve an action; tell the CPU time between two lines of standard input."""
+    from actionlib_core import ActionServer
+    from actionlib_core.interfaces.actionlib.msg import TestAction, TestResult
+
+    def on_goal(handle: Any) -> None:
+        handle.set_accepted()
+        handle.set_succeeded(TestResult(1))
+
+    server = ActionServer("scale", TestAction, on_goal, print, auto_start=False)
+    server.start()
+    print("ready", flush=True)
+    sys.stdin.readline()
+    begun = time.process_time()
+    sys.stdin.readline()
+    print(time.process_time() - begun, flush=True)
+    sys.stdin.read()
+
+
+def send_goals(count: int, goals: int) -> None:
+    """Let `count` clients send goals one after the other, and tell the CPU time."""
+    from actionlib_core import ActionClient
+    from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal
+
+    clients = [ActionClient("scale", TestAction) for _ in range(count)]
+    for client in clients:
+        assert client.wait_for_server(START_S)
+
+    def run(client: Any) -> None:
+        for _ in range(goals):
+            with client.send(TestGoal(1), timeout=START_S) as handle:
+                handle.result()
+
+    threads = [threading.Thread(target=run, args=(client,)) for client in clients]
+    print("ready", flush=True)
+    sys.stdin.readline()
+    begun = time.process_time()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    print(time.process_time() - begun, flush=True)
+    sys.stdin.read()
+
+
 def of_action_states(sizes: Sequence[int]) -> dict[str, float]:
     """CPU time of a concurrence of action states: from the preempt of all to the machine's end."""
     costs = []
@@ -590,12 +684,20 @@ def main() -> None:
     parser.add_argument("--store", metavar="URL", help="an empty database for the queue")
     parser.add_argument("--servers", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--states", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--clients", type=int, nargs=2, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.servers:
         print(json.dumps(start_servers(args.servers)))
         return
     if args.states:
         print(preempt_states(args.states))
+        return
+    if args.serve:
+        serve()
+        return
+    if args.clients:
+        send_goals(*args.clients)
         return
     waiting = (100, 1_000, 10_000, 100_000) if args.long else (100, 1_000, 10_000)
     finished = (10, 1_000, 10_000, 100_000) if args.long else (10, 1_000, 10_000)
@@ -619,6 +721,7 @@ def main() -> None:
             found |= of_servers(1_000 if args.long else 400)
             if args.long:
                 found |= of_action_states((300, 1_000, 3_000))
+                found |= of_clients((4, 16, 64, 200))
             runners = (1, 2, 4, 8) if args.long else (4,)
             found |= of_runners(str(folder / "runners.db"), folder, runners, long=args.long)
     if args.json:
