@@ -27,7 +27,7 @@ Exception
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -312,11 +312,15 @@ class RemoteNodeError(ActionlibError):
     Attributes:
         node: Its full name.
         problems: Name of a parameter or transition -> reason.
+        values: Parameters that a ROS 1 node has set to others than it was told, as it limits them.
     """
 
-    def __init__(self, node: str, problems: dict[str, str]) -> None:
+    def __init__(
+        self, node: str, problems: dict[str, str], values: dict[str, Any] | None = None
+    ) -> None:
         self.node = node
         self.problems = problems
+        self.values = values or {}
         super().__init__("\n".join(f"/{node}: {name}: {why}" for name, why in problems.items()))
 
 

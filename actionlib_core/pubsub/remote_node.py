@@ -277,7 +277,7 @@ class ReconfiguredNode(_ServicesOfNode):
                 the node has others now, as it limits them, and has set the rest. The error names
                 all of those.
         """
-        problems, config = {}, Config()
+        problems, config, others = {}, Config(), {}
         for name, value in values.items():
             try:
                 add_to_config(config, name, value)
@@ -287,6 +287,8 @@ class ReconfiguredNode(_ServicesOfNode):
             now = self._request(config)
             for name, value in values.items():
                 if now.get(name) != value:
+                    if name in now:
+                        others[name] = now[name]
                     # Texts are not shown: one may be a password.
                     shown = "" if isinstance(value, str) else f": {now.get(name)!r}, not {value!r}"
                     problems[name] = (
@@ -294,7 +296,7 @@ class ReconfiguredNode(_ServicesOfNode):
                         "its limits."
                     )
         if problems:
-            raise RemoteNodeError(self.name, problems)
+            raise RemoteNodeError(self.name, problems, others)
 
     def _request(self, config: Config) -> dict[str, Any]:
         """Set some parameters, or none; return the values of all."""

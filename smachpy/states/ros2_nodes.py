@@ -147,7 +147,13 @@ class SetParameters(State):
                 was = earlier[name]["was"] if name in earlier else now[name]
                 earlier[name] = {"was": was, "set": value} | wire
             userdata[self.__before] = kept
-            call(lambda: remote.set_parameters(values))
+            try:
+                call(lambda: remote.set_parameters(values))
+            except RemoteNodeError as error:
+                for name, value in error.values.items():  # beyond a limit of it: that is set back
+                    earlier[name]["set"] = value
+                userdata[self.__before] = _copy(kept)
+                raise
 
         return _talk(self, _kind_of(self.__ros1), self.__node, self.__timeout_s, change)
 

@@ -51,6 +51,7 @@ class ScriptedNode(ScriptedEnd):
         changes: What was set, in order: one dict for each request that changed something.
         transitions: The transitions that were requested and happened, in order.
         refused: Name of a parameter or transition -> reason for which it is refused.
+        highest: Name of a parameter -> its limit, of a ROS 1 node.
         takes: How long each answer takes, by the name of the service [s]; None: it never comes. A
             node answers one request after another.
     """
@@ -62,6 +63,7 @@ class ScriptedNode(ScriptedEnd):
         self.changes: list[dict[str, Any]] = []
         self.transitions: list[str] = []
         self.refused: dict[str, str] = {}
+        self.highest: dict[str, float] = {}
         self.takes: dict[str, float | None] = {}
         super().__init__(kit, name, None)
 
@@ -100,6 +102,7 @@ class ScriptedNode(ScriptedEnd):
         """Make the same node in another test."""
         made = type(self)(kit, self.name, *self._first)
         made.refused, made.takes = dict(self.refused), dict(self.takes)
+        made.highest = dict(self.highest)
         return made
 
     def situation(self) -> Hashable:
@@ -166,7 +169,7 @@ class ScriptedRos1Node(ScriptedNode):
 
     It ignores parameters that it does not have, and values of another type. Made by
     `mission.ros1_node`; it has what `ScriptedNode` has, without a life cycle. What is `refused`
-    keeps its value, and the reason is told to nobody.
+    keeps its value, and the reason is told to nobody; what is beyond its `highest` becomes that.
     """
 
     def _services(self) -> dict[str, tuple[Any, Any]]:
@@ -175,7 +178,7 @@ class ScriptedRos1Node(ScriptedNode):
     def _reconfigure(self, request: Any, response: Any) -> Any:
         config = request.config
         changed = {
-            part.name: part.value
+            part.name: min(part.value, self.highest.get(part.name, part.value))  # type: ignore[type-var]
             for part in (*config.bools, *config.ints, *config.strs, *config.doubles)
             if type(self.parameters.get(part.name)) is type(part.value)
             and part.name not in self.refused

@@ -322,6 +322,15 @@ def test_what_a_ros1_node_does_not_take_is_told(mission, planner, caplog, values
     assert planner.parameters == PLANNER
 
 
+def test_what_a_ros1_node_limits_is_set_back_too(mission, planner, caplog):
+    """It stayed at the limit, as if somebody else had changed it."""
+    planner.highest["max_vel_x"] = 0.8
+    values = {"max_vel_x": 9.0, "samples": 5}
+    mission(slowly_in_ros1(values)).assert_outcome("aborted")
+    assert planner.changes[0] == {"max_vel_x": 0.8, "samples": 5}
+    assert planner.parameters == PLANNER
+
+
 def test_a_ros1_node_that_is_not_there_or_never_answers(mission, caplog):
     run = mission(slowly_in_ros1(timeout=3.0))
     assert run.outcome == "aborted"
