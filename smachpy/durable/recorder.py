@@ -432,6 +432,9 @@ class Recorder(RunJournal):
         outcome: str | None = None
         if visit is None:
             self._resumed.pop(path, None)
+            has_siblings = frame.tidying is None and _kind(frame) in {"concurrence", "plan"}
+            self._drop_below(path if has_siblings else frame.path)
+            self._markings.pop(path, None)
             # The child before had ended after these, and it is followed now: they are served.
             self._served.setdefault(frame.path, []).extend(self._open.pop(frame.path, ()))
             self._forget_requests(path)
@@ -464,10 +467,24 @@ class Recorder(RunJournal):
             frame.run.flush()
         return outcome
 
+    def _drop_below(self, path: str) -> None:
+        """What was active below `path` before the resume is not entered again any more.
+
+        A container that raised before it had entered its children again may be visited anew.
+        """
+        if not (self._unresumed or self._resumed or self._markings):
+            return
+        has_waited = bool(self._unresumed)
+        for places in (self._unresumed, self._resumed, self._markings):
+            for each in tuple(places):  # a copy: other branches take theirs out at the same time
+                if each.startswith(f"{path}/"):
+                    places.pop(each, None)
+        if has_waited and not self._unresumed:
+            self._note_all_back()
+
     def _note_writes(self, frame: Frame, step: Step, path: str) -> None:
         """Note what a leaf writes while others run beside it; a container does so as it ends."""
-        kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
-        if kind in {"concurrence", "plan"} and not isinstance(step.state, Container):
+        if _kind(frame) in {"concurrence", "plan"} and not isinstance(step.state, Container):
             with self._journal.lock:
                 writers = self._writers.setdefault(frame.path, {})
                 for key in getattr(step.userdata, "_output", {}).values():
@@ -488,7 +505,7 @@ class Recorder(RunJournal):
     def _write_entered(self, frame: Frame, path: str) -> bool:
         """Write that the state at `path` begins; return whether that worked."""
         facts: dict[str, Any] = {"in": frame.path}
-        kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
+        kind = _kind(frame)
         if frame.tidying is not None:
             facts["ending"] = list(frame.tidying.ending)
         elif kind in {"concurrence", "plan"}:
@@ -635,8 +652,7 @@ class Recorder(RunJournal):
         elif not (asked or target.final) and hasattr(frame.data, "transitions"):
             facts["next"] = f"{frame.path}/{target.label}"
             self._chosen.add(facts["next"])
-        kind = frame.container._smachpy_kind  # type: ignore[attr-defined]
-        if answered and outcome != "preempted" and kind not in {"concurrence", "plan"}:
+        if answered and outcome != "preempted" and _kind(frame) not in {"concurrence", "plan"}:
             facts["served"] = True
         # Start callbacks get the userdata itself and may keep it: compare all keys, not only those
         # that this child writes.
@@ -832,6 +848,8 @@ class Recorder(RunJournal):
         path = frame.here()
         # The next attempt is a normal one: `resume`, the goal and the time left were for this one.
         self._resumed.pop(path, None)
+        self._markings.pop(path, None)
+        self._drop_below(path)
         self._forget_requests(path)
         if path in self._journal.position.visits:
             at_ns = self.time.now_ns() + int(wait * 1e9)
@@ -1060,6 +1078,12 @@ def _unserved(position: Position) -> list[dict[str, str]]:
     # quicker must not begin another child before.
     passing = OF_PROCESS | {"timeout", "plan"}
     return [one for one in (*old, *kept) if one["source"] not in passing]
+
+
+def _kind(frame: Frame) -> str:
+    """Return the kind of the container of `frame`."""
+    kind: str = frame.container._smachpy_kind  # type: ignore[attr-defined]
+    return kind
 
 
 def _shortened(text: str) -> str:

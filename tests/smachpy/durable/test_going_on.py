@@ -880,3 +880,47 @@ def test_a_branch_begins_again_with_the_values_with_which_it_began(
     store.arm(0, written=False)
     assert live() == ("ok", {"value": ["work"], "other": "done"})
     assert begun == [[], []]
+
+
+
+# -- a container that cannot go on ---------------------------------------------------------------
+
+
+def two_in_a_machine(grasp: State, place: State, **options: Any) -> Container:
+    machine = StateMachine(["goal", "preempted"], **options)
+    machine.add("GRASP", grasp, {"ok": "PLACE"})
+    machine.add("PLACE", place, {"ok": "goal"})
+    return machine
+
+
+def two_in_a_plan(grasp: State, place: State, **options: Any) -> Container:
+    net = net_of(
+        "init* -> GRASP.exec : GRASP.start\nGRASP.exec -> held : GRASP.end\n"
+        "held -> PLACE.exec : PLACE.start\nPLACE.exec -> goal : PLACE.end"
+    )
+    return PetriNetPlan(net, {"GRASP": grasp, "PLACE": place}, **options)
+
+
+@pytest.mark.parametrize("shape", [two_in_a_machine, two_in_a_plan])
+def test_a_container_that_cannot_go_on_begins_anew_when_it_is_visited_again(
+    store: KillingStore, shape: Callable[..., Container]
+) -> None:
+    done: list[str] = []
+
+    def doing(name: str) -> smachpy.CBState:
+        return smachpy.CBState(lambda _: done.append(name) or "ok", outcomes=["ok"])
+
+    def build(place: smachpy.CBState, on_resume: Callable[..., object]) -> StateMachine:
+        work = StateMachine(["goal", "fail", "preempted"], on_exception={Exception: "fail"})
+        work.add("CELL", shape(doing("grasp"), place, on_resume=on_resume))
+        machine = StateMachine(["ok", "preempted"], name="M")
+        machine.add("WORK", work, {"goal": "ok", "fail": "RECOVER"})
+        machine.add("RECOVER", doing("recover"), {"ok": "WORK"})
+        return machine
+
+    def has_no_camera(_: Any) -> None:
+        raise OSError
+
+    kill(store, build(smachpy.CBState(killed, outcomes=["ok"]), fine))
+    assert go_on(store, build(doing("place"), has_no_camera)) == "ok"
+    assert done == ["grasp", "recover", "grasp", "place"]
