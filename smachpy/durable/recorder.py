@@ -23,7 +23,15 @@ from smachpy.engine.described import walk
 from smachpy.engine.interrupt import Interruption
 from smachpy.engine.journal import RunJournal
 from smachpy.engine.options import ASK
-from smachpy.engine.preempt import ask, ask_child, asking, current_origin, pass_on, request_soon
+from smachpy.engine.preempt import (
+    ask,
+    ask_child,
+    asking,
+    call_off,
+    current_origin,
+    pass_on,
+    request_soon,
+)
 from smachpy.engine.visit import Origin, Override
 from smachpy.exceptions import InvalidUserCodeError, MissionError, error_text
 from smachpy.machines.container import Container, control_of
@@ -439,7 +447,8 @@ class Recorder(RunJournal):
             self._served.setdefault(frame.path, []).extend(self._open.pop(frame.path, ()))
             self._forget_requests(path)
             if not self._write_entered(frame, path):
-                outcome = "preempted"
+                call_off(frame)
+                return "preempted"
         else:
             outcome = visit["outcome"]
             if outcome is None:

@@ -841,6 +841,18 @@ def start(frame: Frame, step: Any) -> bool:
         return visit.phase not in NOT_STARTED
 
 
+def call_off(frame: Frame) -> None:
+    """Call off the child that `frame` has just started, and stop its container.
+
+    For a journal that could not write that the child begins. The request to the container counts
+    anew: children before this one may have serviced those that came before.
+    """
+    with frame.run.lock:
+        frame.container._preempt_requested = True
+        if frame.visit is not None:
+            frame.visit.phase = Phase.CALLED_OFF
+
+
 def end_visit(frame: Frame, outcome: Any) -> Decision:
     """End the visit of the child that `frame` runs, and decide where the container goes.
 

@@ -706,6 +706,35 @@ def test_a_journal_that_cannot_be_written_preempts_the_machine(store: KillingSto
     assert full.rows["m"].status == "interrupted"
 
 
+def test_a_run_ends_without_its_journal_even_if_a_request_to_stop_leads_on() -> None:
+    class Gone(KillingStore):
+        is_gone = False
+
+        def append(self, *arguments: Any, **named: Any) -> None:
+            if self.is_gone:
+                raise StoreError("here", "no space is left.", reason="full")
+            super().append(*arguments, **named)
+
+    gone, begun = Gone(), []
+
+    def drive(state: State, _: Any) -> str:
+        begun.append(1)
+        gone.is_gone = len(begun) == 2
+        return "skipped" if state.sleep(30.0) else "ok"
+
+    # A request to stop skips to the next place; there are always more.
+    machine = StateMachine(["late", "preempted"], name="M")
+    machine.userdata.value = 0
+    for label, following in (("A", "B"), ("B", "A")):
+        machine.add(label, Doing(drive), {"ok": following, "skipped": following})
+    outer = StateMachine(["late", "preempted"], name="OUTER")
+    outer.add("M", machine, {"preempted": "M"})
+    with use_clock(VirtualClock()), pytest.raises(StoreError):
+        current_clock().call_later(45.0, machine.request_preempt)
+        go_on(gone, outer)
+    assert len(begun) == 2
+
+
 def test_a_mission_whose_end_cannot_be_written_is_interrupted() -> None:
     """It waited in the queue, as if it had not begun."""
 
