@@ -499,6 +499,13 @@ class Recorder(RunJournal):
                 for key in getattr(step.userdata, "_output", {}).values():
                     writers.setdefault(key, set()).add(path)
 
+    def _forget_writes(self, frame: Frame, step: Step, path: str) -> None:
+        """Note that a child has ended, which others run beside."""
+        if frame.path in self._writers:
+            with self._journal.lock:
+                for key in getattr(step.userdata, "_output", {}).values():
+                    self._writers[frame.path].get(key, set()).discard(path)
+
     def _held_outcome(
         self, step: Step, visit: dict[str, Any] | None, outcome: str | None
     ) -> str | None:
@@ -639,18 +646,21 @@ class Recorder(RunJournal):
         self._resumed.pop(path, None)
         if frame.dead:  # left behind: the journal has recorded another end for this visit
             raise Interruption
-        visit, state = frame.visit, step.state
-        override = None if visit is None else visit.override
-        answered = visit is not None and visit.has_answered(outcome)
-        overridden = override is not None and override.holds(answered=answered)
         if frame.path not in self._containers or not isinstance(outcome, str):
             return outcome
+        visit, state = frame.visit, step.state
         facts: dict[str, Any] = self._places(state, path)
-        if overridden:
-            return self._chosen_by_operator(path, outcome, facts)
-        facts["outcome"] = outcome
-        step.decide(frame, outcome)
-        target = step.next[outcome].target if outcome in step.next else None
+        choice, counts = _choice(frame, outcome), outcome
+        if choice is None:
+            step.decide(frame, outcome)
+        elif choice.outcome is not None:
+            counts = choice.outcome
+        else:  # a jump: a resumed run enters the child, to ask it again
+            if facts:
+                self._write("Noted", path, **facts)
+            return outcome
+        facts["outcome"] = counts
+        target = step.next[counts].target if counts in step.next else None
         asked = state._preempt_requested or (visit is not None and visit.is_asked())
         asked = asked or frame.container._preempt_requested
         if target is None:
@@ -661,22 +671,14 @@ class Recorder(RunJournal):
         elif not (asked or target.final) and hasattr(frame.data, "transitions"):
             facts["next"] = f"{frame.path}/{target.label}"
             self._chosen.add(facts["next"])
+        answered = visit is not None and visit.has_answered(outcome)
         if answered and outcome != "preempted" and _kind(frame) not in {"concurrence", "plan"}:
             facts["served"] = True
         # Start callbacks get the userdata itself and may keep it: compare all keys, not only those
         # that this child writes.
         callbacks = frame.data.start_cbs
         self._write_with(frame, None if callbacks else step, "Left", path, facts)
-        if frame.path in self._writers:
-            with self._journal.lock:
-                for key in getattr(step.userdata, "_output", {}).values():
-                    self._writers[frame.path].get(key, set()).discard(path)
-        return outcome
-
-    def _chosen_by_operator(self, path: str, outcome: str, places: dict[str, Any]) -> str:
-        """Write where the child at `path` has ended; an operator has chosen what follows."""
-        if places:
-            self._write("Noted", path, **places)
+        self._forget_writes(frame, step, path)
         return outcome
 
     def _places(self, state: Any, path: str) -> dict[str, Any]:
@@ -1087,6 +1089,15 @@ def _unserved(position: Position) -> list[dict[str, str]]:
     # quicker must not begin another child before.
     passing = OF_PROCESS | {"timeout", "plan"}
     return [one for one in (*old, *kept) if one["source"] not in passing]
+
+
+def _choice(frame: Frame, outcome: str) -> Override | None:
+    """Return what an operator chose to follow instead of a child's `outcome`, or None."""
+    visit = frame.visit
+    if visit is None or visit.override is None or frame.container._preempt_requested:
+        return None
+    holds = visit.override.holds(answered=visit.has_answered(outcome))
+    return visit.override if holds else None
 
 
 def _kind(frame: Frame) -> str:

@@ -568,6 +568,50 @@ def test_what_an_operator_wants_of_one_state_holds_on(
     assert seen == ran
 
 
+def after_one_another(first: State, last: State) -> Container:
+    return machine_of(first, last)
+
+
+def side_by_side(first: State, last: State) -> Container:
+    both = Concurrence(
+        ["ok", "late"], "late", outcome_map={"ok": {"S0": "ok", "S1": "ok"}}, name="M"
+    )
+    both.add("S0", first)
+    both.add("S1", last, remapping={"value": "other"})
+    return both
+
+
+@pytest.mark.parametrize("shape", [after_one_another, side_by_side])
+def test_a_state_that_ended_with_a_forced_outcome_is_not_executed_again(
+    shape: Callable[..., Container],
+) -> None:
+    done: list[str] = []
+
+    class Killing(KillingStore):
+        def append(self, lease: Any, entries: list[bytes], **named: Any) -> None:
+            if len(done) == 1 and any(b'"Entered"' in entry for entry in entries):
+                done.append("killed")
+                raise Kill
+            super().append(lease, entries, **named)
+
+    def forced(state: State, _: Any) -> str:
+        machine.control.force_outcome("/M/S0", "ok")
+        done.append("S0")
+        return "late"
+
+    def dies_later(state: State, _: Any) -> str:  # in the branch beside
+        state.sleep(5.0)
+        raise Kill
+
+    store = Killing()
+    with use_clock(VirtualClock()):
+        machine = shape(Doing(forced), Doing(dies_later))
+        kill(store, machine)
+        done.append("killed")
+        assert go_on(store, shape(Doing(forced), Doing(fine))) == "ok"
+    assert done.count("S0") == 1
+
+
 def test_a_branch_that_was_stopped_before_stays_so(store: KillingStore) -> None:
     def wait(state: State, _: Any) -> str:
         state.wait_preempt()
@@ -729,9 +773,10 @@ def test_a_run_ends_without_its_journal_even_if_a_request_to_stop_leads_on() -> 
         machine.add(label, Doing(drive), {"ok": following, "skipped": following})
     outer = StateMachine(["late", "preempted"], name="OUTER")
     outer.add("M", machine, {"preempted": "M"})
-    with use_clock(VirtualClock()), pytest.raises(StoreError):
-        current_clock().call_later(45.0, machine.request_preempt)
-        go_on(gone, outer)
+    with use_clock(VirtualClock()) as clock:
+        clock.call_later(45.0, machine.request_preempt)
+        with pytest.raises(StoreError):
+            go_on(gone, outer)
     assert len(begun) == 2
 
 
@@ -909,7 +954,6 @@ def test_a_branch_begins_again_with_the_values_with_which_it_began(
     store.arm(0, written=False)
     assert live() == ("ok", {"value": ["work"], "other": "done"})
     assert begun == [[], []]
-
 
 
 # -- a container that cannot go on ---------------------------------------------------------------
