@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType, NoneType
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
+from actionlib_core.clock import current_clock
 from actionlib_core.clock.forks import is_copy
 from actionlib_core.names import clean_namespace
 from smachpy.durable.position import VERSION as FORMAT
@@ -1039,16 +1040,28 @@ class SqlStore(ABC):
                     *(now - seconds, start[0], start[0], start[1]),
                 )
                 rows = [self._row(row, now) for row in cursor.fetchall()]
-                gone = [row.id for row in rows if not (row.problem or keep(row))]
-                self._delete(cursor, gone)
+                gone = [row for row in rows if not (row.problem or keep(row))]
+                some = gone[: self._fitting(cursor, [row.id for row in gone])]
+                self._delete(cursor, [row.id for row in some])
                 last = rows[-1] if len(rows) == PRUNED_AT_ONCE else None
-                return len(gone), None if last is None else (last.changed, last.id)
+                last = last if len(some) == len(gone) else some[-1]
+                return len(some), None if last is None else (last.changed, last.id)
 
+            begun = current_clock().now()
             count, after = self._transact(work)
             deleted += count
+            self._give_way(begun)
         if deleted:
             self._shrink()
         return deleted
+
+    def _fitting(self, _: Cursor, ids: Sequence[str]) -> int:
+        """Return how many of these missions, from the first, one transaction is to delete."""
+        return len(ids)
+
+    def _give_way(self, begun: float) -> None:  # noqa: ARG002
+        """Let others write after a long transaction, which began at that time of the clock."""
+        return
 
     def _shrink(self) -> None:
         """Give freed space back to the system, if the database does not do it itself."""

@@ -33,7 +33,7 @@ from smachpy.durable.sql import TABLES, VERSION, Cursor, Dialect, SqlStore
 from smachpy.durable.store import Reason, StoreError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 T = TypeVar("T")
 
@@ -50,6 +50,23 @@ DEADLINE_S: Final = 20.0
 
 CHECK_S: Final = 0.3
 """Longest time for the check of a file that is opened [s]; a gigabyte takes several seconds."""
+
+# A file has one writer at a time, and a mission waits 5 s for it. So `prune` deletes and frees in
+# parts, and lets others write in between.
+PRUNED_BYTES: Final = 16 * 2**20
+"""Data that is deleted in one transaction."""
+
+PAGES_AT_ONCE: Final = 2_000
+"""Pages that are given back to the system in one transaction."""
+
+LONGEST_WAY_S: Final = 0.2
+"""Longest pause after each [s], else as long as it took; who waits looks every 0.1 s."""
+
+_SIZE: Final = (
+    "SELECT (SELECT TOTAL(LENGTH(data)) FROM smachpy_entries WHERE mission = ?)"
+    " + (SELECT TOTAL(LENGTH(data)) FROM smachpy_snapshots WHERE mission = ?)"
+    " + (SELECT TOTAL(LENGTH(data)) FROM smachpy_blobs WHERE mission = ?)"
+)
 
 _STEPS: Final = 20_000
 """Steps of SQLite's machine between two looks at the deadline, about a millisecond."""
@@ -369,20 +386,42 @@ class SQLiteStore(SqlStore):
             reason, text = _REASONS[sqlite3.SQLITE_CORRUPT]
             raise StoreError(self.where, f"{text} ({problem}).", reason=reason)
 
+    def _fitting(self, cursor: Cursor, ids: Sequence[str]) -> int:
+        size = 0
+        for number, one in enumerate(ids, 1):
+            size += self._one(cursor, _SIZE, one, one, one)[0]
+            if size >= PRUNED_BYTES:
+                return number
+        return len(ids)
+
+    def _give_way(self, begun: float) -> None:
+        clock = current_clock()
+        clock.sleep(min(clock.now() - begun, LONGEST_WAY_S))
+
     def _shrink(self) -> None:
-        with self._lock:
-            try:
-                if self._connection.execute("PRAGMA auto_vacuum").fetchone()[0] == 0:
-                    # A file of an older smachpy: from now on as `_pragmas` sets it.
-                    self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
-                    self._connection.execute("VACUUM")
-                else:
-                    # `execute` would free one page and stop: the statement has no rows to fetch.
-                    self._connection.executescript("PRAGMA incremental_vacuum")
-                self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-            except sqlite3.Error as error:
-                raise self._error(error) from error
-            self._mark_file()
+        left, goes_on = math.inf, True
+        while goes_on:
+            begun = current_clock().now()
+            with self._lock:
+                try:
+                    free = self._give_back(is_first=left == math.inf)
+                    goes_on, left = 0 < free < left, free
+                    if not goes_on:
+                        self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+                except sqlite3.Error as error:
+                    raise self._error(error) from error
+                self._mark_file()
+            self._give_way(begun)
+
+    def _give_back(self, *, is_first: bool) -> int:
+        """Give the next free pages back to the system; return how many are left."""
+        if is_first and self._connection.execute("PRAGMA auto_vacuum").fetchone()[0] == 0:
+            # A file of an older smachpy: from now on as `_pragmas` sets it.
+            self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+            self._connection.execute("VACUUM")
+        # `execute` would free one page and stop: the statement has no rows to fetch.
+        self._connection.executescript(f"PRAGMA incremental_vacuum({PAGES_AT_ONCE})")
+        return int(self._connection.execute("PRAGMA freelist_count").fetchone()[0])
 
     def _bytes(self, cursor: Cursor) -> int:
         pages = self._one(cursor, "PRAGMA page_count")[0]

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import pytest
 
-from smachpy.durable import sql
+from smachpy.durable import sql, sqlite
 from smachpy.durable.processes import this_runner
 from smachpy.durable.store import (
     FencedError,
@@ -472,6 +472,34 @@ def test_prune_gives_the_disk_back(tmp_path):
     assert store.size()[1] < before / 10
     assert place.stat().st_size < before / 10
     store.close()
+
+
+def test_prune_lets_others_write_between_parts_of_bounded_size(tmp_path, monkeypatch):
+    monkeypatch.setattr(sqlite, "PRUNED_BYTES", 100_000)
+    monkeypatch.setattr(sqlite, "PAGES_AT_ONCE", 20)
+    store, other = (open_store(tmp_path / "queue.db") for _ in range(2))
+    for n in range(10):
+        put(store, f"m{n}")
+        lease = store.claim(f"m{n}", this_runner(), seconds=LONG_S)
+        store.append(lease, [os.urandom(25_000)], blobs={"digest": os.urandom(25_000)})
+        store.append(lease, [], status="ended", outcome="done")
+        store.release(lease, "ended")
+    put(other, "running")
+    lease = other.claim("running", this_runner(), seconds=LONG_S)
+    left = []
+
+    def give_way(_):
+        other.append(lease, [b"x"])  # raises if the file is still locked
+        left.append((len(other.missions()), other.size()[1]))
+
+    monkeypatch.setattr(store, "_give_way", give_way)
+    assert store.prune(0.0, keep=lambda _: False) == 10
+    counts, sizes = zip(*left, strict=True)
+    assert counts[:5] == (9, 7, 5, 3, 1)
+    assert sum(later < earlier for earlier, later in itertools.pairwise(sizes)) >= 5
+    assert len(other.read("running")[1]) == len(left)
+    store.close()
+    other.close()
 
 
 NO_ROOM = """
