@@ -75,6 +75,7 @@ class GoalRun:
         "_accept_timeout",
         "_deadline",
         "_failed",
+        "_is_taken_over",
         "_preempt_timeout",
         "abandoned",
         "begun_at",
@@ -99,6 +100,7 @@ class GoalRun:
         self._deadline: float | None = None
         self.begun_at: float | None = None
         self._failed = False
+        self._is_taken_over = False
         self.preempted = False
         self.timed_out = ""
         self.cancelling = False
@@ -130,10 +132,10 @@ class GoalRun:
             if not self.cancelling:
                 self._deadline = None if self.exec_timeout is None else at + self.exec_timeout
 
-    def on_preempt(self) -> None:
-        """Record that the state was asked to stop."""
+    def on_preempt(self, *, is_taken_over: bool = False) -> None:
+        """Record that the state was asked to stop, and whether another process follows the goal."""
         if not self.status:
-            self.preempted = True
+            self.preempted, self._is_taken_over = True, is_taken_over
 
     def on_failure(self) -> None:
         """Record that a callback raised: the goal must be cancelled, although nobody asked."""
@@ -153,6 +155,10 @@ class GoalRun:
         # `preempt_timeout`.
         late = self._deadline is not None and now >= self._deadline
         asked = self.preempted or self._failed
+        if self._is_taken_over:
+            self.abandoned, self.status = True, "LOST"
+            self.text = "another process follows the goal"
+            return GoalDuty.ABANDON
         if not self.cancelling and (asked or late):
             if late and not asked:
                 self.timed_out = (
@@ -466,7 +472,7 @@ class GoalFollower:
         clock = self._wake.clock
         with self._lock:
             if self._preempt_requested():
-                self.run.on_preempt()
+                self.run.on_preempt(is_taken_over=self._journal.is_taken_over)
             if handle.goal.begun:
                 self.run.on_begun(clock.now())
             elif handle.goal.acknowledged:

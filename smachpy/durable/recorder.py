@@ -284,7 +284,7 @@ class Recorder(RunJournal):
         """Preempt the run because its journal cannot be written; only the first `error` counts."""
         if self.broken is not None or self._is_suspended:
             return
-        self.broken = error
+        self.broken, self.is_taken_over = error, isinstance(error, FencedError)
         if self.on_fenced is not None and isinstance(error, FencedError):
             self.on_fenced(error)
         log.logerr(f"{self._root}: the journal cannot be written, the run is preempted: {error}")

@@ -20,6 +20,7 @@ from actionlib_core.node import Node
 from smachpy import CBState, Concurrence, SimpleActionState, StateMachine, events
 from smachpy.durable.journal import read_position
 from smachpy.durable.recorder import Recorder
+from smachpy.durable.store import FencedError, StoreError
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 from tests.two_nodes import TwoNodes
 
@@ -127,6 +128,24 @@ def test_one_that_still_runs_is_followed(world: World) -> None:
     assert world.run(machine) == "succeeded"
     assert machine.userdata.result == Result(7)
     assert len(world.ids) == 1
+
+
+@pytest.mark.parametrize("error", [FencedError, StoreError])
+def test_one_that_another_process_follows_is_not_cancelled(
+    world: World, monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+) -> None:
+    def renew(lease: Any, **_: Any) -> bool:
+        if error is StoreError:
+            raise StoreError("here", "no space is left.", reason="full")
+        raise FencedError("here", lease, "other:7")
+
+    world.serve()
+    monkeypatch.setattr(world.store, "renew", renew)
+    with pytest.raises(error):
+        world.run(world.machine())
+    world.clock.sleep(5.0)
+    is_cancelled = world.handles[0].get_goal_status().status == GoalStatus.PREEMPTED
+    assert is_cancelled is (error is StoreError)
 
 
 def test_its_feedback_comes_again(world: World) -> None:
