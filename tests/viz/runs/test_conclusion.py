@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from xml.etree import ElementTree as ET
 
@@ -39,6 +40,44 @@ def test_two_values_are_told_where_one_does_not_part_the_runs():
     found = bounds(ends, [0, 2, 5], values)
     assert found == (Bound("x", 2.0, above=False), Bound("y", 2.0, above=False))
     assert headline(ends, values)[1].endswith("every one with x up to 2 and y up to 2.")
+
+
+def axes(chart):
+    """The names and numbers at the axes: x, y and text of each."""
+    root = ET.fromstring(chart)
+    texts = [one for one in root.iter("text") if one.get("class") == "axis"]
+    return [(float(one.get("x")), float(one.get("y")), one.text) for one in texts]
+
+
+@pytest.mark.parametrize(
+    ("x", "across"),
+    [
+        ([1, 2, 3], ["1", "2", "3"]),  # whole numbers have no halves
+        ([4.0, 4.0, 4.0], ["4"]),
+        ([0.0, 40.0, 100.0], ["0", "50", "100"]),
+        ([0.1, 0.45, 0.3], ["0.1", "0.2", "0.3", "0.4"]),
+        ([1e6, 1.5e6, 2e6], ["1000000", "1500000", "2000000"]),
+    ],
+)
+def test_axes_have_round_numbers_and_whole_ones_for_counts(x, across):
+    chart = concluding_charts.scatter([GOOD, bad(), GOOD], [{"x": one} for one in x], ["x"], ())
+    numbers = [(left, down, text) for left, down, text in axes(chart) if text not in {"x", "run"}]
+    low = max(down for _, down, _ in numbers)
+    assert [text for _, down, text in numbers if down == low] == across
+    assert [text for _, down, text in numbers if down < low] == ["1", "2", "3"]  # the runs
+
+
+def test_an_axis_of_values_without_an_end_has_no_numbers():
+    values = [{"x": one} for one in (1.0, math.inf, math.nan)]
+    chart = concluding_charts.scatter([GOOD, bad(), GOOD], values, ["x"], ())
+    assert {text for _, _, text in axes(chart)} == {"x", "run", "1", "2", "3"}
+
+
+def test_the_name_of_an_axis_touches_no_number():
+    ends = [RunEnd(good=True, place=(x, y)) for x, y in ((0.0, 0.0), (5.0, 10.5), (2.0, 10.0))]
+    texts = axes(concluding_charts.places(ends))
+    ((_, name, _),) = [one for one in texts if one[2] == "y [m]"]
+    assert min(down for _, down, text in texts if text != "y [m]") - name >= 14
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 from smachpy_viz.model.labels import html_text, shorten
@@ -13,12 +14,15 @@ if TYPE_CHECKING:
 
 WIDE: Final = 640
 TALL: Final = 320
+TOP: Final = 24
+"""Room for the name of y above its highest number."""
 LEFT: Final = 56
 FOOT: Final = 40
 SQUARE: Final = 14
 PER_ROW: Final = 40
 MOST_SQUARES: Final = 1_000
 LEAST_SPAN: Final = 1e-9
+TICKS: Final = 5
 
 
 def squares(ends: Sequence[RunEnd]) -> str:
@@ -54,7 +58,11 @@ def scatter(
         shared: The bounds that the failures keep: the part within them is coloured.
     """
     xs = [one[keys[0]] for one in values]
-    ys = [one[keys[1]] for one in values] if len(keys) > 1 else list(map(float, range(len(ends))))
+    ys = (
+        [one[keys[1]] for one in values]
+        if len(keys) > 1
+        else list(map(float, range(1, len(ends) + 1)))
+    )
     by_key = {bound.key: bound for bound in shared}
     return _plot(ends, xs, ys, (keys[0], keys[1] if len(keys) > 1 else "run"), by_key)
 
@@ -82,7 +90,7 @@ def _plot(
 
     def at(x: float, y: float) -> tuple[float, float]:
         across = (x - x_low) / (x_high - x_low) * (WIDE - LEFT - 16)
-        up = (y - y_low) / (y_high - y_low) * (TALL - FOOT - 16)
+        up = (y - y_low) / (y_high - y_low) * (TALL - FOOT - TOP)
         return LEFT + across, TALL - FOOT - up
 
     parts = []
@@ -94,14 +102,17 @@ def _plot(
             f'<rect class="bound" x="{x0:.1f}" y="{y0:.1f}" width="{x1 - x0:.1f}" '
             f'height="{y1 - y0:.1f}"/>'
         )
-    for i in range(5):
-        x, y = x_low + (x_high - x_low) * i / 4, y_low + (y_high - y_low) * i / 4
-        (px, _), (_, py) = at(x, y_low), at(x_low, y)
+    for x, text in _ticks(xs, x_low, x_high):
+        px, _ = at(x, y_low)
         parts.append(
-            f'<line x1="{px:.1f}" x2="{px:.1f}" y1="16" y2="{TALL - FOOT}"/>'
+            f'<line x1="{px:.1f}" x2="{px:.1f}" y1="{TOP}" y2="{TALL - FOOT}"/>'
+            f'<text class="axis" x="{px:.1f}" y="{TALL - FOOT + 12}">{text}</text>'
+        )
+    for y, text in _ticks(ys, y_low, y_high):
+        _, py = at(x_low, y)
+        parts.append(
             f'<line x1="{LEFT}" x2="{WIDE - 16}" y1="{py:.1f}" y2="{py:.1f}"/>'
-            f'<text class="axis" x="{px:.1f}" y="{TALL - FOOT + 12}">{x:.3g}</text>'
-            f'<text class="axis" x="{LEFT - 24}" y="{py:.1f}">{y:.3g}</text>'
+            f'<text class="axis" x="{LEFT - 24}" y="{py:.1f}">{text}</text>'
         )
     x_name, y_name = (html_text(shorten(name, 40)) for name in names)
     parts.append(f'<text class="axis" x="{(LEFT + WIDE) / 2}" y="{TALL - 8}">{x_name}</text>')
@@ -122,6 +133,18 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
     low, high = min(values), max(values)
     margin = max((high - low) * 0.05, abs(high) * 0.01, LEAST_SPAN)
     return low - margin, high + margin
+
+
+def _ticks(values: Sequence[float], low: float, high: float) -> list[tuple[float, str]]:
+    """Return round numbers of an axis with their texts; whole ones where all values are whole."""
+    if not math.isfinite(high - low):
+        return []
+    step = 10.0 ** math.floor(math.log10((high - low) / TICKS))
+    step *= next(factor for factor in (1, 2, 5, 10) if (high - low) / (step * factor) <= TICKS)
+    if all(value % 1 == 0 for value in values):
+        step = max(step, 1.0)
+    numbers = range(math.ceil(low / step), math.floor(high / step) + 1)
+    return [(number * step, f"{number * step:.10g}") for number in numbers]
 
 
 def _within(bound: Bound | None, low: float, high: float) -> tuple[float, float]:
