@@ -1,9 +1,11 @@
 """What the live page costs: frames, time from an event to its paint, the server's processor time.
 
     python benchmarks/viewer.py [--states N] [--depth N] [--rate HZ] [--seconds S] [--json]
+    python benchmarks/viewer.py --recorded EVENTS [--json]
 
 A mission in another process, `smachpy view` in a third, a headless Chromium that draws in software.
 Hold at 50 transitions/s: 50 frames/s, p95 from event to paint 80 ms, 5 % of a core per client.
+With --recorded, a recorded run with that many events is opened, and 100 instants of it are shown.
 Figures mean something only on a machine that does nothing else.
 """
 
@@ -16,10 +18,14 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 from playwright.sync_api import sync_playwright
+
+import smachpy
+from smachpy.events.recording import Recorder
 
 ROBOT = Path(__file__).parent.parent / "tests" / "viz" / "live" / "robot.py"
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -33,6 +39,13 @@ def start(*command):
         text=True,
     )
     return child, child.stdout.readline().strip()
+
+
+def launch(playwright):
+    return playwright.chromium.launch(
+        executable_path=shutil.which("chromium"),
+        args=["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"],
+    )
 
 
 def processor_time(pid):
@@ -74,25 +87,87 @@ def measure(page, pid, seconds):
     }
 
 
+def record(path, events):
+    """Record a machine of two states that goes on until so many events are made."""
+    left = [events // 4]
+
+    def step(_):
+        left[0] -= 1
+        return "again" if left[0] > 0 else "done"
+
+    machine = smachpy.StateMachine(["done"], name="LOOP")
+    machine.add("A", smachpy.CBState(lambda _: "done", outcomes=["done"]), {"done": "B"})
+    machine.add("B", smachpy.CBState(step, outcomes=["again", "done"]), {"again": "A"})
+    with Recorder(path, machine):
+        machine.execute()
+
+
+def busy(session):
+    """Return the processor time of the tasks of the page's main thread [s]."""
+    metrics = session.send("Performance.getMetrics")["metrics"]
+    return next(one["value"] for one in metrics if one["name"] == "TaskDuration")
+
+
+def look_at_recorded(browser, folder, events):
+    """Open a recorded run, and look at instants of it."""
+    path = Path(folder) / "run.jsonl"
+    record(path, events)
+    view, address = start("-m", "smachpy.command", "view", "--child", "--port", 0, path)
+    try:
+        page = browser.new_page(viewport={"width": 1600, "height": 950})
+        session = page.context.new_cdp_session(page)
+        session.send("Performance.enable", {"timeDomain": "threadTicks"})  # CPU, not the clock
+        cpu, begun = processor_time(view.pid), time.perf_counter()
+        page.goto(address)
+        page.wait_for_selector("html[data-drawn]", timeout=120_000)
+        figures = {
+            "recorded: opened s": time.perf_counter() - begun,
+            "recorded: server CPU s": processor_time(view.pid) - cpu,
+            "recorded: page CPU s": busy(session),
+        }
+        shown = page.evaluate("() => smachpy.store.data.run.events.length")
+        before = busy(session)
+        page.evaluate("""async () => {
+            const { data: { run }, playback } = smachpy.store;
+            for (let i = 0; i < 100; i++) {
+                playback.seek(run.first() + ((run.last() - run.first()) * ((37 * i) % 100)) / 100);
+                await new Promise((done) => requestAnimationFrame(done));
+            } }""")
+        figures["recorded: page CPU ms per instant"] = 10 * (busy(session) - before)
+        print(f"{shown} events of {events} in the page", file=sys.stderr)
+        for name, value in figures.items():
+            print(f"{name}: {value:.2f}", file=sys.stderr)
+        return figures
+    finally:
+        view.stdin.close()
+        view.wait(10)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--states", type=int, default=60)
     parser.add_argument("--depth", type=int, default=99)
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=6.0)
+    parser.add_argument("--recorded", type=int, default=0)
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     os.environ.setdefault("SMACHPY_DOMAIN", str(1 + os.getpid() % 9999))
+    if args.recorded:
+        with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+            browser = launch(playwright)
+            figures = look_at_recorded(browser, folder, args.recorded)
+            browser.close()
+        if args.json:
+            print(json.dumps(figures))
+        return
     robot, _ = start(ROBOT, "--states", args.states, "--rate", args.rate)
     view, address = start("-m", "smachpy.command", "view", "--child", "--port", 0)
     try:
         found = re.match(r"http://[^#]*", address)
         assert found, address
         with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(
-                executable_path=shutil.which("chromium"),
-                args=["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"],
-            )
+            browser = launch(playwright)
             page = browser.new_page(viewport={"width": 1600, "height": 950})
             begun = time.perf_counter()
             page.goto(found[0] + "?machine=robot")
