@@ -14,9 +14,13 @@ import rclpy
 from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from goal_conversations import CONVERSATIONS, NONE, A
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser.definition import AbstractNestedType, Array, BasicType, NamespacedType
@@ -272,7 +276,59 @@ def refuse_a_cancel():
         world.close()
 
 
-COMMANDS = {f.__name__: f for f in (exchange, converse, refuse_a_cancel)}
+# -- parameters and life cycles --------------------------------------------------------------------
+
+
+def ask_a_node(parameters, asked):
+    """Return what a managed node of rclpy answers, in order; see `test_nodes`."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = LifecycleNode("robot", context=context)
+    for name, value in parameters.items():
+        node.declare_parameter(name, value)
+    asker = rclpy.create_node("asker", context=context)
+    executor = MultiThreadedExecutor(4, context=context)
+    for each in (node, asker):
+        executor.add_node(each)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+
+    def call(kind, name, request):
+        client = asker.create_client(kind, f"/robot/{name}")
+        assert client.wait_for_service(LONG_S)
+        done = threading.Event()
+        future = client.call_async(request)
+        future.add_done_callback(lambda _: done.set())
+        assert done.wait(LONG_S)
+        return future.result()
+
+    def set_parameters(values):
+        made = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+        found = call(SetParameters, "set_parameters", SetParameters.Request(parameters=made))
+        return [n for n, one in zip(values, found.results, strict=True) if not one.successful]
+
+    def get_parameters(names):
+        found = call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+        return [parameter_value_to_python(one) for one in found]
+
+    def change_state(label):
+        request = ChangeState.Request()
+        request.transition.label = label
+        is_done = call(ChangeState, "change_state", request).success
+        return [is_done, call(GetState, "get_state", GetState.Request()).current_state.label]
+
+    known = {f.__name__: f for f in (set_parameters, get_parameters, change_state)}
+    try:
+        return [known[name](argument) for name, argument in asked]
+    finally:
+        executor.shutdown()
+        thread.join()
+        node.destroy_node()
+        asker.destroy_node()
+        context.shutdown()
+
+
+COMMANDS = {f.__name__: f for f in (exchange, converse, refuse_a_cancel, ask_a_node)}
 
 for line in sys.stdin:
     command, *arguments = json.loads(line)
