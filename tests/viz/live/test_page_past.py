@@ -37,6 +37,8 @@ def test_the_past_says_which_instant_and_disarms_what_commands(served, look):
         assert "back to live" in page.get_attribute(button, "title")
         page.click(button, force=True)  # it is marked as one that does nothing
         page.wait_for_selector(".notice.error")
+    # Space plays, and a second later that would be the present.
+    page.evaluate("() => smachpy.store.playback.setRate(0)")
     page.keyboard.press("Space")
     page.keyboard.press("s")
     assert served.commands == []
