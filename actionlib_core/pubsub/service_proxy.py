@@ -211,6 +211,12 @@ class ServiceProxy(ServiceEnd, Generic[P, Q, S]):
         start = clock.now()
         self._find_server()
         left = None if self.timeout is None else max(self.timeout - (clock.now() - start), 0.0)
+        if left == 0.0:
+            raise ServiceTimeoutError(
+                self._full_name,
+                f"not called: got no time to wait for an answer; expected more than the "
+                f"{self.timeout:g} s of its timeout.",
+            )
         return self._read(self._ask(request, left))
 
     def _call_told(self, request: Message) -> Message:

@@ -267,3 +267,11 @@ def test_a_request_callback_that_was_left_behind_calls_nothing(world):
     assert branches.execute() == "preempted"
     world.clock.sleep(90.0)
     assert world.requests == []
+
+
+def test_without_time_nothing_is_called(world):
+    world.serve()
+    machine = world.machine(world.state(timeout=0, timeout_outcome="other"))
+    assert [machine.execute() for _ in range(2)] == ["other"] * 2
+    world.clock.sleep(1.0)
+    assert world.requests == []
