@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import threading
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -154,6 +155,8 @@ class GoalKeeper:
                 handle = ServerGoalHandle(self, kept.record, kept.content)
                 handle.resumed = kept.begun
                 kept.record.tag = handle
+                # Older than all goals that come before `settle` delivers it, see `is_older_than`.
+                kept.record.age, kept.record.made_at = math.inf, -math.inf
                 self.goals.restore(kept.record, now)
                 if kept.record.status not in TERMINAL:
                     handles.append(handle)

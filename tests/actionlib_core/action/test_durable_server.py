@@ -303,6 +303,34 @@ def test_server_that_stops_looks_for_no_clients(world):
     assert len(cancelled) == 1
 
 
+def test_goal_that_comes_as_the_server_starts_is_newer_than_those_of_before(world):
+    """The resumed goal, which was delivered later, preempted it."""
+    server = world.serve(lambda handle: handle.set_accepted())
+    former = send(world)
+    world.kill(server)
+    ran = []
+
+    def run(goal):
+        ran.append((goal.goal, simple.wait_preempt(5.0)))
+        simple.set_succeeded()
+
+    kept = {"durable": world.file, "on_restart": "resume"}
+    simple = SimpleActionServer("work", Action, run, False, node=world.new_life(), **kept)
+    port = simple.action_server.keeper.port
+    opened = port.open
+
+    def open_and_wait(listener):
+        opened(listener)
+        world.clock.sleep(0.5)
+
+    port.open = open_and_wait
+    world.client.send_goal(Goal(2))
+    simple.start()
+    world.clock.sleep(10.0)
+    assert ran == [(2, False)]
+    assert world.end_of(former)[0] == Status.RECALLED
+
+
 def test_file_of_the_version_before_gets_the_new_columns(world):
     server = world.serve(lambda handle: handle.set_accepted())
     goal_id = send(world)
