@@ -433,14 +433,20 @@ class SimpleActionServer:
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
         """Handle a new goal; called by the `ActionServer` beneath."""
+        refused = ""
         with self.lock:
-            stopping = self._stopping
-            if not stopping:
-                decision = self._admit(goal)
+            if self._stopping:
+                refused = TEXT_STOPPED
+            else:
+                try:
+                    decision = self._admit(goal)
+                except RuntimeError as error:  # no thread can be started, the system's limit
+                    self._policy.on_cancel(goal, recall_waiting=True)
+                    refused = f"The goal cannot run: {error}"
                 current = self._policy.current
                 waits = self._policy.running or self.execute_callback is None
-        if stopping:
-            self._turn_away(goal, "reject", TEXT_STOPPED)
+        if refused:
+            self._turn_away(goal, "reject", refused)
             return
         if decision.preempt and current is not None:
             self._keeper.note_superseded(current.record)

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from actionlib_core import ActionServer, SimpleActionClient, SimpleActionServer, server
+from actionlib_core import (
+    ActionServer,
+    SimpleActionClient,
+    SimpleActionServer,
+    server,
+)
 from actionlib_core.exceptions import ServerConflictError
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
@@ -245,3 +250,30 @@ def test_a_server_whose_preempt_cannot_be_told_leaves_the_network_all_the_same(w
         running.stop()
 
     assert running.wait(0.0)
+
+
+def test_a_goal_for_which_no_thread_can_be_started_is_rejected(world, monkeypatch):
+    """It stayed pending until another goal came."""
+    ran = []
+
+    def execute(goal):
+        ran.append(goal.goal)
+        simple.set_succeeded()
+
+    simple = SimpleActionServer("a", TestAction, execute, False, node=world.robot)
+    simple.start()
+    sender = client(world)
+    start, left = simple._start, ["one"]
+
+    def start_late():
+        if left:
+            left.pop()
+            raise RuntimeError("can't start new thread")
+        return start()
+
+    monkeypatch.setattr(simple, "_start", start_late)
+    for goal in (1, 2):
+        sender.send_goal(TestGoal(goal))
+        assert sender.wait_for_result(5.0)
+        assert ran == [2][: goal - 1]
+        assert sender.get_state() == (Status.REJECTED, Status.SUCCEEDED)[goal - 1]
