@@ -13,7 +13,7 @@ from actionlib_core.action.client_goal_handle import ClientGoalHandle, CommState
 from actionlib_core.action.goal_id_generator import GoalIDGenerator
 from actionlib_core.action.goal_manager import GoalManager, Owner
 from actionlib_core.action.sent_goal import SentGoal
-from actionlib_core.exceptions import ActionException, ActionlibError
+from actionlib_core.exceptions import ActionException, ActionlibError, TransportError
 from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S, ClientGoal
 from actionlib_core.goal.states import OVER, CommState, SimpleGoalState, TerminalState
 from actionlib_core.inputs.arguments import (
@@ -375,7 +375,10 @@ class ActionClient(Generic[A_co]):
 
         Raises:
             ActionlibError: `goal_id` is not an id.
+            TransportError: the client is stopped.
         """
+        if self._owner.closed:  # else it would follow the goal of another client of the node
+            raise TransportError(f"action '{self.ns}': the client is stopped.")
         if not is_goal_id(goal_id):
             raise ActionlibError(
                 f"action '{self.ns}': goal id: got {goal_id!r}; expected the id of a goal that "

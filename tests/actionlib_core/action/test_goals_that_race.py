@@ -5,12 +5,13 @@ from __future__ import annotations
 import pytest
 
 from actionlib_core import (
+    ActionClient,
     ActionServer,
     SimpleActionClient,
     SimpleActionServer,
     server,
 )
-from actionlib_core.exceptions import ServerConflictError
+from actionlib_core.exceptions import ServerConflictError, TransportError
 from actionlib_core.goal.states import Status
 from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
 from smachpy import ActionServerWrapper, State, StateMachine
@@ -277,3 +278,14 @@ def test_a_goal_for_which_no_thread_can_be_started_is_rejected(world, monkeypatc
         assert sender.wait_for_result(5.0)
         assert ran == [2][: goal - 1]
         assert sender.get_state() == (Status.REJECTED, Status.SUCCEEDED)[goal - 1]
+
+
+def test_a_stopped_client_follows_no_goal_of_another_one(world):
+    simple = SimpleActionServer("a", TestAction, lambda goal: None, False, node=world.robot)
+    simple.start()
+    stopped = ActionClient("a", TestAction, node=world.mission)
+    sender = ActionClient("a", TestAction, node=world.mission)
+    goal_id = sender.send_goal(TestGoal(1)).get_goal_id()
+    stopped.stop()
+    with pytest.raises(TransportError, match="the client is stopped"):
+        stopped.follow(goal_id)
