@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
+import sys
+import threading
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actionlib_core import border
+from actionlib_core.goal.bounded import Backlog
 from actionlib_core.pubsub.topic import NotingSubscriber
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
@@ -34,7 +36,7 @@ class MonitorState(State):
     """Checks the messages of a topic. Outcomes: 'valid', 'invalid', 'preempted'.
 
     The condition runs in the state's thread, once per message, in order. It may be slow: messages
-    that arrive meanwhile wait.
+    that arrive meanwhile wait; beyond 100,000 or 32 MiB the oldest are dropped, which is logged.
 
     Args:
         topic: Name of the topic.
@@ -97,19 +99,15 @@ class MonitorState(State):
 
         Blocks: see above.
         """
-        waiting: deque[Any] = deque(maxlen=1 if self.__latest else None)
-
         with Wakeup(self) as wake:
-
-            def note(message: Any) -> None:
-                waiting.append(message)
-                wake.set()
-
-            subscriber = NotingSubscriber(self.__topic, self.__msg_type, note, node=self.__node)
+            inlet = _Inlet(self.__topic, self.__msg_type, wake, latest=self.__latest)
+            subscriber = NotingSubscriber(
+                self.__topic, self.__msg_type, inlet.take_in, node=self.__node
+            )
             with subscriber, subscriber.telling():
-                return self.__watch(ud, wake, waiting)
+                return self.__watch(ud, wake, inlet)
 
-    def __watch(self, ud: Any, wake: Wakeup, waiting: deque[Any]) -> str:
+    def __watch(self, ud: Any, wake: Wakeup, inlet: _Inlet) -> str:
         clock = wake.clock
         verdicts = border.Verdicts(current_path() or "", self.__topic, clock)
         until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
@@ -120,10 +118,10 @@ class MonitorState(State):
                 return "preempted"
             if until is not None and clock.now() >= until:
                 return self.__timeout_outcome
-            if not waiting:
+            message = inlet.take()
+            if message is None:
                 wake.wait_until(until)
                 continue
-            message = waiting.popleft()
             is_good = self.__check(ud, message)
             verdicts.note(message, is_good)
             if not is_good:
@@ -157,3 +155,40 @@ class MonitorState(State):
         if self.__timeout_s is not None:
             own.append(("timeout", f"{self.__timeout_s:g} s -> {self.__timeout_outcome}"))
         return kind, (*own, *details)
+
+
+class _Inlet:
+    """The messages that wait for the condition.
+
+    Threads: `take_in` on the network's thread, `take` in the state's.
+    """
+
+    def __init__(self, topic: str, kind: Any, wake: Wakeup, *, latest: bool) -> None:
+        self._topic = topic
+        self._kind = kind
+        self._wake = wake
+        self._latest = latest
+        self._lock = threading.Lock()  # guards `_waiting`
+        self._waiting: Backlog[Any] = Backlog(1, sys.maxsize) if latest else Backlog()
+
+    def take_in(self, message: Any) -> None:
+        """Keep a message."""
+        size = 0
+        if self._waiting and not self._latest:  # the condition is slow: how large are they?
+            ros2 = self._kind._wire == "ros2"
+            size = len(message.to_cdr() if ros2 else message.to_bytes())
+        with self._lock:
+            before = self._waiting.dropped
+            self._waiting.add(message, size)
+            first = not before and self._waiting.dropped and not self._latest
+        if first:
+            log.logwarn(
+                f"MonitorState {self._topic!r}: messages come faster than the condition checks "
+                "them: of those that wait, the oldest are dropped. Try latest=True."
+            )
+        self._wake.set()
+
+    def take(self) -> Any:
+        """Return the next message; None if none waits."""
+        with self._lock:
+            return self._waiting.take()

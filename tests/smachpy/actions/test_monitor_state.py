@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from actionlib_core.interfaces.std_msgs.msg import Int32
+from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.pubsub.topic import Publisher
 from smachpy import State, StateMachine, UserData, cb_interface, events
 from smachpy.actions.monitor_state import MonitorState
@@ -215,3 +215,22 @@ def test_other_missing_attributes_are_the_states_own():
     sm.add("WATCH", Broken("level", Int32, lambda _userdata, _message: True))
     with pytest.raises(AttributeError):
         describe(sm)
+
+
+def test_messages_that_wait_for_a_slow_condition_are_bounded(world, caplog):
+    """They were all kept: images filled the memory."""
+    sizes = []
+
+    def slow(userdata, message):
+        sizes.append(len(message.data))
+        if len(sizes) == 1:
+            world.clock.sleep(10.0)
+        return True
+
+    camera = Publisher("camera", String, node=world.robot)
+    image = "x" * 2**20
+    world.clock.call_later(1.0, lambda: [camera.publish(image) for _ in range(40)])
+    state = MonitorState("camera", String, slow, timeout=20.0, node=world.mission)
+    assert state.execute(UserData()) == "aborted"
+    assert 30 < len(sizes) < 35
+    assert caplog.text.count("messages come faster than the condition") == 1
