@@ -237,6 +237,7 @@ class Subscriber(_TopicEnd, Generic[M]):
     _kind = Kind.SUBSCRIBER
     _counterpart = Kind.PUBLISHER
     _is_input = True
+    _wants_latched = True
     _call: Callable[[Callable[[], None]], object]
 
     @overload
@@ -288,7 +289,7 @@ class Subscriber(_TopicEnd, Generic[M]):
             border.tell("subscriber", self.node, self._full_name, self.type, self._number)
         self._call = self._caller()
         # Last: a message may arrive at once, and needs all of the above.
-        self._join(lambda: self._end.receive(self._on_sample))
+        self._join(lambda: self._end.receive(self._on_sample, latched=self._wants_latched))
 
     def _caller(self) -> Callable[[Callable[[], None]], object]:
         return CallbackQueue(self.node, f"topic {self.name}").call
@@ -346,6 +347,12 @@ class WatchingSubscriber(Subscriber[M]):
     """A subscriber of somebody who only watches; what it gets is no input of the program."""
 
     _is_input = False
+
+
+class FreshSubscriber(Subscriber[M]):
+    """A subscriber that hears only what is published from now on, not what was latched before."""
+
+    _wants_latched = False
 
 
 class NotingSubscriber(Subscriber[M]):

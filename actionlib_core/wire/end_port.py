@@ -83,8 +83,8 @@ class EndPort(Protocol):
     def send(self, *, latch: bool) -> Sender:
         """Declare a publication."""
 
-    def receive(self, callback: Callable[[Sample], None]) -> Closable:
-        """Subscribe, also to the latched message of each publisher."""
+    def receive(self, callback: Callable[[Sample], None], *, latched: bool = True) -> Closable:
+        """Subscribe, if wanted also to the latched message of each publisher."""
 
     def read(self, sample: Sample) -> Any:
         """Decode a message.
@@ -215,8 +215,8 @@ class OwnEndPort:
         port = self._transport.publisher(self.own.name, encoding, quality)
         return Sender(lambda message: port.put(message.to_bytes()), port.close)
 
-    def receive(self, callback: Callable[[Sample], None]) -> Closable:
-        return self._transport.subscribe(self.own.name, callback)
+    def receive(self, callback: Callable[[Sample], None], *, latched: bool = True) -> Closable:
+        return self._transport.subscribe(self.own.name, callback, history=latched)
 
     def read(self, sample: Sample) -> Any:
         check_encoding(sample.encoding, self._interface, name=self.own.name)

@@ -21,7 +21,7 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import FreshSubscriber, Publisher
 from smachpy.base.log import logwarn
 from smachpy.base.problems import Problems, name_of
 from smachpy.engine.frame import current_scope
@@ -155,8 +155,9 @@ class AskOperator(State):
             ask = open_ends.enter_context(
                 Publisher(f"{self.__channel}/question", String, latch=True, node=node)
             )
+            # A latched answer is that to an earlier question.
             open_ends.enter_context(
-                Subscriber(f"{self.__channel}/answer", String, asking.on_topic, node=node)
+                FreshSubscriber(f"{self.__channel}/answer", String, asking.on_topic, node=node)
             )
             if self.__answers == YES_NO:
                 confirm = f"{self.__channel}/confirm"

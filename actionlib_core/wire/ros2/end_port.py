@@ -107,9 +107,12 @@ class RosEndPort:
 
         return Sender(put, port.close)
 
-    def receive(self, callback: Callable[[Sample], None]) -> Closable:
-        # Asks for kept messages in any case: whether a publisher latches is its own choice.
-        return self._network.transport.subscribe(self._end.key, callback, cached=LATCHED.depth)
+    def receive(self, callback: Callable[[Sample], None], *, latched: bool = True) -> Closable:
+        # Asks for kept messages of all publishers: whether one latches is its own choice.
+        kept = LATCHED.depth if latched else 0
+        return self._network.transport.subscribe(
+            self._end.key, callback, history=latched, cached=kept
+        )
 
     def read(self, sample: Sample) -> Any:
         return _read(self._message, sample.payload)

@@ -118,6 +118,18 @@ def test_the_next_question_does_not_take_the_last_ones_answer(mission, answer):
     assert (run.outcome, run.duration) == ("no_answer", 6.0)
 
 
+def test_a_latched_answer_is_that_to_the_question_of_its_time(mission):
+    """It answered every later question at once."""
+    mission.topic("operator/answer", String).publish_at(2.0, String("yes"), latch=True)
+    sm = smachpy.StateMachine(["yes", "no", "no_answer", "preempted"])
+    with sm:
+        sm.add("ONE", AskOperator("One?", patience=5), {"yes": "TWO"})
+        sm.add("TWO", AskOperator("Two?", patience=5))
+    run = mission(sm)
+    run.assert_outcome("no_answer")
+    assert run.duration == 7.0
+
+
 def test_the_machines_picture_shows_the_question():
     (child,) = smachpy.describe(asking()).children
     assert ("question", "Go on?") in child.details
