@@ -604,7 +604,7 @@ def preempt_states(count: int) -> float:
             machine.add(
                 f"C{number}", smachpy.SimpleActionState("scale", TestAction, goal=TestGoal(1))
             )
-        run = threading.Thread(target=machine.execute)
+        run = threading.Thread(target=machine.execute, daemon=True)  # a failure ends the process
         run.start()
         assert begun.wait(START_S)
         before = time.process_time()

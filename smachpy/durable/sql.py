@@ -104,8 +104,12 @@ MAX_KINDS: Final = 10_000
 _FRONT: Final = (
     "WITH front AS (SELECT id FROM smachpy_missions WHERE status = '{}' AND "
     f"{_FREE} ORDER BY priority DESC, ready, id LIMIT {FRONT}) "
-    "SELECT m.id FROM front CROSS JOIN smachpy_missions AS m WHERE m.id = front.id"
+    "SELECT m.id FROM front CROSS JOIN smachpy_missions AS m WHERE m.id = front.id "
+    "AND m.status || '' = '{}' AND m.waits + 0 = 0 AND COALESCE(m.owner, '') = ''"
 )
+"""Those in front. Another runner may have taken them meanwhile, so what they are is asked again,
+and in a form for which no index is of use: PostgreSQL is to find them by their ids.
+"""
 
 PRUNED_AT_ONCE: Final = 500
 """Missions that `prune` deletes in one transaction: others write in between."""
@@ -641,12 +645,12 @@ class SqlStore(ABC):
         def work(cursor: Cursor, _: bool) -> tuple[MissionRow, Lease] | None:
             now = self._now_text()
 
-            def take(status: str, free: str, among: str, *needs: str) -> Any:
+            def take(status: str, among: str, single: str, *needs: str) -> Any:
                 return self._one(
                     cursor,
                     "UPDATE smachpy_missions SET owner = ?, mark = ?, fence = fence + 1, "
                     f"lease_end = {now} + ?, lease_clock = ? "
-                    f"WHERE id = ({among} AND {free} {others}"
+                    f"WHERE id = ({among} {single}{others}"
                     f"AND {_not_in_use(_ROBOT, status)} AND {_not_in_use('{}grp', status)} "
                     f"ORDER BY m.priority DESC, m.ready, m.id LIMIT 1{self.dialect.skip_locked}) "
                     f"RETURNING {_COLUMNS}, {_HELD}, fence",
@@ -655,14 +659,14 @@ class SqlStore(ABC):
                 )
 
             for status in (INTERRUPTED, QUEUED):
-                free = f"m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL {single}"
-                if status == QUEUED:
-                    free += f"AND (m.not_after IS NULL OR m.not_after > {now}) "
+                late = f"AND (m.not_after IS NULL OR m.not_after > {now}) "
+                here = single + (late if status == QUEUED else "")
                 # Those of some robots may all be far behind.
-                row = None if names else take(status, free, _FRONT.format(status))
+                row = None if names else take(status, _FRONT.format(status, status), here)
                 kinds = [] if row else self._kinds(cursor, status, names, targets)
-                for needs in self._by_first(cursor, kinds, free, singles):
-                    row = row or take(status, free, one_kind, needs)
+                free = f"m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL"
+                for needs in self._by_first(cursor, kinds, f"{free} {here}", singles):
+                    row = row or take(status, f"{one_kind} AND {free}", here, needs)
                 if row is not None:
                     return self._row(row[:-1], 0.0), Lease(row[0], row[-1], runner)
             return None
