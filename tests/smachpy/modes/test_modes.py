@@ -722,6 +722,12 @@ def test_one_mission_at_a_time_one_clean_up_each_and_no_stop_is_lost(events, res
 
 
 GAPS = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0, 7.0]), EVENTS), max_size=10)
+MODES = st.sampled_from(["idle", "auto", "teleop", "charging", "estop"])
+MORE_WAYS = st.dictionaries(
+    st.tuples(st.sampled_from(["start", "joy", "free", "full", "reset", "done", "error"]), MODES),
+    MODES,
+    max_size=6,
+)
 LEAVES = st.one_of(st.sampled_from([0.0, 1.0, 7.0]), st.just("raises"))
 MISSIONS = st.recursive(
     LEAVES,
@@ -764,23 +770,32 @@ def made(part: Any) -> State:
 
 
 @pytest.mark.slow
+@example([(1.0, "stop"), (1.0, "low"), (1.0, "joy")], 7.0, 1.0, False, {})  # a stop is left by none
 @example(  # a stop of the clean-ups, which begin again
     [(1.0, "joy"), (0.5, "stop"), (1.0, "go on"), (0.5, "low")],
     ("machine", [("concurrence", [7.0, ("machine", [7.0], True)], True)], True),
     1.0,
     True,
+    {},
 )
 @example(  # a stop of a clean-up that had been asked to hurry, for longer than its grace
     [(0.5, "stop")],
     ("concurrence", ["raises", ("machine", [0.0], True)], False),
     0.0,
     False,
+    {},
 )
 @settings(max_examples=60, deadline=None)
-@given(GAPS, MISSIONS, MISSIONS, st.booleans())
-def test_random_missions_run_one_at_a_time_clean_up_once_and_stop(gaps, auto, charge, resume):
+@given(GAPS, MISSIONS, MISSIONS, st.booleans(), MORE_WAYS)
+def test_random_modes_run_one_mission_at_a_time_clean_up_once_and_stop(
+    gaps, auto, charge, resume, more
+):
     times = accumulate([1.0, *(gap for gap, _ in gaps)])
     events = [*zip(times, ["start", *(event for _, event in gaps)], strict=True)]
+
+    known = {(event, source) for event, source, _ in WAYS}
+    ways = [*WAYS, *([*way, target] for way, target in more.items() if way not in known)]
+    free = {"go on", *(event for event, source, _ in ways if source == "estop")}
 
     def mission_of(part: Any) -> Any:
         return lambda: made(("machine", [part], True))
@@ -793,7 +808,7 @@ def test_random_missions_run_one_at_a_time_clean_up_once_and_stop(gaps, auto, ch
             {"name": "charging", "mission": mission_of(charge)},
             "estop",
         ],
-        WAYS,
+        ways,
         emergency="estop",
         name="ROBOT",
     )
@@ -824,7 +839,7 @@ def test_random_missions_run_one_at_a_time_clean_up_once_and_stop(gaps, auto, ch
             if path in cleans:
                 assert cleaned == bool(children), f"{path}: cleaned up {cleaned} times"
     for at in [at for at, event in events if event == "stop"]:
-        releases = [t for t, event in events if event in {"reset", "go on"} and t >= at]
+        releases = [t for t, event in events if event in free and t >= at]
         assert entered_after(run, at, min([*releases, 300.0])) == []
 
 
