@@ -148,8 +148,12 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
     """
     place = text.partition(":")[0]
     if is_data(place):
-        folder = Path(place).resolve().parent
-        found = [path for path in sorted(folder.rglob("*")) if path.suffix in {*DATA, ".py"}]
+        folder = Path(place).parent.resolve()  # of a link, as its states are looked up
+        found = [
+            path
+            for path in sorted(folder.rglob("*"))
+            if path.suffix in {*DATA, ".py"} and path.is_file()  # no link to nothing
+        ]
         files = {str(path.relative_to(folder)): path for path in found}
     else:
         module = sys.modules.get(target.source.partition(":")[0])

@@ -361,7 +361,7 @@ def _import_file(text: str, path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses and pickles look their module up
     try:
-        with _on_python_path(path.parent.resolve()):  # as `python path.py` would
+        with _on_python_path(path.resolve().parent):  # as `python path.py`, also of a link
             spec.loader.exec_module(module)
     except _FAILURES as error:
         sys.modules.pop(name, None)  # it was executed only in part
@@ -431,7 +431,8 @@ def _in_package(text: str, path: Path) -> ModuleType | None:
 
     Its relative imports and those of the package then work, as with `python -m`.
     """
-    folder, names = path.resolve().parent, [] if path.stem == "__init__" else [path.stem]
+    path = path.resolve()
+    folder, names = path.parent, [] if path.stem == "__init__" else [path.stem]
     while (folder / "__init__.py").is_file() and folder.name.isidentifier():
         names.insert(0, folder.name)
         folder = folder.parent

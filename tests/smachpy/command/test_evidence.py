@@ -98,6 +98,28 @@ def test_a_shipped_mission_and_a_mission_file_have_a_hash_of_their_own_files():
     assert hash_of("files/one.yaml") != one  # it may use the other one
 
 
+def test_a_linked_mission_runs_what_is_in_its_hash():
+    Path("elsewhere").mkdir()
+    Path("elsewhere/good.py").symlink_to("../good.py")
+    Path("elsewhere/evidence_helper.py").write_text('OUTCOME = "other"\n')
+    target = load_target("elsewhere/good.py")
+    assert mission_facts(target, "elsewhere/good.py")["hash"] == hash_of("good.py")
+    assert target.build().execute() == "done"
+
+
+def test_a_linked_mission_file_has_the_hash_of_the_folder_where_it_is_read():
+    for name, limit in (("files", 1.0), ("linked", 2.0)):
+        Path(name).mkdir()
+        Path(f"{name}/helper.py").write_text(f"LIMIT = {limit}\n")
+    Path("files/one.yaml").write_text("name: M\nstates:\n  WAIT: {wait: 1.0}\n")
+    Path("linked/one.yaml").symlink_to("../files/one.yaml")
+    assert hash_of("linked/one.yaml") != hash_of("files/one.yaml")
+    Path("linked/helper.py").write_text("LIMIT = 1.0\n")
+    assert hash_of("linked/one.yaml") == hash_of("files/one.yaml")
+    Path("files/.#one.yaml").symlink_to("somebody@nowhere.17:1")  # the lock of an editor
+    assert hash_of("linked/one.yaml") == hash_of("files/one.yaml")
+
+
 def evidence(**facts):
     mission = mission_facts(load_target("good.py"), "good.py")
     made = {"format": "smachpy-evidence", "version": 1, "ok": True, "mission": mission}

@@ -389,6 +389,13 @@ def test_a_file_of_a_package_is_a_module_of_it(package, line):
     assert load_target(f"{path}:mission").source == "my_robot.wards.hospital:mission"
 
 
+def test_a_link_to_a_file_of_a_package_is_this_module(package, tmp_path):
+    (tmp_path / "current.py").symlink_to(package("from ..places import WARD"))
+    found = load_target("current.py")
+    assert found.source == "my_robot.wards.hospital:mission"
+    assert found.build()
+
+
 def test_a_module_with_a_dot_needs_no_function(package, monkeypatch, tmp_path):
     package("from ..places import WARD")
     monkeypatch.chdir(tmp_path / "src")
