@@ -7,9 +7,11 @@ fields, so a bag of ROS 2 gives messages of ROS 1's types, as missions use them.
 from __future__ import annotations
 
 import contextlib
+import os
 from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from actionlib_core.exceptions import ActionlibError
 from actionlib_core.interfaces import get_message
@@ -17,6 +19,10 @@ from actionlib_core.interfaces import get_message
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
     from typing import Self
+
+
+MCAP: Final = b"\x89MCAP0\r\n"
+"""The first and the last bytes of an MCAP file."""
 
 
 class BagError(ActionlibError):
@@ -79,8 +85,10 @@ def read_bag(path: str | Path, topics: Collection[str] | None = None) -> Iterato
                     continue
                 raise BagError(path, f"topic {name!r}: {error}") from error
             yield BagMessage((stamp_ns - first) / 1e9, name, kind._type, make(kind))
-    except (BagError, ActionlibError):
+    except BagError:
         raise
+    except ActionlibError as error:
+        raise BagError(path, f"topic {name!r}: {error}") from error
     except ImportError as error:
         raise BagError(path, f"{error}. Try: pip install 'smachpy[cdr,mcap]'") from error
     except Exception as error:  # of many kinds: those of two packages and of what they use
@@ -177,6 +185,12 @@ def _mcap(path: Path) -> Iterator[tuple[int, str, str, Any]]:
     from mcap.reader import make_reader
 
     with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - len(MCAP)))
+        if size < 2 * len(MCAP) or file.read() != MCAP:
+            raise BagError(path, "is cut off, or no MCAP file. Try: mcap recover FILE -o NEW_FILE")
+        file.seek(0)
+        store_of = cache(_store)
         for schema, channel, message in make_reader(file).iter_messages():
             if schema is None:
                 continue
@@ -189,21 +203,24 @@ def _mcap(path: Path) -> Iterator[tuple[int, str, str, Any]]:
                     lambda kind, d=data: kind.from_bytes(d),
                 )
             elif channel.message_encoding == "cdr":
-                made = _of_cdr(schema.name, schema.data.decode(), message.data)
                 yield (
                     message.log_time,
                     channel.topic,
                     schema.name,
-                    lambda kind, m=made: _filled(kind, m),
+                    # Read only when it is wanted: the schema of another topic may be unreadable.
+                    lambda kind, one=schema, d=message.data: _filled(
+                        kind, store_of(one.name, one.data).deserialize_cdr(d, one.name)
+                    ),
                 )
 
 
-def _of_cdr(name: str, text: str, data: bytes) -> Any:
+def _store(name: str, text: bytes) -> Any:
+    """Return what reads messages of a type, as its schema describes it."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(text, name))
-    return store.deserialize_cdr(data, name)
+    store.register(get_types_from_msg(text.decode(), name))
+    return store
 
 
 def _rosbags(path: Path) -> Iterator[tuple[int, str, str, Any]]:
@@ -212,12 +229,11 @@ def _rosbags(path: Path) -> Iterator[tuple[int, str, str, Any]]:
 
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
         for connection, stamp_ns, data in reader.messages():
-            made = reader.deserialize(data, connection.msgtype)
             yield (
                 stamp_ns,
                 connection.topic,
                 connection.msgtype,
-                lambda kind, m=made: _filled(kind, m),
+                lambda kind, d=data, t=connection.msgtype: _filled(kind, reader.deserialize(d, t)),
             )
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from actionlib_core.interfaces import bags
 from actionlib_core.interfaces.bags import BagError, read_bag
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from smachpy import MonitorState, StateMachine
 from smachpy.command import main
 
 TIMES = [(1.5, 0.8), (7.0, 0.25)]
+SEVEN = b"\0\1\0\0\7\0\0\0"  # of an Int32, in CDR
 BEGAN_NS = 1_700_000_000_000_000_000
 
 
@@ -106,9 +108,60 @@ def test_what_is_no_bag_is_refused_in_one_line(tmp_path):
         list(read_bag(tmp_path / "none.mcap"))
     (tmp_path / "bad.mcap").write_bytes(b"x" * 100)
     (tmp_path / "bad.bag").write_bytes(b"x" * 100)
-    for name in ("bad.mcap", "bad.bag"):
-        with pytest.raises(BagError, match="cannot be read"):
+    for name, said in (("bad.mcap", "is cut off, or no MCAP"), ("bad.bag", "cannot be read")):
+        with pytest.raises(BagError, match=said):
             list(read_bag(tmp_path / name))
+
+
+def mixed_mcap(folder):
+    """A bag whose other topic has a schema that nobody here reads."""
+    from mcap.writer import Writer
+
+    path = folder / "mixed.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        number = writer.register_schema("std_msgs/msg/Int32", "ros2msg", b"int32 data\n")
+        other = writer.register_schema("mine/msg/Other", "ros2idl", b"module mine {};")
+        channels = [
+            writer.register_channel("/n", "cdr", number),
+            writer.register_channel("/other", "cdr", other),
+        ]
+        for at in range(3):
+            for channel in channels:
+                writer.add_message(channel, BEGAN_NS + at * 10**9, SEVEN, 0)
+        writer.finish()
+    return path
+
+
+def test_topics_that_cannot_be_read_do_not_hide_the_others(tmp_path, monkeypatch):
+    stores, make = [], bags._store
+    monkeypatch.setattr(bags, "_store", lambda *schema: stores.append(schema) or make(*schema))
+    found = list(read_bag(mixed_mcap(tmp_path)))
+    assert [(one.topic, one.message.data) for one in found] == [("n", 7)] * 3
+    assert len(stores) == 1  # not one for each message
+
+
+@pytest.mark.parametrize("size", [0, 7, 8, 40, -9, -1])
+def test_a_file_that_is_cut_off_is_called_so(size, tmp_path):
+    file = mcap_of_ros1(tmp_path)
+    file.write_bytes(file.read_bytes()[:size])
+    with pytest.raises(BagError, match=r"drive.mcap': is cut off.* Try: mcap recover"):
+        next(read_bag(file))
+
+
+def test_a_message_that_is_none_names_bag_and_topic(tmp_path):
+    from mcap.writer import Writer
+
+    file = tmp_path / "drive.mcap"
+    with file.open("wb") as out:
+        writer = Writer(out)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/BatteryState", "ros1msg", b"")
+        writer.add_message(writer.register_channel("/akku", "ros1", schema), BEGAN_NS, b"zz", 0)
+        writer.finish()
+    with pytest.raises(BagError, match=r"drive.mcap': topic 'akku': .*got 2 bytes"):
+        next(read_bag(file))
 
 
 MISSION = """
