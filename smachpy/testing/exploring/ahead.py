@@ -30,16 +30,20 @@ if TYPE_CHECKING:
     Known: TypeAlias = list[tuple[Prefix, list[ScheduleChoice]]]
     Found: TypeAlias = tuple[list[ScheduleChoice], Run | None, Orders]
 
-TOGETHER: Final = 16
-"""Runs that a process does without asking for more."""
+TOGETHER: Final = 32
+"""Runs that a process does without asking for more; to begin them costs as much as one."""
 
 COMPARED: Final = 4
 """Runs of this process that each other one does, too, before its own count."""
+
+BEGIN: Final = -1
+"""Number of a question without runs: whether a process can do them."""
 
 
 class Ahead:
     """Does the next runs of a search in other processes; a context manager.
 
+    This process goes on by itself until another one has begun, which takes a second or more.
     If a process does the first runs not as this one, no other process is used: such as one in which
     a set of texts has another order.
 
@@ -72,6 +76,7 @@ class Ahead:
         self._ready: deque[tuple[Prefix, Found | None]] = deque()
         self._answers: dict[int, list[Found | None] | None] = {}  # by the number of the question
         self._sent = self._taken = 0
+        self._is_beginning = self._is_ready = False
         # The runs of this process have their own time, in which nothing can be waited for that
         # others do. So a thread which is not in it asks, over queues that are not in it either.
         self._questions: SimpleQueue[tuple[int, tuple[Any, ...]] | None] = SimpleQueue()
@@ -86,15 +91,15 @@ class Ahead:
         self._thread.join()
 
     def found(self, prefix: Prefix, search: Search) -> Found | None:
-        """Return a run that keeps all invariants; None if it is not known to be one.
+        """Return a run that keeps all invariants; None if this process is to do it.
 
         Args:
             prefix: What `search.next` has returned.
             search: The search; its next runs are begun.
 
-        Blocks: until the run has been done.
+        Blocks: until the run has been done; not while the first process begins.
         """
-        if not self._known:
+        if not self._known or (self._job and not self._has_begun()):
             return None
         if self._job and not self._ready and not self._asked:
             self._ask([prefix])
@@ -108,12 +113,22 @@ class Ahead:
 
     def note(self, prefix: Prefix, choices: list[ScheduleChoice]) -> None:
         """Note a run that this process has done, and that keeps all invariants."""
-        if self._job and not self._sent and len(self._known) < COMPARED:
+        if self._job and not self._is_beginning and len(self._known) < COMPARED:
             self._known.append((prefix, choices))
+
+    def _has_begun(self) -> bool:
+        """Let the processes begin, once; return whether one of them is ready for runs."""
+        if not self._is_beginning:
+            self._is_beginning = True
+            for _ in range(self._count):
+                self._question(BEGIN, [])
+        while not self._is_ready and not self._answered.empty():
+            self._take_answer()
+        return self._is_ready
 
     def _ask_for(self, search: Search) -> None:
         """Keep all processes busy with the runs that come next."""
-        if not self._job:
+        if not self._job or len(self._asked) >= 2 * self._count:
             return
         begun = len(self._ready) + sum(map(len, self._asked))
         # The search waits for the first of these, and no longer has it.
@@ -126,16 +141,16 @@ class Ahead:
 
     def _ask(self, prefixes: list[Prefix]) -> None:
         self._asked.append(prefixes)
-        self._questions.put(
-            (self._sent, (self._job, self._known, prefixes, self._wants_runs)),
-        )
+        self._question(self._sent, prefixes)
         self._sent += 1
+
+    def _question(self, number: int, prefixes: list[Prefix]) -> None:
+        self._questions.put((number, (self._job, self._known, prefixes, self._wants_runs)))
 
     def _receive(self) -> None:
         """Take the answer to the first question that has none yet."""
         while self._taken not in self._answers:
-            number, results = self._answered.get()
-            self._answers[number] = results
+            self._take_answer()
         found = self._answers.pop(self._taken)
         self._taken += 1
         prefixes = self._asked.popleft()
@@ -145,6 +160,15 @@ class Ahead:
             self._asked.clear()
             return
         self._ready.extend(zip(prefixes, found, strict=True))
+
+    def _take_answer(self) -> None:
+        number, results = self._answered.get()
+        if number != BEGIN:
+            self._answers[number] = results
+        elif results is not None:
+            self._is_ready = True
+        elif not self._is_ready:
+            self._job = b""
 
     def _send(self) -> None:
         """Ask what `found` wants to know, in a thread of its own, until the end."""

