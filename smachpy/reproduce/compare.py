@@ -251,6 +251,7 @@ def steps_of(
             its path or the end of it, with all in it.
     """
     parallel = [state.path for state in record.walk() if state.kind in _PARALLEL]
+    actions = {state.path for state in record.walk() if state.kind == "action"}
     left_out = {kind for name in tolerate for kind in GROUPS.get(name, ())}
     found: list[Step] = []
     began: float | None = None
@@ -274,7 +275,9 @@ def steps_of(
         if "cancelled" in facts:
             facts["cancelled"] = event.get("goal_id") in cancelled
         number = len(found) + 1
-        lane, at = _lane(path, parallel), t - began
+        # A machine that serves the goal of a state of this one runs beside that.
+        served = next((f"{above}/" for above in _above(path) if above in actions), "")
+        lane, at = served or _lane(path, parallel), t - began
         found.append(Step(number, at, kind, path, tuple(facts.items()), lane, took, index, t))
     return found
 
@@ -355,6 +358,11 @@ def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _plain(one) for key, one in value.items() if key not in _STAMPS}
     return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def _above(path: str) -> Iterator[str]:
+    while path := path.rpartition("/")[0]:
+        yield path
 
 
 def _lane(path: str, parallel: Iterable[str]) -> str:

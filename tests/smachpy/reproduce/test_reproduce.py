@@ -963,6 +963,21 @@ def test_moments_of_two_clocks_are_the_same_if_they_are_as_far_away():
     assert compare(numbered([0.5], 13_700.0), numbered([0.4], 0.0)).difference.number == 2
 
 
+def test_a_machine_that_serves_a_goal_of_the_run_begins_beside_the_state_that_sends_it():
+    sm = smachpy.StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    sm.add("SEND", smachpy.SimpleActionState("turn", MoveBaseAction))
+    sent = {"kind": "GoalSent", "path": "/M/SEND", "action": "turn"}
+    begins = {"kind": "Entered", "path": "/M/SEND/TURN"}
+    ends = {"kind": "Left", "path": "/M/SEND/TURN", "outcome": "done"}
+    one, other = (
+        steps_of(events, describe(sm), ())
+        for events in ([sent, begins, ends], [begins, sent, ends])
+    )
+    assert compare(one, other).difference is None
+    differs = compare(one, steps_of([sent, begins, {**ends, "outcome": "stuck"}], describe(sm), ()))
+    assert differs.difference.number == 3
+
+
 def test_what_is_shown_of_the_progress_is_not_compared():
     text = {"$object": "Progress", "fields": {"fraction": 0.1, "seconds_left": 9.0, "text": "a"}}
     assert compare(numbered([text, text], 0.0), numbered([text], 0.0)).difference is None
