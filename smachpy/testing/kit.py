@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
 import tempfile
+import threading
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -58,6 +60,33 @@ class UnfiredWarning(UserWarning):
     """A preempt or interrupt of the test never came: the run ended before its moment."""
 
 
+class _Shutdown(Shutdown):
+    """The shutdown of a test, in which signals are meant for the program that tests."""
+
+    _signal = ""
+    _asking = 0  # the thread that requests the shutdown, in which no signal is noted
+
+    def request(self, reason: str = "requested") -> bool:
+        """Request the shutdown; see `Shutdown`."""
+        self._asking = threading.get_ident()
+        try:
+            return super().request(reason)
+        finally:
+            self._asking = 0
+
+    def note(self, reason: str) -> None:
+        """Note a signal that has come during a run, or what is requested."""
+        if threading.get_ident() != self._asking:
+            self._signal = self._signal or reason
+        super().note(reason)
+
+    def pass_on(self) -> None:
+        """Give the signal to the program, once it has its handlers again."""
+        name, self._signal = self._signal, ""
+        if name:
+            signal.raise_signal(signal.Signals[name])
+
+
 class MissionKit:
     """Runs machines in virtual time on a network in memory; the `mission` fixture is one.
 
@@ -106,7 +135,7 @@ class MissionKit:
             namespace=namespace,
             arguments=arguments,
         )
-        self.shutdown = Shutdown()
+        self.shutdown = _Shutdown()
         self.draws = True
         self.call = "mission"
         self._folder = folder or _temporary_folder
@@ -205,6 +234,7 @@ class MissionKit:
                 outcome, error = self._execute(machine)
         finally:
             self.clock.limit = self.clock.most_turns = None
+        self.shutdown.pass_on()
         duration = self.clock.now() - recorder.started
         if self._servers and error is None:
             self.clock.sleep(SETTLE_S)

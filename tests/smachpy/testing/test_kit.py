@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import threading
 import time
 import warnings
@@ -31,6 +32,7 @@ from smachpy.testing import (
     TimeLimitError,
     UnfiredWarning,
     UnknownStateError,
+    explore,
     mission_kit,
 )
 from smachpy.testing.coverage import Coverage
@@ -552,3 +554,24 @@ def test_the_same_seed_gives_the_same_run_to_the_last_event():
 
     assert events(5) == events(5)
     assert any("GoalSent" in event for event in events(5))
+
+
+def test_ctrl_c_during_a_run_is_meant_for_the_test_and_not_only_for_the_run():
+    runs = []
+
+    def interrupted(_userdata):
+        runs.append(1)
+        signal.raise_signal(signal.SIGINT)
+        return "done"
+
+    def machine():
+        sm = StateMachine(["done", "preempted"], name="M")
+        sm.add("WORK", CBState(interrupted, outcomes=["done"]), {"done": "WAIT"})
+        sm.add("WAIT", Wait(5.0))
+        return sm
+
+    with pytest.raises(KeyboardInterrupt), mission_kit() as mission:
+        mission(machine())
+    with pytest.raises(KeyboardInterrupt):
+        explore(machine, keep=["WORK"], jobs=1)
+    assert len(runs) == 2
