@@ -12,8 +12,10 @@ from actionlib_core.command_line.numbers import between, seconds
 from actionlib_core.process.output import printable
 from smachpy.command.durable import whole_target
 from smachpy.command.on import ProgressLine, add_jobs_and_on, opened_cluster, workers_text
-from smachpy.command.run import add_input, read_inputs
+from smachpy.command.run import add_input, brings_robots, read_inputs
+from smachpy.exceptions import MissionError
 from smachpy.machines.container import Container
+from smachpy.machines.mission_info import mission_info
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -76,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
     target = args.target if args.on is None else whole_target(args.target)
     make = MissionMaker(target, read_inputs(args.input), args.words)
+    make.check()
     machine = make()
     with opened_cluster(args.on, target) as cluster:
         progress = ProgressLine("runs", workers_text(cluster, args.jobs, args.max_runs))
@@ -113,6 +116,21 @@ class MissionMaker:
     words: tuple[str, ...] = ()
     imports: bool = False
     allow: tuple[str, ...] | None = None
+
+    def check(self) -> None:
+        """Refuse a mission that starts its robots, in each run anew.
+
+        Raises:
+            MissionError: it does.
+        """
+        target = _loaded(self.target, self.imports, self.allow)
+        needs = mission_info(target.thing)
+        if needs.real_time and brings_robots(target, self.words, self.inputs):
+            hint = f" Try -i {needs.robots}=false." if isinstance(needs.robots, str) else ""
+            raise MissionError(
+                f"mission {target.name!r} needs real time: {needs.real_time}; expected one that "
+                f"starts no robots.{hint}"
+            )
 
     def __call__(self) -> Container:
         """Return a new machine."""

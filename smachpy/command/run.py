@@ -266,7 +266,7 @@ def _use_own_network(args: argparse.Namespace, stack: contextlib.ExitStack) -> N
         print(f"network of this run: SMACHPY_DOMAIN={domain:d}", file=sys.stderr)
 
 
-def _brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Text]) -> bool:
+def brings_robots(target: Target, words: Sequence[str], inputs: Mapping[str, Text]) -> bool:
     """Return whether a mission starts robots itself when called with these arguments."""
     robots = mission_info(target.thing).robots
     if not isinstance(robots, str):
@@ -315,7 +315,7 @@ def _run_mission(
         print(usage(target))
         return 0
     inputs = read_inputs(args.input)
-    if _brings_robots(target, args.words, inputs):
+    if brings_robots(target, args.words, inputs):
         _use_own_network(args, stack)
     origin = _origin(args, target, inputs)
     if args.record is not None or args.view:

@@ -7,6 +7,7 @@ import pytest
 
 import smachpy
 from smachpy import events as ev
+from smachpy.command import main
 from smachpy.command.arguments import Text
 from smachpy.command.mission_run import (
     RunOptions,
@@ -228,3 +229,29 @@ def test_the_recorder_keeps_several_robots_apart(office, tmp_path):
     assert recorder.has_goals
     recorder.draw(tmp_path / "tracks.png", office, dock=None, title="fleet: succeeded")
     assert (tmp_path / "tracks.png").read_bytes().startswith(b"\x89PNG")
+
+
+STARTS_ROBOTS = """
+from pathlib import Path
+import smachpy
+
+
+@smachpy.mission(real_time="its robots are processes", robots="start")
+def mission(*, start: bool = True) -> smachpy.StateMachine:
+    sm = smachpy.StateMachine(["done", "preempted"], name="TEAM")
+    sm.add("WORK", smachpy.CBState(print, outcomes=["done"]))
+    if start:
+        sm.register_start_cb(lambda *_: Path("started").touch())
+    return sm
+"""
+
+
+def test_a_mission_that_starts_its_robots_is_not_explored(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("team.py").write_text(STARTS_ROBOTS)
+    assert main(["explore", "team.py"]) == 2
+    said = capsys.readouterr().err
+    assert "needs real time: its robots are processes; expected one that starts no robots" in said
+    assert "Try -i start=false." in said
+    assert not Path("started").exists()
+    assert main(["explore", "team.py", "-i", "start=false", "--jobs", "1"]) == 0

@@ -209,6 +209,7 @@ def _explored(
     from smachpy.testing.exploring.exploration import explore
 
     make = _maker(args, inputs)
+    make.check()
     machine = make()
     keep, coverage = reckoning_states(machine), Coverage()
     found = explore(
