@@ -550,11 +550,13 @@ class Position:
             visit = self.visits.get(entry["path"])
             if visit is not None:  # it may have ended meanwhile
                 override = entry["override"]  # outcome, label, maybe whether only if it stopped
-                earlier = (visit.get("asked") or {}).get("override")
-                # As `smachpy.engine.visit.Override.instead_of`.
-                if earlier is not None and (override is None or override[2:] == [True]):
-                    override = earlier
                 before = visit.get("asked") or {}
+                earlier = before.get("override")
+                # As `smachpy.engine.visit.choice_after`.
+                if override is None:
+                    override = None if earlier and earlier[2:] == [True] else earlier
+                elif override[2:] == [True] and before:
+                    override = earlier
                 left = entry.get("goes_on") or before.get("goes_on")
                 kept = {"goes_on": left} if left else {}
                 visit["asked"] = {**request, "override": override, **kept}

@@ -469,10 +469,11 @@ class Recorder(RunJournal):
                 self._all_back.wait(RESUME_S)
         outcome = self._held_outcome(step, visit, outcome)
         # An outcome without a transition was accepted because the child had been asked to stop:
-        # ask again, so that it is accepted now, too.
+        # ask again, so that it is accepted now, too. What an operator has chosen stays as it is.
         if outcome is not None and outcome not in step.next:
             with asking("program", "journal", "before the resume"), frame.run.lock:
-                ask(frame, step)
+                chosen = None if frame.visit is None else frame.visit.override
+                ask(frame, step, override=chosen)
             frame.run.flush()
         return outcome
 

@@ -39,6 +39,7 @@ from smachpy.engine.visit import (
     Phase,
     Why,
     after,
+    choice_after,
     followed,
 )
 from smachpy.events import (
@@ -532,13 +533,13 @@ def ask(
     if not frame.run.journal.passes(meant.path_in(frame)):
         return False
     if timeout is None:
+        # Before the child hears of it: one that ends at once looks at it without the lock.
+        asked = visit.is_asked() and not visit.by_timeout
+        visit.override = choice_after(visit.override, override, asked=asked)
         visit.by_timeout = False
     elif not visit.is_asked():
         visit.by_timeout = True
     visit.timeout = timeout
-    if override is not None:
-        # Before the child hears of it: one that ends at once looks at it without the lock.
-        visit.override = override.instead_of(visit.override)
     if frame.run.control is not None:
         frame.run.control.release(f"{frame.path}/{meant.label}")
     visit.happen(Event.ASK if timeout is None else Event.TIME_OVER)
@@ -551,8 +552,8 @@ def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool
     Args:
         frame: Where it runs.
         step: The child.
-        override: What the operator chose for its end, in place of an earlier choice; a pause that
-            cancels the child (`if_stopped`) replaces none. None if it is no operator who asks.
+        override: What the operator chose for its end; None if it is no operator who asks. See
+            `smachpy.engine.visit.choice_after`.
     """
     with frame.run.lock:
         asked = ask(frame, step, override=override)

@@ -276,9 +276,24 @@ class Override:
         is_choice = self.outcome is not None or self.label is not None
         return is_choice and (answered or not self.if_stopped)
 
-    def instead_of(self, earlier: Override | None) -> Override:
-        """Return the one that counts after an `earlier` one: a pause only adds that it waits."""
-        return earlier if earlier is not None and self.if_stopped else self
+
+def choice_after(
+    earlier: Override | None, later: Override | None, *, asked: bool
+) -> Override | None:
+    """Return what replaces the outcome of a child that is asked to stop once more.
+
+    Of an operator's choices the last one counts. A pause only adds that the child waits: it
+    replaces no choice, and a child that anybody else stops, before it or after it, does not run
+    again.
+
+    Args:
+        earlier: What replaced it before this request.
+        later: The choice of this request; None if it is no operator's.
+        asked: Anyone except its own timeout has asked the child before.
+    """
+    if later is None:
+        return None if earlier is not None and earlier.if_stopped else earlier
+    return earlier if later.if_stopped and asked else later
 
 
 class Decision(NamedTuple):

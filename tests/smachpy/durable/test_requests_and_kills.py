@@ -270,6 +270,26 @@ def test_a_pause_does_not_void_an_operators_jump_after_a_kill_either(shape):
         assert ends[-1] == "LOOK done", (place, ends)
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_pause_begins_nothing_again_that_a_sibling_has_stopped_after_a_kill_either():
+    def build(ends):
+        both = Concurrence(ENDS, "done", child_termination_cb=lambda _: True)
+        both.add("DRIVE", SlowToStop(ends, "DRIVE", seconds=60.0))
+        both.add("WATCH", Work([], "WATCH", seconds=REQUEST_S))
+        sm = StateMachine(ENDS, name="R")
+        sm.add("BOTH", both)
+        sm.register_start_cb(lambda *_: pause(sm))
+        return sm
+
+    def pause(sm):
+        clock = current_clock()
+        clock.call_later(REQUEST_S + 1.0, lambda: sm.control.pause(running="cancel"))
+        clock.call_later(REQUEST_S + 4.0, sm.control.resume)
+
+    for place, _, ends in lives(build, ""):
+        assert "DRIVE done" not in ends, place
+
+
 def test_a_request_before_the_first_state_reaches_the_resumed_run():
     """It waited until the states that were active had been entered again: there was none."""
     ends, store = [], KillingStore()

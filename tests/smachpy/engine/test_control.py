@@ -15,6 +15,7 @@ from smachpy.engine.control import ControlError
 from smachpy.engine.preempt import ask_child, on_preempt
 from smachpy.engine.visit import Override
 from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed
+from tests.smachpy.pnp.nets import net_of
 
 
 class Work(smachpy.State):
@@ -243,6 +244,74 @@ def test_what_an_operator_has_chosen_outlasts_a_pause_and_a_taker_of_the_resourc
     after = {"preempt": "/P/B", "force": "/P/C", "jump": "/P/D"}[chosen]
     assert entered(sm) == ["/P/A", after]
     assert drive.runs == 1
+
+
+class Watches(Work):
+    """Ends after a second, as a sibling that has seen enough, or broken."""
+
+    def __init__(self, error=None):
+        super().__init__()
+        self.error = error
+
+    def execute(self, userdata):
+        super().execute(userdata)
+        if self.error is not None:
+            raise self.error
+        return "ok"
+
+
+def beside(drive, error=None):
+    both = smachpy.Concurrence(
+        ["ok", "failed", "preempted"], "ok", child_termination_cb=lambda _: True, name="P"
+    )
+    both.add("DRIVE", drive)
+    both.add("WATCH", Watches(error))
+    return both
+
+
+def interrupted(drive):
+    net = net_of(
+        """
+        init* -> DRIVE.exec : DRIVE.start
+        DRIVE.exec -> goal0 : DRIVE.end
+        DRIVE.exec -> r : DRIVE.interrupt [obstacle]
+        r -> B.exec : B.start
+        B.exec -> goal : B.end
+        """
+    )
+    plan = smachpy.pnp.PetriNetPlan(net, {"DRIVE": drive, "B": Work()}, name="P")
+    current_clock().call_later(1.0, lambda: plan.post("obstacle"))
+    return plan
+
+
+def taken(drive):
+    sm = smachpy.StateMachine(["ok", "preempted"], name="P")
+    sm.add("DRIVE", drive, {"failed": "ok"})
+    live = sm._smachpy.live
+    current_clock().call_later(1.0, lambda: ask_child(live.frame, live.frame.step))
+    return sm
+
+
+@pytest.mark.parametrize("when", [0.5, 1.5], ids=["before", "after"])
+@pytest.mark.parametrize("command", ["pause", "emergency"])
+@pytest.mark.parametrize(
+    "make",
+    [beside, lambda drive: beside(drive, OSError("laser lost")), interrupted, taken],
+    ids=["sibling", "error", "plan", "resource"],
+)
+def test_a_pause_does_not_begin_again_what_others_have_stopped(clock, make, command, when):
+    """With the battery low, it drove on after the release, and nobody asked it any more."""
+    drive = Slows()
+    sm = make(drive)
+    pause = {
+        "pause": lambda: sm.control.pause(running="cancel"),
+        "emergency": sm.control.emergency_stop,
+    }[command]
+    at(clock, (when, pause), (9.0, sm.control.resume))
+    with contextlib.suppress(smachpy.InvalidUserCodeError):
+        sm.execute()
+    assert drive.runs == 1
+    assert clock.now() < 12.0
 
 
 @pytest.mark.parametrize(

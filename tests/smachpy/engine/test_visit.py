@@ -22,6 +22,7 @@ from smachpy.engine.visit import (
     Why,
     after,
     after_attempt,
+    choice_after,
     following,
 )
 from smachpy.exceptions import InvalidUserCodeError
@@ -268,18 +269,22 @@ AGAIN = Override(label="DRIVE", if_stopped=True)  # of a pause
 
 
 @pytest.mark.parametrize(
-    ("earlier", "later", "counts"),
+    ("earlier", "later", "asked", "counts"),
     [
-        (None, AGAIN, AGAIN),
-        (AGAIN, Override(outcome="done"), Override(outcome="done")),
-        (Override(outcome="done"), Override(label="NEXT"), Override(label="NEXT")),
-        (Override(label="NEXT"), Override(), Override()),
-        (Override(label="NEXT"), AGAIN, Override(label="NEXT")),
-        (Override(), AGAIN, Override()),
+        (None, AGAIN, False, AGAIN),
+        (None, AGAIN, True, None),  # a concurrence, a plan or who takes the resource has asked it
+        (AGAIN, None, True, None),
+        (AGAIN, AGAIN, True, AGAIN),
+        (AGAIN, Override(outcome="done"), True, Override(outcome="done")),
+        (Override(outcome="done"), Override(label="NEXT"), True, Override(label="NEXT")),
+        (Override(label="NEXT"), Override(), True, Override()),
+        (Override(label="NEXT"), AGAIN, True, Override(label="NEXT")),
+        (Override(label="NEXT"), None, True, Override(label="NEXT")),
+        (Override(), AGAIN, True, Override()),
     ],
 )
-def test_the_last_choice_of_an_operator_counts_and_a_pause_is_none(earlier, later, counts):
-    assert later.instead_of(earlier) == counts
+def test_the_last_choice_of_an_operator_counts_and_a_pause_is_none(earlier, later, asked, counts):
+    assert choice_after(earlier, later, asked=asked) == counts
 
 
 @pytest.mark.parametrize("outcome", [None, 3, ["done"], {"done": 1}])
