@@ -347,18 +347,19 @@ class Concurrence(Container):
                 self, group.frame, self._smachpy.child_termination_cb, (_outcomes(group),)
             )
             no_coroutine(answer)
+            labels = _labels(answer)
         except Exception as error:
             raise raised(group.frame.path, "child_termination_cb", error) from error
         with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):
-            group.ask(self.__chosen(group, answer))
+            group.ask(self.__chosen(group, labels))
 
-    def __chosen(self, group: Group, answer: Any) -> list[ChildBranch]:
-        """Return the branches to preempt after `child_termination_cb` returned `answer`."""
-        labels = [answer] if isinstance(answer, str) else answer
-        if not isinstance(labels, (list, tuple, set, frozenset)):
-            return group.running() if answer else []
+    def __chosen(self, group: Group, labels: list[Any] | bool) -> list[ChildBranch]:
+        """Return the branches to preempt after `child_termination_cb` returned `labels`."""
+        if isinstance(labels, bool):
+            return group.running() if labels else []
         known = self._smachpy.others()
-        unknown = sorted(set(labels) - set(known))
+        strange = (each for each in labels if not (isinstance(each, str) and each in known))
+        unknown = sorted(strange, key=str)
         if unknown:
             raise InvalidUserCodeError(
                 f"{group.frame.path}: child_termination_cb: got labels {unknown}; expected labels "
@@ -404,6 +405,13 @@ class Concurrence(Container):
         if answer and answer not in known:
             raise InvalidTransitionError(unknown_name(f"{frame.path}: outcome_cb", answer, known))
         return plain(answer) if answer else None
+
+
+def _labels(answer: Any) -> list[Any] | bool:
+    """Return the labels in an answer of `child_termination_cb`, or the truth of any other."""
+    if isinstance(answer, str):
+        return [answer]
+    return list(answer) if isinstance(answer, (list, tuple, set, frozenset)) else bool(answer)
 
 
 def _outcomes(group: Group) -> dict[str, str | None]:

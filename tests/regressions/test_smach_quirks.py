@@ -472,10 +472,39 @@ def test_child_termination_cb_preempts_just_the_labels_it_names(clock):
     assert clock.now() == 3.0
 
 
-def test_child_termination_cb_with_an_unknown_label_raises(clock):
-    made = both(Say("ok"), Sleeper(), child_termination_cb=lambda outcomes: ["X"])
-    with pytest.raises(smach.InvalidUserCodeError, match="'X'"):
+class Truthless:
+    """As an array of NumPy: it is neither true nor false."""
+
+    def __bool__(self):
+        raise ValueError("the truth value is ambiguous")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (["X"], r"got labels \['X'\]"),
+        (["X", 3], r"got labels \[3, 'X'\]"),
+        ([["B"]], r"got labels \[\['B'\]\]"),
+        (Truthless(), "child_termination_cb raised ValueError: the truth value"),
+    ],
+    ids=["unknown", "mixed", "nested", "truthless"],
+)
+def test_a_wrong_answer_of_child_termination_cb_raises_when_all_have_ended(clock, answer, said):
+    """The clean-up began, and the concurrence ended, while a branch was still braking."""
+
+    class Brakes(Sleeper):
+        def execute(self, userdata):
+            super().execute(userdata)
+            clock.sleep(1.0)
+            return "preempted"
+
+    made = both(Say("ok"), Brakes(), child_termination_cb=lambda outcomes: answer)
+    made.add_cleanup("DOCK", Say("ok"))
+    ends = []
+    made.subscribe(lambda e: ends.append(e.path) if isinstance(e, smach.events.Left) else None)
+    with pytest.raises(smach.InvalidUserCodeError, match=said):
         made.execute()
+    assert ends == ["/SM_ROOT/A", "/SM_ROOT/B", "/SM_ROOT/DOCK"]
 
 
 def test_child_termination_cb_true_preempts_all_others(clock):
