@@ -328,6 +328,7 @@ class Control:
         with self._lock:
             changed, self._paused = not self._paused, True
             self._stop = stop or self._stop
+        self._watch()  # a run that has begun meanwhile has not seen it
         if changed:
             self._call_listeners()
 
@@ -405,13 +406,14 @@ class Control:
             frame.emit(Resumed)
 
     def _watch(self) -> None:
-        run = self._run
-        frame = self._machine._smachpy.live.frame
-        if frame is not None and self._machine._smachpy.live.root is None:
+        live = self._machine._smachpy.live
+        frame, root = live.frame, live.root
+        if frame is not None and root is None:
             raise ControlError(frame.path, "it is not the root; expected the root's control", ())
-        if frame is not None:
-            run = self._run = frame.run
-            run.control = self
+        if root is not None:  # also in a hook of the root, or between two attempts of it
+            self._run = root.run
+            root.run.control = self
+        run = self._run
         if run is not None:
             run.watched = run.careful = True
             EPOCH.value = object()  # a loop that runs now must notice the flags

@@ -537,6 +537,8 @@ class Root(Branch):
             live.root = self
             live.runs += 1
             is_asked = self._is_stopped or root._preempt_requested
+        if live.control is not None:  # maybe since the start was published
+            live.control.attach(self.run)
         if is_asked:
             self._ask_at_start()
         live.origin = None
@@ -563,11 +565,9 @@ class Root(Branch):
                 self.emit(Finished, outcome)
 
     def _begin(self) -> None:
-        """Attach the journal and the operator's control, and publish the start."""
+        """Attach the journal, and publish the start."""
         run, live = self.run, self.live
         earlier = run.journal.attach(self)
-        if live.control is not None:
-            live.control.attach(run)
         run.watched = run.watched or bool(live.listeners or live.buffers)
         if earlier is not None:
             self.emit(Recovered, *earlier)

@@ -14,7 +14,7 @@ from actionlib_core.shutdown import Shutdown, use_shutdown
 from smachpy.engine.control import ControlError
 from smachpy.engine.preempt import ask_child, on_preempt
 from smachpy.engine.visit import Override
-from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed
+from smachpy.events import Entered, Jumped, OutcomeForced, Paused, Resumed, Started
 from tests.smachpy.pnp.nets import net_of
 
 
@@ -462,6 +462,65 @@ def test_a_second_run_is_controlled_too(clock):
     before = clock.now()
     sm.execute()
     assert clock.now() - before == 5.0 - 0.0 + 3.0
+
+
+# -- the first use of the control, while the run has begun and the root has not -----------------
+
+
+class Fails(Work):
+    """Fails at its first run."""
+
+    def execute(self, userdata):
+        super().execute(userdata)
+        return "failed" if self.runs == 1 else "ok"
+
+
+@pytest.mark.parametrize("command", ["pause", "emergency_stop", "add_breakpoint"])
+@pytest.mark.parametrize("where", ["on_enter", "retry", "Started"])
+def test_a_stop_before_the_root_runs_holds_its_first_state(clock, where, command):
+    """The machine ran all its states to the end, while `is_paused()` was true."""
+    options = {
+        "on_enter": {"on_enter": lambda _: clock.sleep(5.0)},
+        "retry": {"retry": (2, 5.0, ["failed"])},
+        "Started": {},
+    }[where]
+
+    def stop():
+        getattr(sm.control, command)(*(["/P/A"] if command == "add_breakpoint" else []))
+
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P", **options)
+    sm.add("A", Fails() if where == "retry" else Work(), {"ok": "B"})
+    sm.add("B", Work())
+    if where == "Started":
+        sm.subscribe(lambda event: stop() if isinstance(event, Started) else None)
+    else:
+        at(clock, (2.0, stop))
+    seen = []
+    at(clock, (9.0, lambda: seen.extend(sm.control.waiting())), (9.0, lambda: sm.control.resume()))
+    assert sm.execute() == "ok"
+    # The next attempt of the machine itself is held before its first state is.
+    assert seen == ["/P" if where == "retry" and command != "add_breakpoint" else "/P/A"]
+    assert sm["B"].runs == 1
+    assert clock.now() == 11.0
+    assert not sm.control.is_paused()
+
+
+def test_an_emergency_stop_in_the_moment_of_the_begin_is_not_lost(clock, monkeypatch):
+    sm = mission()
+    control, pause = sm.control, sm.control._pause
+
+    def late(stop):
+        clock.sleep(1.0)  # the run begins meanwhile
+        pause(stop)
+
+    monkeypatch.setattr(control, "_pause", late)
+    at(clock, (9.0, control.resume))
+    stopping = clock.spawn(control.emergency_stop, name="stops")
+    clock.sleep(0.5)
+    assert sm.execute() == "ok"
+    stopping.join()
+    assert sm["A"].runs == 2
+    assert clock.now() == 9.0 + 4.0
 
 
 # -- a pause belongs to one run ------------------------------------------------------------------
