@@ -115,6 +115,7 @@ class Live:
     Attributes:
         frame: Where it runs; None between runs, and between two attempts of one run.
         root: The root's frame while it runs as the root of a machine.
+        coming: The same from the call of `execute` until it runs, so that there is one at a time.
         callback: The frame of its callback or hook that runs now, or None.
         plan: Its children, compiled; None when they have changed.
         listeners: Called with each event of it and of all below it.
@@ -133,6 +134,7 @@ class Live:
 
     frame: Frame | None = None
     root: Frame | None = None
+    coming: Frame | None = None
     callback: Any = None  # a smachpy.engine.callback.CallbackFrame, which imports this module
     plan: Any = None
     listeners: tuple[Callable[[Event], object], ...] = ()

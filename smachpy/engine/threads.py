@@ -373,13 +373,12 @@ def execute_root(root: Parent, parent_ud: Any) -> str:
     Blocks: until it has ended.
     """
     top = Root(root, parent_ud)
-    running = top.live.root
-    # Refused here, before this call touches the signal handlers and the shutdown of the other run.
-    if running is not None and not running.ended:
-        raise already_runs(top.here())
-    ends = [observe(root) for observe in OBSERVERS] if OBSERVERS else ()
+    ends: list[Callable[[str | None], object] | None] = []
     outcome: str | None = None
+    # Refused here, before this call touches the signal handlers and the shutdown of the other run.
+    top.come()
     try:
+        ends += [observe(root) for observe in OBSERVERS]
         for other in [run for run in top.ending.enlist(top) if isinstance(run, Root)]:
             _share_no_state(top, other)
         if top.ending.requested():
@@ -400,7 +399,7 @@ def execute_root(root: Parent, parent_ud: Any) -> str:
                 if end is not None:
                     end(outcome)
         finally:
-            _forget_late_request(root)
+            _forget_late_request(top)
             if top.live.control is not None:
                 top.live.control.detach(top.run)
 
@@ -461,10 +460,14 @@ def _leaves(container: Parent, path: str) -> Iterator[tuple[str, Any]]:
             yield f"{path}/{label}", child
 
 
-def _forget_late_request(root: Parent) -> None:
+def _forget_late_request(top: Root) -> None:
     """Clear the flag of a request that arrived while the run was ending: it was for that run."""
-    if root._smachpy.live.frame is None:
-        root._preempt_requested = False
+    root, live = top.container, top.live
+    with FLAGS:
+        if live.coming is top:  # it has not begun
+            live.coming = None
+        if live.frame is None and live.root is None and live.coming is None:
+            root._preempt_requested = False  # else it may be for the next run, which has begun
 
 
 class Root(Branch):
@@ -491,6 +494,18 @@ class Root(Branch):
     def clock(self) -> Clock:
         """The clock of the run."""
         return self.run.clock
+
+    def come(self) -> None:
+        """Let no other run of the root begin.
+
+        Raises:
+            InvalidStateError: there is one.
+        """
+        with FLAGS:
+            running = self.live.coming or self.live.root
+            if running is not None and not running.ended:
+                raise already_runs(self.here())
+            self.live.coming = self
 
     def run_in_thread(self) -> str:
         """Run the root in a thread that can be left behind."""
@@ -534,7 +549,7 @@ class Root(Branch):
         self._begin()
         self.visit = Visit(self, step, Phase.RUNNING)
         with self.run.lock, FLAGS:  # from here on a request belongs to this run
-            live.root = self
+            live.root, live.coming = self, None
             live.runs += 1
             is_asked = self._is_stopped or root._preempt_requested
         if live.control is not None:  # maybe since the start was published

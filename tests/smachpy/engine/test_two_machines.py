@@ -7,7 +7,8 @@ import copy
 import pytest
 
 import smachpy
-from smachpy import CBState, Concurrence, State, StateMachine
+from smachpy import CBState, Concurrence, InvalidStateError, State, StateMachine
+from smachpy.events import Finished, Started
 
 ENDS = ["done", "preempted"]
 
@@ -104,6 +105,40 @@ def test_a_copy_of_a_function_state_is_one_as_well(clock, state):
 def test_two_machines_that_share_nothing_run_as_ever(clock):
     first, second = (machine(name, Nap(), nested=False) for name in "AB")
     assert run_both(clock, first, second) == {"A": "preempted", "B": "done"}
+
+
+def test_a_second_run_is_refused_as_soon_as_the_first_was_called(clock):
+    """It began while the start of the first one was told, and the end of that took its request."""
+    sm = machine("A", Nap(), nested=False)
+    sm.subscribe(lambda event: clock.sleep(3.0) if isinstance(event, Started) else None)
+    outcomes = []
+    first = clock.spawn(lambda: outcomes.append(sm.execute()), name="first")
+    clock.sleep(1.0)
+    with pytest.raises(InvalidStateError, match="second call while it runs"):
+        sm.execute()
+    sm.request_preempt()
+    first.join()
+    assert outcomes == ["preempted"]
+    assert clock.now() == 3.0
+
+
+def test_the_end_of_a_run_takes_no_request_from_the_next_one(clock):
+    """The next one begins as soon as the end is told, which the listeners hear one by one."""
+    sm = machine("A", Nap(), nested=False)
+    smachpy.set_options(sm, on_enter=lambda _: clock.sleep(1.0))
+    unsubscribe = sm.subscribe(
+        lambda event: clock.sleep(1.0) if isinstance(event, Finished) else None
+    )
+    outcomes = []
+    first = clock.spawn(lambda: outcomes.append(sm.execute()), name="first")
+    clock.sleep(11.25)  # on_enter, the nap, and a part of the listener
+    unsubscribe()
+    second = clock.spawn(lambda: outcomes.append(sm.execute()), name="second")
+    clock.call_later(0.5, sm.request_preempt)  # before the first call has returned
+    for task in (first, second):
+        task.join()
+    assert outcomes == ["done", "preempted"]
+    assert clock.now() < 14.0
 
 
 def test_branches_of_one_machine_that_share_a_function_are_refused_still():
