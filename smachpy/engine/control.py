@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from actionlib_core.clock import Event
     from smachpy.engine.described import Child, Parent
     from smachpy.engine.frame import Frame, Run
+    from smachpy.engine.preempt import Visit
     from smachpy.engine.step import Step, Timeout
 
 __all__ = ["Control", "ControlError"]
@@ -288,7 +289,7 @@ class Control:
             return  # it has a goal, perhaps, which it is to cancel
         # A breakpoint pauses the whole machine, not only this branch.
         if (path, None) in self._breakpoints:
-            self._pause()
+            self._pause_at(frame, frame.visit)
             reason = "breakpoint"
         else:
             reason = "step" if self._steps else "pause"
@@ -310,8 +311,9 @@ class Control:
         Blocks: as `pass_gate`.
         """
         self._watch()
-        self._pause()
-        self._hold(frame, path, reason, until)
+        self._pause_at(frame, frame.visit)
+        if self._paused:
+            self._hold(frame, path, reason, until)
 
     def release(self, path: str) -> None:
         """Wake the state at `path`, if it waits, to check whether it was called off."""
@@ -322,15 +324,30 @@ class Control:
     def note_outcome(self, frame: Frame, step: Step, outcome: object) -> None:
         """Pause after `step` if there is a breakpoint on this outcome of it."""
         if (f"{frame.path}/{step.label}", outcome) in self._breakpoints:
-            self._pause()
+            self._pause_at(frame, None)
 
     def _pause(self, stop: object | None = None) -> None:
-        with self._lock:
-            changed, self._paused = not self._paused, True
-            self._stop = stop or self._stop
+        changed = self._begin_pause(stop)
         self._watch()  # a run that has begun meanwhile has not seen it
         if changed:
             self._call_listeners()
+
+    def _pause_at(self, frame: Frame, visit: Visit | None) -> None:
+        """Pause, unless the container of `frame`, or the child in `visit`, is asked to stop.
+
+        Nothing would start there any more, and what cleans up after the stop would be held.
+        """
+        with frame.run.lock:  # a request to stop comes before this, or it ends the pause
+            changed = not _is_asked(frame, visit) and self._begin_pause()
+        if changed:
+            self._call_listeners()
+
+    def _begin_pause(self, stop: object | None = None) -> bool:
+        """Let what starts next wait; return whether it would not have waited."""
+        with self._lock:
+            changed, self._paused = not self._paused, True
+            self._stop = stop or self._stop
+        return changed
 
     def _cancel(self, why: str, *, written: bool = True) -> None:
         with asking("operator", "", why):
@@ -377,9 +394,8 @@ class Control:
         event = frame.run.clock.event(f"control of {path}")
         with self._lock:
             self._waiting[path] = event
-        container = frame.container
         # Registered before the first look at the flags below: a preempt sets the event.
-        forget = on_preempt(container, event.set)
+        forget = on_preempt(frame.container, event.set)
         frame.emit(Paused, reason)
         halted = list(_timeouts_above(frame))
         for timeout in halted:
@@ -388,9 +404,8 @@ class Control:
             # Its own has not begun here, but in the journal: a resumed run reads it there.
             frame.run.journal.halted(path)
             while self._paused and not self._take_step():
-                visit = frame.visit
                 # Called off: the caller sees the same flags and does not start the state.
-                if container._preempt_requested or (visit is not None and visit.is_asked()):
+                if _is_asked(frame, frame.visit):
                     return
                 if until is not None and until():
                     return
@@ -468,6 +483,11 @@ def _inner_frame(state: Child) -> Frame | None:
     """Return the frame of a running container; None for any other state."""
     data = state._smachpy
     return data.live.frame if isinstance(data, ContainerData) else None
+
+
+def _is_asked(frame: Frame, visit: Visit | None) -> bool:
+    """Return whether the container of `frame`, or its child in `visit`, is asked to stop."""
+    return frame.container._preempt_requested or (visit is not None and visit.is_asked())
 
 
 def _timeouts_above(frame: Frame) -> Iterator[Timeout]:

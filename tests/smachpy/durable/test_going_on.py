@@ -351,6 +351,31 @@ def test_an_operator_is_asked(store: KillingStore, world: TwoNodes) -> None:
     assert go_on(store, machine) == "late"
 
 
+def test_a_question_of_a_mission_that_was_cancelled_does_not_hold_its_clean_up(
+    store: KillingStore, world: TwoNodes
+) -> None:
+    """The pause of the question outlasted it, although the state had been asked to stop before."""
+
+    def build() -> StateMachine:
+        machine = machine_of(Doing(killed, resume="ask"))
+        machine.add_cleanup("DOCK", Doing(dock))
+        return machine
+
+    docked: list[float] = []
+
+    def dock(*_: object) -> str:
+        docked.append(world.clock.now())
+        return "ok"
+
+    kill(store, build())
+    store.request_cancel("m")
+    machine, begun = build(), world.clock.now()
+    world.clock.call_later(60.0, machine.control.resume)
+    assert go_on(store, machine) == "preempted"
+    assert len(docked) == 1
+    assert docked[0] < begun + 60.0
+
+
 # -- userdata ----------------------------------------------------------------------------------
 
 

@@ -591,6 +591,45 @@ def test_a_pause_after_the_stop_holds_the_tidy_up(clock):
     assert clock.now() == 10.0
 
 
+def asks_in_a_callback(clock, sm):
+    sm.control.add_breakpoint("/P/B")
+    sm.register_transition_cb(lambda *_: sm.request_preempt())
+
+
+def finishes_after_the_request(clock, sm):
+    sm.control.add_breakpoint("/P/A", "ok")
+    clock.call_later(0.5, sm.request_preempt)
+
+
+def answers_the_request(clock, sm):
+    sm.control.add_breakpoint("/P/A", "preempted")
+    clock.call_later(0.5, sm.request_preempt)
+
+
+@pytest.mark.parametrize("finishes", [False, True])
+@pytest.mark.parametrize(
+    "asks", [asks_in_a_callback, finishes_after_the_request, answers_the_request]
+)
+def test_a_breakpoint_after_the_stop_does_not_hold_the_clean_up(clock, asks, finishes):
+    """Nothing was to start there any more: the robot did not dock until it was asked again."""
+
+    class Ends(Work):
+        def execute(self, userdata):
+            super().execute(userdata)
+            return "ok" if finishes else "preempted" if self.preempt_requested() else "ok"
+
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    sm.add("A", Ends(), {"ok": "B"})
+    sm.add("B", Work())
+    sm.add_cleanup("DOCK", Work())
+    asks(clock, sm)
+    at(clock, (60.0, sm.control.resume))
+    assert sm.execute() == "preempted"
+    assert clock.now() == (2.0 if asks is asks_in_a_callback else 1.5)
+    assert sm["DOCK"].runs == 1
+    assert sm["B"].runs == 0
+
+
 def test_the_stop_of_a_part_leaves_the_machine_paused(clock):
     sm = mission()
     at(
