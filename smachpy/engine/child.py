@@ -127,8 +127,6 @@ def _watched(frame: Frame, step: Step) -> Any:
     except Interruption:  # of a listener: the child has ended, which counts
         if frame.dead:
             raise
-    if run.control is not None:
-        run.control.note_outcome(frame, step, outcome)
     return outcome
 
 

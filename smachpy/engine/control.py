@@ -323,7 +323,8 @@ class Control:
 
     def note_outcome(self, frame: Frame, step: Step, outcome: object) -> None:
         """Pause after `step` if there is a breakpoint on this outcome of it."""
-        if (f"{frame.path}/{step.label}", outcome) in self._breakpoints:
+        path = f"{frame.path}/{step.label}"
+        if isinstance(outcome, str) and (path, outcome) in self._breakpoints:
             self._pause_at(frame, None)
 
     def _pause(self, stop: object | None = None) -> None:
@@ -338,7 +339,8 @@ class Control:
         Nothing would start there any more, and what cleans up after the stop would be held.
         """
         with frame.run.lock:  # a request to stop comes before this, or it ends the pause
-            changed = not _is_asked(frame, visit) and self._begin_pause()
+            is_over = frame.dead or _is_asked(frame, visit)
+            changed = not is_over and self._begin_pause()
         if changed:
             self._call_listeners()
 

@@ -867,6 +867,8 @@ def end_visit(frame: Frame, outcome: Any) -> Decision:
     step, visit, container = frame.step, frame.visit, frame.container
     assert visit is not None
     state: Child = step.state
+    if frame.run.control is not None and visit.phase not in NOT_STARTED:
+        frame.run.control.note_outcome(frame, step, outcome)
     with frame.run.lock:  # a request is passed on completely before or after this, never in between
         if frame.dead:
             raise Interruption

@@ -630,6 +630,57 @@ def test_a_breakpoint_after_the_stop_does_not_hold_the_clean_up(clock, asks, fin
     assert sm["B"].runs == 0
 
 
+def test_a_breakpoint_on_preempted_holds_also_if_the_state_was_interrupted(clock):
+    class Deaf(Work):
+        def execute(self, userdata):
+            clock.sleep(50.0)
+
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    sm.add("A", Deaf(), {"preempted": "B"})
+    sm.add("B", Work())
+    smachpy.set_options(sm["A"], preempt_timeout=1.0)
+    sm.control.add_breakpoint("/P/A", "preempted")
+    at(clock, (1.0, lambda: sm.control.preempt("/P/A")), (9.0, sm.control.resume))
+    assert sm.execute() == "ok"
+    assert clock.now() == 10.0
+
+
+def test_a_breakpoint_on_an_outcome_holds_also_if_the_state_runs_already(clock):
+    """It was the first use of the control, in a run that nobody watched."""
+    sm = smachpy.StateMachine(["ok", "failed", "preempted"], name="P")
+    sm.add("A", Work(), {"ok": "B"})
+    sm.add("B", Work())
+    at(clock, (0.5, lambda: sm.control.add_breakpoint("/P/A", "ok")))
+    at(clock, (9.0, lambda: sm.control.resume()))
+    assert sm.execute() == "ok"
+    assert clock.now() == 10.0
+
+
+def test_a_held_state_that_is_called_off_meets_no_breakpoint_on_its_outcome(clock):
+    """It has not run, so it has not ended either."""
+    sm = mission()
+    sm.control.pause()
+    sm.control.add_breakpoint("/P/A", "preempted")
+    sm.events.clear()
+    at(
+        clock,
+        (1.0, lambda: sm.control.preempt("/P/A")),
+        (1.0, lambda: sm.control.resume()),
+        (9.0, lambda: sm.control.resume()),
+    )
+    assert sm.execute() == "preempted"
+    assert clock.now() == 1.0
+
+
+def test_a_wrong_outcome_is_told_also_where_an_operator_controls_the_machine(clock):
+    """The error was that of looking for a breakpoint on it: a list cannot be in a set."""
+    sm = smachpy.StateMachine(["ok"], name="P")
+    sm.add("A", smachpy.CBState(lambda _: ["ok"], outcomes=["ok"]))
+    sm.control.add_breakpoint("/P/A", "ok")
+    with pytest.raises(smachpy.InvalidTransitionError, match=r"got \['ok'\]"):
+        sm.execute()
+
+
 def test_the_stop_of_a_part_leaves_the_machine_paused(clock):
     sm = mission()
     at(
