@@ -166,6 +166,7 @@ class Visit:
             if not self._frame.dead:
                 if self.is_asked():
                     self._frame.run.journal.recalled(self._frame.here())
+                self.override = None  # an operator's choice was part of the request
                 self.happen(Event.RECALL)
 
     def settle(self) -> None:

@@ -346,6 +346,33 @@ def test_what_an_operator_has_chosen_is_known_when_the_state_hears_that_it_is_as
     assert seen == [choice]
 
 
+@pytest.mark.parametrize(
+    "choose",
+    [
+        lambda control: control.force_outcome("/P/DRIVE", "failed"),
+        lambda control: control.pause(running="cancel"),
+    ],
+    ids=["force", "pause"],
+)
+def test_a_request_that_a_state_withdraws_takes_the_operators_choice_with_it(clock, choose):
+    """The next request, of somebody else, ended it with the outcome of the first."""
+
+    class Recalls(Slows):
+        def execute(self, userdata):
+            self.wait_preempt()
+            self.recall_preempt()
+            return super().execute(userdata)
+
+    drive = Recalls()
+    both = beside(drive)
+    at(clock, (0.5, lambda: choose(both.control)), (9.0, both.control.resume))
+    ends = []
+    both.subscribe(lambda event: ends.append(event) if isinstance(event, OutcomeForced) else None)
+    assert both.execute() == "ok"
+    assert ends == []
+    assert drive.runs == 1
+
+
 def test_jump_preempts_what_runs_and_goes_there(clock):
     sm = mission()
     at(clock, (0.5, lambda: sm.control.jump("/P/Z")))
