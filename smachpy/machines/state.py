@@ -233,8 +233,11 @@ class State:
         data.changed()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the attributes for a copy of the state, with a copy of its data."""
-        return {**vars(self), "_smachpy": self._smachpy.copy()}
+        """Return the attributes for a copy of the state, with a copy of its data.
+
+        A request to stop is not meant for the copy.
+        """
+        return {**vars(self), "_preempt_requested": False, "_smachpy": self._smachpy.copy()}
 
     # The argument has SMACH's name at run time; for type checkers a subclass may call it anything.
     if TYPE_CHECKING:

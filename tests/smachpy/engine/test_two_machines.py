@@ -7,6 +7,7 @@ import copy
 import pytest
 
 import smachpy
+from actionlib_core.clock import current_clock
 from smachpy import CBState, Concurrence, InvalidStateError, State, StateMachine
 from smachpy.events import Finished, Started
 
@@ -100,6 +101,39 @@ def test_a_copy_of_a_function_state_is_one_as_well(clock, state):
     first = machine("A", copy.copy(state), nested=False)
     second = machine("B", first.get_children()["IN"], nested=True)
     assert run_both(clock, first, second) == {"A": "preempted", "B": "done"}
+
+
+def brakes(_userdata):
+    if smachpy.current_state().sleep(10.0):
+        current_clock().sleep(5.0)
+        return "preempted"
+    return "done"
+
+
+def running_copies():
+    state = smachpy.state(outcomes=ENDS)(brakes)
+    return machine("A", state, nested=True), lambda _: machine("B", state, nested=True)
+
+
+def deep_copies():
+    return machine("A", CBState(brakes, outcomes=ENDS), nested=True), copy.deepcopy
+
+
+@pytest.mark.parametrize("make", [running_copies, deep_copies])
+@pytest.mark.parametrize("asked", [2.0, None], ids=["running", "before its run"])
+def test_a_copy_of_what_was_asked_to_stop_is_not_asked(clock, make, asked):
+    """The flag was copied, so the other machine ended at once, although nobody had asked it."""
+    first, other = make()
+    if asked is None:
+        first.request_preempt()
+    else:
+        clock.call_later(asked, first.request_preempt)
+        task = clock.spawn(first.execute, name="first")
+        clock.sleep(asked + 1.0)
+    second = other(first)
+    assert second.execute() == "done"
+    if asked is not None:
+        task.join()
 
 
 def test_two_machines_that_share_nothing_run_as_ever(clock):
