@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tests.browser import wait_for
+
 pytestmark = pytest.mark.browser
 
 
@@ -129,12 +131,12 @@ def test_any_number_is_plotted_and_the_choice_is_kept_and_linked(page):
     address = page.evaluate("() => smachpy.page.address.text")
     page.wait_for_function("() => location.hash === new URL(smachpy.page.address.text).hash")
     page.reload()
-    page.wait_for_selector(".plot")
+    wait_for(page, "smachpy.store.panels.plotsChosen.value")  # other plots are there before
     assert page.evaluate("() => smachpy.store.panels.plotsChosen.value") == chosen
     page.evaluate("() => { localStorage.clear(); }")
     page.goto("about:blank")
     page.goto(address)
-    page.wait_for_selector(".plot")
+    wait_for(page, "smachpy.store.panels.plotsChosen.value")  # other plots are there before
     assert page.evaluate("() => smachpy.store.panels.plotsChosen.value") == chosen
 
 
