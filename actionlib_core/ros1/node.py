@@ -107,14 +107,20 @@ class Subscription:
                 self._links[uri].wake.set()
             if self._closed:
                 return
-            for uri in change.connect:
+            # With those for which there was no room or thread when they came.
+            for uri in change.connect | (self.publishers.there - self._links.keys()):
                 if uri in self._links:
                     self._links[uri].wake.set()
                 elif not self._node.has_room():
                     break
                 else:
-                    self._links[uri] = link = _Link(self._node, self, uri)
-                    link.start()
+                    link = _Link(self._node, self, uri)
+                    try:
+                        link.start()
+                    except RuntimeError as error:  # no thread can be started, the system's limit
+                        self._node.report("links", Ros1Error(self.topic, f"{uri}: {error}"))
+                        break
+                    self._links[uri] = link  # its thread waits for the lock
 
     def update(self, uris: Iterable[str]) -> None:
         """Handle a list of publishers from the master."""

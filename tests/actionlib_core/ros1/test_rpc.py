@@ -326,6 +326,31 @@ def test_publishers_of_all_topics_together_start_few_threads(clock, caplog, monk
         node.close()
 
 
+def test_publisher_for_which_no_thread_can_be_started_is_tried_with_the_next_list(
+    clock, caplog, monkeypatch
+):
+    """It counted as connected, and was never heard."""
+    node = Ros1Node("/bridge", "http://127.0.0.1:9", clock=clock)
+    subscription = node.subscribe("/chatter", lambda _header: None)
+    uri = "http://127.0.0.1:1/"
+    spawn = node.spawn
+
+    def fail(*_args):
+        monkeypatch.setattr(node, "spawn", spawn)
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(node, "spawn", fail)
+    try:
+        subscription.update([uri])
+        assert not subscription._links
+        assert "can't start new thread" in caplog.text
+        subscription.update([uri])
+        assert list(subscription._links) == [uri]
+    finally:
+        subscription.close()
+        node.close()
+
+
 def test_a_subscriber_that_has_the_header_gets_every_message(clock, monkeypatch):
     """What was published before the bridge's thread ran again did not come."""
     published = threading.Event()
