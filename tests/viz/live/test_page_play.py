@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import PIL.Image
 import pytest
+
+from tests.viz.live.test_page_layout import nested
 
 pytestmark = pytest.mark.browser
 
@@ -297,6 +300,44 @@ def test_the_last_seconds_are_saved_as_a_gif_without_moving_anything(served, loo
     assert 2 < film.count(b"\x21\xf9\x04") <= 11  # 5 pictures a second, fewer where nothing changes
     page.wait_for_selector(".share button:has-text('GIF'):enabled")
     assert page.evaluate(SHOWN).startswith("00:3")
+
+
+def test_a_film_of_a_large_machine_has_its_tiles_without_an_image_of_all_elements(
+    served, look, tmp_path
+):
+    """An image of thousands of elements took seconds for each picture."""
+    moves = [("Started", "/TOP"), ("Entered", "/TOP/S3"), ("Entered", "/TOP/S3/S7")]
+    later = [
+        ("Entered", "/TOP/S3/S7/S5", {"at": 2.0}),
+        ("Left", "/TOP/S3/S7/S5", {"outcome": "done", "at": 4.0}),
+    ]
+    served.add("big", sm=nested(10, 2), events=[*moves, *later])
+    page = look(served.start())
+    page.evaluate(
+        """() => { const { page, store } = smachpy, { prototype } = Image, real = prototype.decode;
+          window.images = 0; window.told = new Set();
+          prototype.decode = function () { window.images += 1; return real.call(this); };
+          store.playback.filmed.subscribe((part) => window.told.add(part));
+          store.playback.selectStretch(store.data.run.first() + 1000, store.data.run.first() + 3000);
+          page.layouts.setDepth(99); return page.layouts.running; }"""
+    )
+    with page.expect_download() as download:
+        page.click(".share button:has-text('GIF')")
+    download.value.save_as(tmp_path / "run.gif")
+    images, told = page.evaluate("() => [window.images, [...window.told]]")
+    assert images == 0
+    assert len([part for part in told if part and part < 100]) > 5  # it told how far it was
+    x, y = page.evaluate(
+        """() => { const { diagram, map, view: { x, y, k } } = smachpy.page;
+          const box = diagram.boxOf("/TOP/S3/S7/S5"), part = Math.min(1, 960 / (diagram.svg.clientWidth + map.canvas.clientWidth));
+          return [(x + (box.x + box.w / 8) * k) * part, (32 + y + (box.y + box.h / 2) * k) * part].map(Math.round); }"""
+    )
+    with PIL.Image.open(tmp_path / "run.gif") as film:
+        colours = []
+        for number in (0, film.n_frames - 1):
+            film.seek(number)
+            colours.append(film.convert("RGB").getpixel((x, y)))
+    assert colours[0] != colours[1]  # the state runs in the last one
 
 
 def test_a_film_can_be_stopped_and_freezes_nothing(served, look):

@@ -4677,6 +4677,7 @@ var Picture = class {
       glyph: { element: glyph, text: "" },
       part: 0,
       label: "",
+      isBlank: false,
       node
     });
   }
@@ -4849,6 +4850,9 @@ var Diagram = class {
   paint(path, state, now, goal, noServer = false) {
     const view2 = this.picture.states.get(path);
     if (!view2 || isPartOfNet(view2.node)) return;
+    const isBlank = !state && !goal;
+    if (isBlank && view2.isBlank) return;
+    view2.isBlank = isBlank;
     const active = state?.since != null;
     const asked2 = active && Boolean(state?.preempt);
     const kind = state?.outcome != null ? endClass(view2.node, state.outcome) : null;
@@ -10445,11 +10449,51 @@ function targetOf(e4) {
   return link2 && link2.target !== e4.outcome ? ` → ${shorten(link2.target)}` : "";
 }
 
+// src/drawing/sketch.ts
+var LEAST = 6;
+var NAME = 11;
+function sketch(g5, diagram, { x: x3, y: y5, k: k4 }, part) {
+  const looks = /* @__PURE__ */ new Map();
+  g5.save();
+  g5.beginPath();
+  g5.rect(0, 0, part.w, part.h);
+  g5.clip();
+  g5.translate(x3, y5);
+  g5.scale(k4, k4);
+  for (const [path, { group, frame, node }] of diagram.picture.states) {
+    const box = diagram.boxOf(path);
+    const title = group.querySelector(".title, .name");
+    if (!box || !title) continue;
+    const [left, top, w5, h5] = [box.x * k4 + x3, box.y * k4 + y5, box.w * k4, box.h * k4];
+    if (left > part.w || top > part.h || left + w5 < 0 || top + h5 < 0) continue;
+    const name = `${group.getAttribute("class")} ${node.depth}`;
+    let look = looks.get(name);
+    if (!look) {
+      const { fill, stroke, strokeWidth } = getComputedStyle(frame);
+      look = { fill, stroke, width: Number.parseFloat(strokeWidth), ink: getComputedStyle(title).fill };
+      looks.set(name, look);
+    }
+    g5.fillStyle = look.fill;
+    g5.fillRect(box.x, box.y, box.w, box.h);
+    g5.strokeStyle = look.stroke;
+    g5.lineWidth = look.width;
+    g5.strokeRect(box.x, box.y, box.w, box.h);
+    const own2 = Number.parseFloat(title.style.fontSize);
+    if ((own2 || NAME) * k4 < LEAST) continue;
+    g5.fillStyle = look.ink;
+    g5.font = `620 ${own2 || NAME}px Inter, Arial, sans-serif`;
+    g5.textBaseline = own2 ? "middle" : "alphabetic";
+    g5.fillText(node.shown, Number(title.getAttribute("x")), Number(title.getAttribute("y")));
+  }
+  g5.restore();
+}
+
 // src/drawing/film.ts
 var LAST_MS = 2e4;
 var WIDEST = 960;
 var HEAD5 = 32;
 var FONTS_MS = 150;
+var MOST_IN_IMAGE = 1e3;
 async function saveFilm(page2) {
   const { run } = store.data;
   store.playback.playing.value = null;
@@ -10505,8 +10549,9 @@ async function paint(page2, canvas2, style, isFirst) {
   const scale = Math.min(1, WIDEST / wide);
   const [width, height] = [wide * scale, (HEAD5 + stage.h + below) * scale].map(Math.round);
   if (isFirst) Object.assign(canvas2, { width, height });
-  let picture = await pictureOf(svg2, style);
-  if (isFirst) {
+  const isLarge = page2.diagram.picture.states.size > MOST_IN_IMAGE;
+  let picture = isLarge ? null : await pictureOf(svg2, style);
+  if (picture && isFirst) {
     await new Promise((done) => setTimeout(done, FONTS_MS));
     picture = await pictureOf(svg2, style);
   }
@@ -10524,7 +10569,12 @@ async function paint(page2, canvas2, style, isFirst) {
   g5.font = "600 15px 'JetBrains Mono', monospace";
   g5.fillText(store.clock.instantText(store.playback.nowMs()), wide - 12, HEAD5 / 2);
   g5.textAlign = "left";
-  g5.drawImage(picture, 0, HEAD5, stage.w, stage.h);
+  if (picture) g5.drawImage(picture, 0, HEAD5, stage.w, stage.h);
+  else {
+    g5.translate(0, HEAD5);
+    sketch(g5, page2.diagram, page2.view, stage);
+    g5.translate(0, -HEAD5);
+  }
   if (floor3.clientWidth) g5.drawImage(floor3, stage.w, HEAD5, floor3.clientWidth, floor3.clientHeight);
   if (below) g5.drawImage(timeline, 0, HEAD5 + stage.h, wide, below);
 }

@@ -76,6 +76,9 @@ export class Diagram {
   ) {
     const view = this.picture.states.get(path);
     if (!view || isPartOfNet(view.node)) return;
+    const isBlank = !state && !goal;
+    if (isBlank && view.isBlank) return;
+    view.isBlank = isBlank;
     const active = state?.since != null;
     const asked = active && Boolean(state?.preempt);
     const kind = state?.outcome != null ? endClass(view.node, state.outcome) : null;

@@ -7,12 +7,14 @@ import { messageOf } from "#core/requests.ts";
 import { saveFile } from "#core/share.ts";
 import { store } from "#core/store.ts";
 import type { Page } from "#drawing/page.ts";
+import { sketch } from "#drawing/sketch.ts";
 import { isDark } from "#drawing/theme.ts";
 
 const LAST_MS = 20_000; // length of the film if no stretch is selected
 const WIDEST = 960; // [px]
 const HEAD = 32; // height of the line with the machine's name and the instant [px]
 const FONTS_MS = 150; // until then the font of the first picture may not be loaded
+const MOST_IN_IMAGE = 1000; // states; an image of more takes longer than a second
 
 /** Save a film of the selected stretch, otherwise of the last seconds before the instant shown. */
 export async function saveFilm(page: Page) {
@@ -78,8 +80,9 @@ async function paint(page: Page, canvas: HTMLCanvasElement, style: string, isFir
   const scale = Math.min(1, WIDEST / wide);
   const [width, height] = [wide * scale, (HEAD + stage.h + below) * scale].map(Math.round);
   if (isFirst) Object.assign(canvas, { width, height });
-  let picture = await pictureOf(svg, style);
-  if (isFirst) {
+  const isLarge = page.diagram.picture.states.size > MOST_IN_IMAGE;
+  let picture = isLarge ? null : await pictureOf(svg, style);
+  if (picture && isFirst) {
     await new Promise((done) => setTimeout(done, FONTS_MS));
     picture = await pictureOf(svg, style);
   }
@@ -97,7 +100,12 @@ async function paint(page: Page, canvas: HTMLCanvasElement, style: string, isFir
   g.font = "600 15px 'JetBrains Mono', monospace";
   g.fillText(store.clock.instantText(store.playback.nowMs()), wide - 12, HEAD / 2);
   g.textAlign = "left";
-  g.drawImage(picture, 0, HEAD, stage.w, stage.h);
+  if (picture) g.drawImage(picture, 0, HEAD, stage.w, stage.h);
+  else {
+    g.translate(0, HEAD);
+    sketch(g, page.diagram, page.view, stage);
+    g.translate(0, -HEAD);
+  }
   if (floor.clientWidth) g.drawImage(floor, stage.w, HEAD, floor.clientWidth, floor.clientHeight);
   if (below) g.drawImage(timeline, 0, HEAD + stage.h, wide, below);
 }

@@ -22,6 +22,7 @@ export type StateView = {
   bar: SVGElement | null;
   part: number;
   label: string;
+  isBlank: boolean; // painted as a state that has not run: most are in a large machine
   node: StateNode;
 };
 export type TextOf = { element: SVGElement; text: string };
@@ -197,6 +198,7 @@ export class Picture {
       glyph: { element: glyph, text: "" },
       part: 0,
       label: "",
+      isBlank: false,
       node,
     });
   }
