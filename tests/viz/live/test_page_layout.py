@@ -174,6 +174,45 @@ def test_too_many_states_for_arrows_are_tiles_where_the_running_ones_are_lit(ser
     wait_for(page, "smachpy.store.view.overview.value")
 
 
+def test_many_branches_are_cards_and_one_bracket_counts_them(served, look):
+    labels = [f"ROBOT_{n}" for n in range(8)]
+    fleet = Concurrence(
+        outcomes=["done", "stuck"],
+        default_outcome="stuck",
+        outcome_map={"done": dict.fromkeys(labels, "done")},
+        name="FLEET",
+    )
+    with fleet:
+        for label in labels:
+            Concurrence.add(label, CBState(lambda _: "done", outcomes=["done"]))
+    begun = [("Entered", f"/FLEET/{label}") for label in labels]
+    left = [("Left", f"/FLEET/{label}", {"outcome": "done"}) for label in labels[:3]]
+    served.add(
+        "fleet", sm=fleet, events=[("Started", "/FLEET"), ("Entered", "/FLEET"), *begun, *left]
+    )
+    page = look(served.start())
+    assert page.locator("g.leaf.card").count() == 8
+    assert page.locator(".diagram rect.join").count() == 1
+    wait_for(page, "document.querySelector('.label.joined').textContent.includes('3 of 8')")
+    assert page.locator("g.leaf.card.active").count() == 5
+
+
+def test_transitions_of_many_states_to_one_outcome_are_told_there_with_their_number(served, look):
+    sm = StateMachine(outcomes=["done", "failed"], name="JOB")
+    names = [f"STEP_{n}" for n in range(8)]
+    with sm:
+        for one, after in zip(names, [*names[1:], "done"], strict=True):
+            state = CBState(lambda _: "ok", outcomes=["ok", "failed"])
+            StateMachine.add(one, state, {"ok": after, "failed": "failed"})
+    served.add("one", sm=sm)
+    page = look(served.start())
+    all_levels(page)
+    told = page.locator(".pill text").all_text_contents()
+    assert sorted(told) == ["done", "failed, from 8"]
+    assert page.locator("path.edge.failure").count() == 0
+    assert page.locator("path.edge").count() == 9  # the beginning, and what leads on
+
+
 def linked(count):
     """States of which each leads to each."""
     outcomes = [f"to {n}" for n in range(count)]
@@ -360,7 +399,7 @@ def test_an_outline_is_offered_where_names_are_small(served, look):
     wait_for(page, "smachpy.page.view.k < 0.9")
     outline.click()
     wait_for(page, "smachpy.store.view.opened.value.size === 1")
-    wait_for(page, "!smachpy.store.view.namesAreSmall.value")
+    wait_for(page, "!smachpy.store.view.textIsSmall.value")
     outline.wait_for(state="detached")
 
 
@@ -380,6 +419,29 @@ def test_the_outline_of_one_level_is_tiles_with_larger_names_and_back(served, lo
     assert page.locator("path.edge").count() > 20
 
 
+@pytest.mark.parametrize(
+    ("tiles", "scale", "offered"),
+    [(False, 1.15, True), (False, 1.25, False), (True, 1.15, False), (True, 0.95, True)],
+)
+def test_less_is_offered_where_labels_of_arrows_are_small_or_names_of_tiles(
+    served, look, tiles, scale, offered
+):
+    """Labels have 11 px at a scale of 1.22, names at 1."""
+    served.add("long", labels="ABC")
+    page = look(served.start())
+    font, is_small = page.evaluate(
+        """async ([tiles, scale]) => { const { page: { layouts, view }, store } = smachpy;
+          await layouts.running;
+          if (tiles) { layouts.toggleOutline(); await layouts.running; }
+          view.set(0, 0, scale);
+          const text = document.querySelector(tiles ? ".diagram .name" : ".diagram :is(.label, .outcome)");
+          return [parseFloat(getComputedStyle(text).fontSize), store.view.textIsSmall.value]; }""",
+        [tiles, scale],
+    )
+    assert font == (11 if tiles else 9)
+    assert is_small is offered
+
+
 @pytest.mark.parametrize(("width", "offered"), [(1024, True), (1440, False)])
 def test_where_the_tree_is_hidden_it_is_offered_for_tiles_with_small_names(
     served, look, width, offered
@@ -388,7 +450,7 @@ def test_where_the_tree_is_hidden_it_is_offered_for_tiles_with_small_names(
     page = look(served.start())
     page.set_viewport_size({"width": width, "height": 700})
     all_levels(page)
-    wait_for(page, "smachpy.store.view.namesAreSmall.value")
+    wait_for(page, "smachpy.store.view.textIsSmall.value")
     tree = page.locator(".zoom .of-tree")
     tree.wait_for(state="attached")
     assert tree.is_visible() is offered  # else the tree stands beside the machine

@@ -3321,6 +3321,7 @@ var asks = (data) => Object.values(data.states).some(({ since, question }) => si
 
 // src/core/store/view.ts
 var AROUND = 60;
+var SMALL = { names: 0.98, labels: 1.22 };
 var NOTICE_MS = { info: 3e3, error: 8e3 };
 var View = class {
   pageShown = y3("machine");
@@ -3346,8 +3347,10 @@ var View = class {
   // the name under which answers are given
   tokenAsked = y3(false);
   // whether the viewer refused this page's token
-  namesAreSmall = y3(false);
-  // names of states in the diagram, under 11 px
+  scale = y3(1);
+  // of the diagram
+  /** Whether names of states, or labels of arrows where there are any, have less than 11 px. */
+  textIsSmall = O(() => this.scale.value < (this.overview.value ? SMALL.names : SMALL.labels));
   treeOpen = y3(false);
   // on small screens, where the tree covers the page
   outline = y3(false);
@@ -7984,7 +7987,6 @@ function describe2(span) {
 }
 
 // src/drawing/page.ts
-var READABLE4 = 0.98;
 var Page = class {
   map;
   diagram;
@@ -8011,7 +8013,7 @@ var Page = class {
     this.diagram = new Diagram(svg2, (path, active) => this.minimap.light(path, active));
     this.view = new Viewport(svg2, this.diagram.world, () => {
       this.diagram.showScale(this.view.k);
-      store.view.namesAreSmall.value = this.view.k < READABLE4;
+      store.view.scale.value = this.view.k;
       this.minimap.showWindow(this.view);
     });
     this.timeline = new Timeline(canvas2, {
@@ -17738,7 +17740,7 @@ function TimeTools() {
 }
 function ZoomButtons() {
   const { view: view2 } = store;
-  const small = view2.namesAreSmall.value;
+  const small = view2.textIsSmall.value;
   const on2 = view2.outline.value;
   const isLeast = view2.overview.value && view2.opened.value.size < 2;
   const showTree = () => {
@@ -17750,7 +17752,7 @@ function ZoomButtons() {
       {
         class: on2 ? "offer on" : "offer",
         "aria-pressed": on2,
-        title: on2 ? "show the arrows again" : "the names are small: show less of the machine",
+        title: on2 ? "show the arrows again" : "names or labels are small: show less of the machine",
         onClick: () => page.layouts.toggleOutline(),
         children: "Outline"
       }

@@ -120,7 +120,7 @@ function TimeTools() {
 
 function ZoomButtons() {
   const { view } = store;
-  const small = view.namesAreSmall.value;
+  const small = view.textIsSmall.value;
   const on = view.outline.value;
   const isLeast = view.overview.value && view.opened.value.size < 2; // the picture cannot show less
   const showTree = () => {
@@ -132,7 +132,7 @@ function ZoomButtons() {
         <button
           class={on ? "offer on" : "offer"}
           aria-pressed={on}
-          title={on ? "show the arrows again" : "the names are small: show less of the machine"}
+          title={on ? "show the arrows again" : "names or labels are small: show less of the machine"}
           onClick={() => page.layouts.toggleOutline()}
         >
           Outline

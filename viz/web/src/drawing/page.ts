@@ -21,8 +21,6 @@ import { applyTheme, systemIsDark } from "#drawing/theme.ts";
 import { Timeline } from "#drawing/timeline.ts";
 import { Viewport } from "#drawing/viewport.ts";
 
-const READABLE = 0.98; // scale under which names have less than 11 px
-
 export class Page {
   map: MapView;
   diagram: Diagram;
@@ -55,7 +53,7 @@ export class Page {
     this.diagram = new Diagram(svg, (path, active) => this.minimap.light(path, active));
     this.view = new Viewport(svg, this.diagram.world, () => {
       this.diagram.showScale(this.view.k);
-      store.view.namesAreSmall.value = this.view.k < READABLE;
+      store.view.scale.value = this.view.k;
       this.minimap.showWindow(this.view);
     });
     this.timeline = new Timeline(canvas, {

@@ -1,7 +1,7 @@
 // The choices of the page's user: the page and the state on view, the open containers, the dialogs.
 
 import type { Signal } from "@preact/signals";
-import { signal } from "@preact/signals";
+import { computed, signal } from "@preact/signals";
 import { Model } from "#core/model.ts";
 import type { PageName } from "#core/pages.ts";
 import { save, saved } from "#core/storage.ts";
@@ -9,6 +9,7 @@ import type { Data } from "#core/store/data.ts";
 import type { MachinePayload, StateNode, Theme } from "#core/types.ts";
 
 const AROUND = 60; // states to open around a state of an overview
+const SMALL = { names: 0.98, labels: 1.22 }; // scales of the diagram below which they have less than 11 px
 const NOTICE_MS = { info: 3000, error: 8000 };
 
 export class View {
@@ -26,7 +27,9 @@ export class View {
   readonly sound: Signal<boolean> = signal(saved("sound", true)); // whether a new question makes a sound
   readonly operator: Signal<string> = signal(saved("operator", "")); // the name under which answers are given
   readonly tokenAsked = signal(false); // whether the viewer refused this page's token
-  readonly namesAreSmall = signal(false); // names of states in the diagram, under 11 px
+  readonly scale = signal(1); // of the diagram
+  /** Whether names of states, or labels of arrows where there are any, have less than 11 px. */
+  readonly textIsSmall = computed(() => this.scale.value < (this.overview.value ? SMALL.names : SMALL.labels));
   readonly treeOpen = signal(false); // on small screens, where the tree covers the page
   readonly outline = signal(false); // whether the user wants tiles without arrows, with larger names
   readonly overview = signal(false); // whether states are tiles without arrows, because many are open
