@@ -9181,6 +9181,7 @@ function Goal2({ goal }) {
 }
 
 // src/panels/controls.tsx
+var LONG = 18;
 function Command({
   does,
   onClick,
@@ -9214,6 +9215,7 @@ function OperatorBar() {
   const { paused } = facts;
   if (store.data.run.now.ended != null && !paused) return null;
   const target = targetText();
+  const isLong = target.length > LONG;
   return /* @__PURE__ */ a4("div", { class: "operator", role: "toolbar", "aria-label": `commands to ${target}`, children: [
     /* @__PURE__ */ a4(
       Command,
@@ -9251,7 +9253,7 @@ function OperatorBar() {
       Command,
       {
         id: "preempt",
-        class: "warn",
+        class: isLong ? "warn long" : "warn",
         does: keyOf("preempt", store.data.model.value?.root.path),
         title: `Preempt ${target}`,
         onClick: () => askForPreempt(target),

@@ -21,6 +21,8 @@ import { shorten } from "#core/text.ts";
 import type { StateNode, StateRun } from "#core/types.ts";
 import { fieldValue } from "#panels/components.tsx";
 
+const LONG = 18; // characters of a target, from which it is written in three small lines
+
 /**
  * A button for a command; disabled, with the reason, while no command may be sent, and red after one that failed.
  * @param props `does` is `keyOf` the command, `why` a further reason to disable it
@@ -70,6 +72,7 @@ export function OperatorBar() {
   const { paused } = facts;
   if (store.data.run.now.ended != null && !paused) return null;
   const target = targetText();
+  const isLong = target.length > LONG;
   return (
     <div class="operator" role="toolbar" aria-label={`commands to ${target}`}>
       <Command
@@ -100,7 +103,7 @@ export function OperatorBar() {
       </Command>
       <Command
         id="preempt"
-        class="warn"
+        class={isLong ? "warn long" : "warn"}
         does={keyOf("preempt", store.data.model.value?.root.path)}
         title={`Preempt ${target}`}
         onClick={() => askForPreempt(target)}
