@@ -167,6 +167,31 @@ def test_words_of_questions_are_only_text(served, look, text):
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
 
 
+# Parts of an element, and of what is drawn above it at the middle of its edges.
+APART = """() => { const [card, page] = [".questions", ".home, .fleet, .actions-page"]
+        .map((one) => document.querySelector(one).getBoundingClientRect());
+    const answers = [...document.querySelectorAll(".answer")].map((one) => one.getBoundingClientRect());
+    return { over: Math.min(card.right, page.right) > Math.max(card.left, page.left)
+        && Math.min(card.bottom, page.bottom) > Math.max(card.top, page.top),
+      room: [page.width, page.height], cut: answers.some((one) => one.bottom > innerHeight || one.right > innerWidth),
+      wide: document.documentElement.scrollWidth > innerWidth }; }"""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("size", [(390, 844), (844, 390)])
+@pytest.mark.parametrize("shown", ["runs", "fleet", "actions"])
+def test_a_question_covers_no_page_of_a_phone(served, look, size, shown):
+    served.add("one", events=WAITS)
+    viewport = {"width": size[0], "height": size[1]}
+    page = look(f"{served.start(token='t')}?{shown}#token=t", drawn=False, viewport=viewport)
+    page.wait_for_selector(OPEN)
+    page.wait_for_selector(".home, .fleet, .actions-page")
+    seen = page.evaluate(APART)
+    assert (seen["over"], seen["cut"], seen["wide"]) == (False, False, False)
+    assert seen["room"][0] >= 390
+    assert seen["room"][1] >= 240
+
+
 @pytest.mark.browser
 def test_a_phone_shows_the_question_and_its_buttons_at_once(served, look):
     served.add("one", events=WAITS)
