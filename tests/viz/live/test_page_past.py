@@ -417,6 +417,20 @@ def test_an_old_tab_takes_the_token_of_an_address_that_is_pasted_into_it(served,
     wait_for(page, "document.querySelector('.notice')?.textContent === 'pause: done'")
 
 
+def test_a_page_without_the_token_for_reading_shows_nothing_and_one_with_it_commands_nothing(
+    served, look
+):
+    served.add("one", events=BEGUN, control=CONTROL)
+    address = served.start(token="commander", read_token="reader")
+    stranger = look(address, drawn=False)
+    stranger.wait_for_selector(".token")  # it asks for one
+    assert stranger.locator("g.leaf").count() == 0
+    reader = look(f"{address}#view=reader")
+    assert reader.locator("g.leaf").count() == 2
+    assert "reader" not in reader.url
+    assert reader.query_selector("#pause") is None
+
+
 def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
     served.add("one", events=BEGUN)
     page = look(served.start())
