@@ -201,10 +201,11 @@ class ClientGoalHandle:
 
     def wait_settled(self, timeout: float | None) -> bool:
         """Wait until the goal is settled, `timeout` [s] at most; return whether it is."""
-        with self.manager.lock:
+        manager = self.owner.manager
+        with manager.lock:
             if self.settled:
                 return True
-            settled = self._settled = self._settled or self.manager.clock.event()
+            settled = self._settled = self._settled or manager.clock.event()
         return settled.wait(timeout)
 
     def call(self, state: CommState, callback: Callable[..., object], *args: object) -> None:

@@ -32,6 +32,7 @@ class GoalIDGenerator:
         if name is None:
             name = get_node().name
         self._clock = clock
+        self._wall_time = None if clock is None else wall_time(clock)
         self.name = ""
         self.set_name(name)
 
@@ -46,7 +47,7 @@ class GoalIDGenerator:
     def generate(self) -> tuple[str, int]:
         """Return a new id and its stamp [ns since the epoch], later than those before."""
         clock = self._clock if self._clock is not None else current_clock()
-        stamp_ns = wall_time(clock).stamp_ns()
+        stamp_ns = (self._wall_time or wall_time(clock)).stamp_ns()
         secs, nsecs = divmod(stamp_ns, 1_000_000_000)
         # A virtual clock counts by itself, so that repeated runs of a test have the same ids.
         count = getattr(clock, "numbers", _count)

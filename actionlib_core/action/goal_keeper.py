@@ -119,6 +119,7 @@ class GoalKeeper:
         self.goals = ServerGoals(name, result_timeout=result_timeout)
         self.status = StatusPublisher(node.clock, self.lock, self.goals, port, self._tidy_file_soon)
         self._clock = node.clock
+        self._wall_time = wall_time(node.clock)
         self._cancels_lost = on_client_lost == "cancel"
         self._deliver_goal = deliver_goal
         self._deliver_cancel = deliver_cancel
@@ -500,7 +501,7 @@ class GoalKeeper:
 
     def _check_clock(self, what: str, stamp_ns: int, sender: str) -> None:
         """Warn, once for each sender, of a stamp in the future; see `AHEAD_NS`."""
-        wall_time(self._clock).check()
+        self._wall_time.check()
         ahead_ns = stamp_ns - self._clock.time_ns()
         if ahead_ns <= AHEAD_NS or sender in self._ahead:
             return

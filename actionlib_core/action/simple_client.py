@@ -229,7 +229,7 @@ class SimpleActionClient(Generic[A_co]):
         # Set before sending: a callback may come at once and must see its own goal.
         former, self._handle = self._handle, handle
         try:
-            handle.manager.begin(handle)
+            handle.owner.manager.begin(handle)
             # Only now: if sending has raised an error, the previous goal is still followed.
             if former is not None and not former.goal.over:
                 former.manager.forget(former)
@@ -325,8 +325,7 @@ class SimpleActionClient(Generic[A_co]):
 
         Blocks: until then.
         """
-        no_limit = isinstance(timeout, float) and timeout == 0.0  # the default: spares the checks
-        limit = None if no_limit else self._check_wait("timeout", timeout)
+        limit = self._check_wait("timeout", timeout)
         handle = self._handle
         if handle is None:
             return False
@@ -334,10 +333,12 @@ class SimpleActionClient(Generic[A_co]):
 
     def _wait(self, handle: ClientGoalHandle, limit: float | None) -> bool:
         """Wait for the end of a goal [s]; return whether it is over."""
-        return handle.manager.wait(handle, limit)
+        return handle.owner.manager.wait(handle, limit)
 
     def _check_wait(self, argument: str, timeout: float | Duration | None) -> float | None:
         """Return the limit of a wait for a goal's end; warn of a negative one, as of a mistake."""
+        if isinstance(timeout, float) and timeout == 0.0:  # the default: spares the checks
+            return None
         where = f"action '{self.action_client.ns}'"
         limit = check_wait(where, argument, timeout)
         if limit != 0.0:
