@@ -1,6 +1,6 @@
 """The programs `smachpy` and `actionlib`, which Ctrl-C ends without a traceback from the start on.
 
-A top-level module of its own: `import smachpy` takes 80 ms, much longer on a busy robot, and any
+A top-level module of its own: `import smachpy` takes 55 ms, much longer on a busy robot, and any
 module inside the package is imported only after that. What is to hold meanwhile has to lie outside.
 
 Ctrl-C while Python itself starts (some 20 ms, longer with an editable install) is a traceback of

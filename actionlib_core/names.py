@@ -11,9 +11,8 @@ Source:
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from actionlib_core.exceptions import InvalidNameError, NameSetupError
 
@@ -137,8 +136,7 @@ def resolve_name(
     return remappings.get(full, full)
 
 
-@dataclass(frozen=True, slots=True)
-class RemapRule:
+class RemapRule(NamedTuple):
     """One `from:=to` of a command line.
 
     Attributes:
@@ -152,8 +150,7 @@ class RemapRule:
     node: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class NameArguments:
+class NameArguments(NamedTuple):
     """The arguments about names of a command line.
 
     Attributes:
@@ -194,14 +191,14 @@ class NameArguments:
         return result
 
 
-@dataclass(slots=True)
 class _Collected:
     """The parts of the command line read so far."""
 
-    rules: list[RemapRule] = field(default_factory=list)
-    rest: list[str] = field(default_factory=list)
-    problems: list[str] = field(default_factory=list)
-    parameters: list[str] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.rules: list[RemapRule] = []
+        self.rest: list[str] = []
+        self.problems: list[str] = []
+        self.parameters: list[str] = []
 
     def take_rule(self, text: str, *, node: str = "") -> None:
         """Read one `from:=to`; parameters are stored unchanged, unknown `__settings` ignored."""

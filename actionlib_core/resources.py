@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import threading
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
@@ -28,7 +27,6 @@ Policy: TypeAlias = Literal["wait", "preempt", "refuse"]
 POLICIES: tuple[Policy, ...] = get_args(Policy)
 
 
-@dataclass(slots=True, eq=False)
 class Claim:
     """The wish to hold a resource.
 
@@ -43,26 +41,35 @@ class Claim:
         give: Gives the resource back to other processes, from which the claim has it; or None.
     """
 
-    resource: str
-    policy: Policy
-    around: tuple[object, ...]
-    who: Callable[[], str]
-    stop: Callable[[Claim], object]
-    wake: Event
-    give: Callable[[], object] | None = None
+    def __init__(
+        self,
+        resource: str,
+        policy: Policy,
+        around: tuple[object, ...],
+        who: Callable[[], str],
+        stop: Callable[[Claim], object],
+        wake: Event,
+    ) -> None:
+        self.resource = resource
+        self.policy = policy
+        self.around = around
+        self.who = who
+        self.stop = stop
+        self.wake = wake
+        self.give: Callable[[], object] | None = None
 
     def is_inside(self, other: Claim) -> bool:
         """Return whether the claim is made inside of `other`, or is it."""
         return any(one is other.around[0] for one in self.around)
 
 
-@dataclass(slots=True, eq=False)
 class Resources:
     """The claims on one clock. Threads: any."""
 
-    _holders: dict[str, list[Claim]] = field(default_factory=dict)  # the innermost last
-    _waiting: dict[str, list[Claim]] = field(default_factory=dict)  # the next one first
-    _lock: threading.RLock = field(default_factory=threading.RLock)
+    def __init__(self) -> None:
+        self._holders: dict[str, list[Claim]] = {}  # the innermost last
+        self._waiting: dict[str, list[Claim]] = {}  # the next one first
+        self._lock = threading.RLock()
 
     def claim(self, claim: Claim) -> Claim | None:
         """Hold the resource, or else wait for it, unless the claim refuses to.

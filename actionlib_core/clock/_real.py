@@ -14,7 +14,6 @@ import threading
 import time
 import weakref
 from contextvars import Context, ContextVar, copy_context
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 from actionlib_core.clock._deadlines import Deadlines
@@ -33,7 +32,6 @@ IDLE_S = 5.0  # a cached thread without work ends after this
 IDLE_NAME = "idle"  # name of a cached thread between two jobs
 
 
-@dataclass(slots=True, eq=False, repr=False)
 class RealEvent:
     """An event whose `set` takes no lock, so that a signal handler may call it at any moment.
 
@@ -41,8 +39,11 @@ class RealEvent:
     which would be a deadlock. Here every waiter has a lock of its own; list operations are atomic.
     """
 
-    _flag: bool = field(default=False, init=False)
-    _waiters: list[_thread.LockType] = field(default_factory=list, init=False)
+    __slots__ = ("_flag", "_waiters")
+
+    def __init__(self) -> None:
+        self._flag = False
+        self._waiters: list[_thread.LockType] = []
 
     def is_set(self) -> bool:
         return self._flag
@@ -101,17 +102,19 @@ def _acquire_in_main(waiter: _thread.LockType, timeout: float | None) -> bool:
             return False
 
 
-@dataclass(slots=True, eq=False, repr=False)
 class RealTask:
     """A target running in a cached thread."""
 
-    _target: Callable[[], object]
-    name: str
-    _context: Context = field(default_factory=copy_context, init=False)
-    _done: RealEvent = field(default_factory=RealEvent, init=False)
-    _pid: int = field(default_factory=os.getpid, init=False)
-    ident: int | None = field(default=None, init=False)
-    error: BaseException | None = field(default=None, init=False)
+    __slots__ = ("_context", "_done", "_pid", "_target", "error", "ident", "name")
+
+    def __init__(self, target: Callable[[], object], name: str) -> None:
+        self._target = target
+        self.name = name
+        self._context = copy_context()
+        self._done = RealEvent()
+        self._pid = os.getpid()
+        self.ident: int | None = None
+        self.error: BaseException | None = None
 
     def run(self) -> None:
         self.ident = threading.get_ident()
@@ -238,11 +241,13 @@ class _ThreadCache:
                 worker.give(task)
 
 
-@dataclass(slots=True, eq=False, repr=False)
 class RealTimer:
     """One call of the timer thread."""
 
-    callback: Callable[[], object] | None
+    __slots__ = ("callback",)
+
+    def __init__(self, callback: Callable[[], object]) -> None:
+        self.callback: Callable[[], object] | None = callback
 
     def cancel(self) -> None:
         self.callback = None

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
-from smachpy.base.problems import Problems, name_of, no_coroutine
+from smachpy.base.functions import name_of, no_coroutine
+from smachpy.base.problems import Problems
 from smachpy.machines.state import State
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ from smachpy.actions.interface import adopt_interface
 from smachpy.actions.wakeup import Wakeup, answer_preempt
 from smachpy.base import log
 from smachpy.base.context import current_path
-from smachpy.base.problems import Problems, name_of, no_coroutine
+from smachpy.base.functions import name_of, no_coroutine
+from smachpy.base.problems import Problems
 from smachpy.engine.frame import current_scope
 from smachpy.events import CallbackFailed
 from smachpy.exceptions import error_text

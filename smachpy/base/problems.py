@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import functools
-import inspect
 import math
 import numbers
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from types import CoroutineType
 from typing import Any, Final
 
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.names import check_name
+from smachpy.base.functions import name_of, signature_text, takes, unrun_kind
 from smachpy.base.slips import accepts
 from smachpy.exceptions import InvalidStateError, did_you_mean
 
@@ -182,36 +182,20 @@ class Problems:
         if given is None and optional:
             return None
         expected = f"expected something to call as {call}"
+        # The function, or the method of an object that is called.
+        kind = unrun_kind(given) or unrun_kind(getattr(type(given), "__call__", None))  # noqa: B004
         if not callable(given):
-            hint = " Try the function itself, without ()." if inspect.iscoroutine(given) else ""
+            is_called = isinstance(given, CoroutineType)
+            hint = " Try the function itself, without ()." if is_called else ""
             self.add(f"{argument}: got {given!r}; {expected}.{hint}")
-        elif plain and _is(given, inspect.iscoroutinefunction, inspect.isasyncgenfunction):
-            self.add(f"{argument}: got the async {_shown(given)}; {expected}, not an async one.")
-        elif plain and _is(given, inspect.isgeneratorfunction):
-            self.add(f"{argument}: got the generator {_shown(given)}; {expected}, without `yield`.")
+        elif plain and kind:
+            instead = "not an async one" if kind == "async" else "without `yield`"
+            self.add(f"{argument}: got the {kind} {_shown(given)}; {expected}, {instead}.")
         elif count is not None and not takes(given, count, kwargs):
             problem = f"{argument}: got {_shown(given)}; {expected}."
             if not accepts(problem):
                 self.add(problem)
         return given
-
-
-def no_coroutine(answer: Any) -> Any:
-    """Return what a function of the user has answered.
-
-    Raises:
-        TypeError: it is a coroutine, which nothing would await, and which counts as true.
-    """
-    if inspect.iscoroutine(answer):
-        answer.close()
-        raise TypeError("got a coroutine; expected an answer. Try a function that is not async.")
-    return answer
-
-
-def _is(function: Any, *tests: Callable[[Any], bool]) -> bool:
-    """Return whether a test holds for `function`, or for the method of an object that is called."""
-    method = getattr(type(function), "__call__", None)  # noqa: B004  the function itself is needed
-    return any(test(function) or test(method) for test in tests)
 
 
 def unknown_name(what: str, got: object, known: Iterable[str]) -> str:
@@ -244,43 +228,11 @@ def as_number(given: Any) -> float | None:
         return None
 
 
-def takes(function: Any, count: int, kwargs: Mapping[str, Any] | None = None) -> bool:
-    """Return whether `function` can be called with `count` positional arguments; True if unknown.
-
-    For a decorated function the signature of the wrapper counts, not that of the wrapped function:
-    the wrapper may add or remove arguments.
-    """
-    try:
-        signature = inspect.signature(function, follow_wrapped=False)
-    except (TypeError, ValueError):  # implemented in C, without a signature
-        return True
-    try:
-        signature.bind(*[None] * count, **(kwargs or {}))
-    except TypeError:
-        return False
-    return True
-
-
 def _shown(function: Any) -> str:
     name = getattr(function, "__qualname__", None) or getattr(function, "__name__", None)
     if name is None:
         return repr(function)
-    try:
-        return f"{name}{inspect.signature(function, follow_wrapped=False)}"
-    except (TypeError, ValueError):
-        return str(name)
-
-
-def name_of(function: object) -> str:
-    """Return the name of a user's function for texts, never with a memory address.
-
-    A method is named with its class, a `functools.partial` as its function, and any other callable
-    object as its class.
-    """
-    while isinstance(function, functools.partial):
-        function = function.func
-    name = getattr(function, "__qualname__", None) or getattr(function, "__name__", None)
-    return str(name or type(function).__name__).rpartition("<locals>.")[2]
+    return f"{name}{signature_text(function)}"
 
 
 def missing_init(state: object, error: BaseException) -> str:

@@ -7,7 +7,6 @@ meaning, `smachpy.durable.journal` writes them.
 from __future__ import annotations
 
 import copy
-import dataclasses
 import json
 import os
 from typing import TYPE_CHECKING, Any, Final
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.clock.forks import is_copy
 from actionlib_core.shutdown import AT_EXIT
 from smachpy.base import log
-from smachpy.base.problems import name_of
+from smachpy.base.functions import name_of
 from smachpy.durable.codec import NotDurableError, decode, encode, is_named_secret
 from smachpy.durable.position import OF_PROCESS
 from smachpy.durable.store import FencedError, StoreError, digest_of
@@ -979,7 +978,7 @@ class Recorder(RunJournal):
         path = step.path_in(frame)
         if path in self._journal.position.visits:
             source, by, why = current_origin()
-            wanted = None if override is None else list(dataclasses.astuple(override))
+            wanted = None if override is None else list(override)
             facts = {"source": source, "by": by, "why": why, "override": wanted}
             self._write("PreemptRequested", path, **facts, **({"goes_on": left} if left else {}))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.base.problems import name_of
+from smachpy.base.functions import name_of
 from smachpy.engine.described import StateData
 from smachpy.engine.frame import Frame
 from smachpy.engine.interrupt import Interruption, uninterrupted

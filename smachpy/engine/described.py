@@ -7,7 +7,6 @@ which no copy, comparison or file of a machine concerns.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from smachpy.base.problems import unique_names
@@ -46,7 +45,6 @@ NESTED = _Epoch()
 """The same for the structure of what is inside of any container."""
 
 
-@dataclass(slots=True, eq=False)
 class StateData:
     """The library's data of one state.
 
@@ -67,19 +65,26 @@ class StateData:
         is_child: It is, or was, in a container.
     """
 
-    outcomes: tuple[str, ...] = ()
-    input_keys: tuple[str, ...] = ()
-    output_keys: tuple[str, ...] = ()
-    options: Options = NO_OPTIONS
-    version: int = 0
-    with_hooks: tuple[Options, Options] | None = None
-    is_async: bool = False
-    code: tuple[Any, ...] = ()
-    is_function: bool = False
-    is_shared: bool = False
-    is_child: bool = False
-    made_from: Any = None
-    preempt_callbacks: list[Callable[[], object]] = field(default_factory=list)
+    __slots__ = (
+        *("outcomes", "input_keys", "output_keys", "options", "version", "with_hooks"),
+        *("preempt_callbacks", "is_async", "code", "is_function", "made_from"),
+        *("is_shared", "is_child"),
+    )
+
+    def __init__(self) -> None:
+        self.outcomes: tuple[str, ...] = ()
+        self.input_keys: tuple[str, ...] = ()
+        self.output_keys: tuple[str, ...] = ()
+        self.options: Options = NO_OPTIONS
+        self.version = 0
+        self.with_hooks: tuple[Options, Options] | None = None
+        self.preempt_callbacks: list[Callable[[], object]] = []
+        self.is_async = False
+        self.code: tuple[Any, ...] = ()
+        self.is_function = False
+        self.made_from: Any = None
+        self.is_shared = False
+        self.is_child = False
 
     def add(self, name: str, names: Iterable[str]) -> None:
         """Add outcomes or keys to the attribute `name`."""
@@ -108,7 +113,6 @@ class StateData:
         return made
 
 
-@dataclass(slots=True, eq=False)
 class Live:
     """What belongs to the runs of one container: where it runs, who watches and controls it.
 
@@ -132,24 +136,30 @@ class Live:
             'preempted' because of that; else "".
     """
 
-    frame: Frame | None = None
-    root: Frame | None = None
-    coming: Frame | None = None
-    callback: Any = None  # a smachpy.engine.callback.CallbackFrame, which imports this module
-    plan: Any = None
-    listeners: tuple[Callable[[Event], object], ...] = ()
-    buffers: tuple[EventBuffer, ...] = ()
-    control: Gate | None = None
-    journal: RunJournal = NO_JOURNAL
-    origin: Origin | None = None
-    runs: int = 0
-    is_passing_on: bool = False
-    end_waiters: list[ClockEvent] = field(default_factory=list)
-    goes_on: str = ""
-    stopped_at: str = ""
+    __slots__ = (
+        *("frame", "root", "coming", "callback", "plan", "listeners", "buffers"),
+        *("control", "journal", "origin", "runs", "is_passing_on", "end_waiters"),
+        *("goes_on", "stopped_at"),
+    )
+
+    def __init__(self) -> None:
+        self.frame: Frame | None = None
+        self.root: Frame | None = None
+        self.coming: Frame | None = None
+        self.callback: Any = None  # a smachpy.engine.callback.CallbackFrame, which imports this
+        self.plan: Any = None
+        self.listeners: tuple[Callable[[Event], object], ...] = ()
+        self.buffers: tuple[EventBuffer, ...] = ()
+        self.control: Gate | None = None
+        self.journal: RunJournal = NO_JOURNAL
+        self.origin: Origin | None = None
+        self.runs = 0
+        self.is_passing_on = False
+        self.end_waiters: list[ClockEvent] = []
+        self.goes_on = ""
+        self.stopped_at = ""
 
 
-@dataclass(slots=True, eq=False)
 class ContainerData(StateData):
     """The library's data of one container.
 
@@ -169,30 +179,37 @@ class ContainerData(StateData):
         live: Its side of the runs.
     """
 
-    children: dict[str, Any] = field(default_factory=dict)
-    remappings: dict[str, dict[str, str]] = field(default_factory=dict)
-    cleanup: str = ""
-    begins_with: dict[str, Any] = field(default_factory=dict)
-    reenter: str = "first"
-    start_cbs: list[Callback] = field(default_factory=list)
-    transition_cbs: list[Callback] = field(default_factory=list)
-    termination_cbs: list[Callback] = field(default_factory=list)
-    open_tokens: list[Any] = field(default_factory=list)
-    context_kwargs: dict[str, Any] = field(default_factory=dict)
-    checked: object = None
-    depth: int = 0
-    live: Live = field(default_factory=Live)
-
+    __slots__ = (
+        *("children", "remappings", "cleanup", "begins_with", "reenter", "start_cbs"),
+        *("transition_cbs", "termination_cbs", "open_tokens", "context_kwargs", "checked"),
+        *("depth", "live"),
+    )
     _kept: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.children: dict[str, Any] = {}
+        self.remappings: dict[str, dict[str, str]] = {}
+        self.cleanup = ""
+        self.begins_with: dict[str, Any] = {}
+        self.reenter = "first"
+        self.start_cbs: list[Callback] = []
+        self.transition_cbs: list[Callback] = []
+        self.termination_cbs: list[Callback] = []
+        self.open_tokens: list[Any] = []
+        self.context_kwargs: dict[str, Any] = {}
+        self.checked: object = None
+        self.depth = 0
+        self.live = Live()
 
     def restructured(self) -> None:
         """As that of a state; also what was found out about this container."""
         self.checked = None
-        StateData.restructured(self)  # no `super()`: a dataclass with slots is another class
+        super().restructured()
 
     def copy(self) -> Self:
         """Return the data for a copy of the container: its structure and callbacks only."""
-        made = StateData.copy(self)
+        made = super().copy()
         made.is_child = self.is_child
         callbacks = ("start_cbs", "transition_cbs", "termination_cbs")
         kept = ("cleanup", "reenter", *callbacks, *self._kept)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
+from types import CoroutineType
 from typing import TYPE_CHECKING
 
 from smachpy.base.problems import missing_init
@@ -36,7 +36,7 @@ def unknown_outcome(path: str, outcomes: Iterable[str], got: object) -> InvalidT
     hint = did_you_mean(got, known) if isinstance(got, str) else ""
     if got is None:
         hint = " Try a `return` at the end of every way through execute."
-    elif inspect.iscoroutine(got):
+    elif isinstance(got, CoroutineType):
         got.close()
         hint = " Try `async def execute`, or `await` it."
     return InvalidTransitionError(

@@ -16,8 +16,8 @@ from actionlib_core.clock import current_clock
 from actionlib_core.clock._serial import report_thread_exception
 from smachpy.base import log
 from smachpy.base.context import current_frame
+from smachpy.base.functions import name_of
 from smachpy.base.log import MESSAGES
-from smachpy.base.problems import name_of
 from smachpy.engine.described import EPOCH
 from smachpy.engine.interrupt import Interruption
 from smachpy.engine.shutdown_check import SHUTDOWN_CHECK

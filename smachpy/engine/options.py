@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actionlib_core.exceptions import InvalidNameError
 from actionlib_core.names import check_name
 from actionlib_core.resources import POLICIES
+from smachpy.base.frozen import Frozen
 from smachpy.base.problems import Problems, as_number, plain, unknown_name
 
 if TYPE_CHECKING:
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     Result: TypeAlias = str | type[BaseException]
 
 
-@dataclasses.dataclass(frozen=True, slots=True, init=False)
-class Retry:
+class Retry(Frozen):
     """Run a state again when it ends badly.
 
     Attributes:
@@ -32,6 +31,8 @@ class Retry:
     Raises:
         InvalidStateError: a value is wrong; all problems at once.
     """
+
+    __slots__ = ("attempts", "backoff", "on")
 
     attempts: int
     backoff: float
@@ -51,8 +52,7 @@ class Retry:
             "on": _results(problems, on),
         }
         problems.raise_all()
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        self._set(**checked)
 
     def wants(self, attempt: int, result: str | BaseException) -> bool:
         """Return whether to run again after attempt number `attempt` (from 1) gave `result`."""
@@ -76,8 +76,7 @@ _DOUBLINGS = 60  # of a pause, which lasts for ever by then; 1,024 of them are n
 REFUSED = "refused"
 
 
-@dataclasses.dataclass(frozen=True, slots=True, init=False)
-class Resource:
+class Resource(Frozen):
     """What a state needs for itself while it executes, such as the base of the robot.
 
     Attributes:
@@ -88,6 +87,8 @@ class Resource:
     Raises:
         InvalidStateError: a value is wrong; all problems at once.
     """
+
+    __slots__ = ("name", "policy")
 
     name: str
     policy: Policy
@@ -102,22 +103,20 @@ class Resource:
         if not isinstance(policy, str) or policy not in POLICIES:
             problems.add(f"resource: policy: got {policy!r}; expected one of {list(POLICIES)}.")
         problems.raise_all()
-        object.__setattr__(self, "name", word)
-        object.__setattr__(self, "policy", plain(policy))
+        self._set(name=word, policy=plain(policy))
 
     def __str__(self) -> str:
         return self.name if self.policy == "wait" else f"{self.name}, {self.policy}"
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class Options:
+class Options(NamedTuple):
     """The options of one state, checked; `smachpy.machines.state.StateOptions` describes them."""
 
     timeout: float | None = None
     timeout_outcome: str = "aborted"
     preempt_timeout: Any = "inherit"
     retry: Retry | None = None
-    on_exception: Mapping[type[BaseException], str] = dataclasses.field(default_factory=dict)
+    on_exception: Mapping[type[BaseException], str] = {}
     on_enter: Callable[[Any], object] | None = None
     on_exit: Callable[[Any, Any], object] | None = None
     resume: str | Callable[[Any], Any] | None = None
@@ -144,7 +143,7 @@ class Options:
 SKIP = "skip:"
 ASK = "ask"
 NO_OPTIONS = Options()
-NAMES = tuple(field.name for field in dataclasses.fields(Options))
+NAMES = Options._fields
 
 
 def _is_caught(kind: object) -> bool:
@@ -165,7 +164,7 @@ def _results(problems: Problems, on: Any) -> tuple[Any, ...]:
 def changed(options: Options, given: Mapping[str, Any], problems: Problems) -> Options:
     """Return a copy of `options` with the values in `given`, whose names are valid."""
     checked = {name: _CHECKS[name](problems, name, value) for name, value in given.items()}
-    return dataclasses.replace(options, **checked)
+    return options._replace(**checked)
 
 
 def outcome_problems(options: Options, outcomes: Iterable[str]) -> Iterator[str]:

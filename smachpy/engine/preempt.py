@@ -10,7 +10,6 @@ listener or a logger.
 from __future__ import annotations
 
 import contextlib
-import inspect
 import signal
 import threading
 from contextvars import ContextVar
@@ -506,7 +505,9 @@ def has_own_request(state: Child) -> bool:
 
 def _request_of(state: Child) -> Any:
     """Return the `request_preempt` of `state` for its name only, without running a property."""
-    found = inspect.getattr_static(state, "request_preempt")
+    from inspect import getattr_static  # here: a machine rarely needs it
+
+    found = getattr_static(state, "request_preempt")
     return getattr(found, "fget", None) or found
 
 

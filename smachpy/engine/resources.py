@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import copy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -180,7 +180,9 @@ def _take_outside(frame: Frame, all_of: Resources, claim: Claim) -> str | None:
     claim.give = partial(journal.give, claim.resource)
 
     def stop(by: str) -> None:
-        claim.stop(replace(claim, who=lambda: by))
+        taker = copy.copy(claim)
+        taker.who = lambda: by
+        claim.stop(taker)
 
     return journal.take(claim.resource, frame.here(), claim.policy, stop)
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import copy
-import inspect
 import math
-from dataclasses import dataclass, field, replace
 from functools import partial
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, Literal
 
 from actionlib_core import shutdown
 from smachpy.base import log
 from smachpy.base.context import current_frame
-from smachpy.base.problems import name_of, takes
+from smachpy.base.functions import is_coroutine_function, name_of, takes, unrun_kind
 from smachpy.base.slips import ACCEPTING
 from smachpy.engine.callback import call_bounded
 from smachpy.engine.container import run_container
@@ -44,7 +43,6 @@ if TYPE_CHECKING:
 _new = tuple.__new__  # takes half as long as the `__new__` of a NamedTuple
 
 
-@dataclass(slots=True, eq=False)
 class Step:
     """One child, ready to run.
 
@@ -60,22 +58,29 @@ class Step:
         choices: Outcome -> what decides where it leads, for outcomes with conditions; or None.
     """
 
-    label: str
-    state: Child
-    execute: Callable[[Any], Any]
-    userdata: Any = None
-    next: dict[str, Decision] = field(default_factory=dict)
-    interface: int = field(init=False)
-    writes: bool = field(init=False)
-    watched_window: _WatchedRemapper | None = None
-    choices: dict[str, Any] | None = None
-    final: Literal[False] = False  # a slot is found faster than a class attribute; see `End`
-    _base: str | None = None  # None, so that a root's "" is taken for no path that is known
-    _path: str = ""
+    __slots__ = (
+        *("label", "state", "execute", "userdata", "next", "interface", "writes"),
+        *("watched_window", "choices", "final", "_base", "_path"),
+    )
 
-    def __post_init__(self) -> None:
-        self.interface = self.state._smachpy.version
-        self.writes = bool(self.state._smachpy.output_keys)
+    def __init__(
+        self, label: str, state: Child, execute: Callable[[Any], Any], userdata: Any = None
+    ) -> None:
+        self.label = label
+        self.state = state
+        self.execute = execute
+        self.userdata = userdata
+        self.next: dict[str, Decision] = {}
+        self.interface = state._smachpy.version
+        self.writes = bool(state._smachpy.output_keys)
+        self.watched_window: _WatchedRemapper | None = None
+        self.choices: dict[str, Any] | None = None
+        # A slot is found faster than a class attribute; see `End`.
+        self.final: Literal[False] = False
+        self._base: str | None = (
+            None  # None, so that a root's "" is taken for no path that is known
+        )
+        self._path = ""
 
     def end_always(self) -> None:
         """Let each outcome lead to an end of that name: what is around the child decides."""
@@ -146,7 +151,7 @@ def make_step(container: Parent, label: str) -> Step:
     if is_copy:  # each machine has its own flag for a preempt
         state = copy.copy(state)
     execute, kind, of_child = state.execute, type(state), state._smachpy
-    is_async = of_child.is_async or inspect.iscoroutinefunction(execute)
+    is_async = of_child.is_async or is_coroutine_function(execute)
     # A container whose `execute` is overridden: the user's code around `super().execute()` would
     # block a preempt for ever, so it gets the container's grace.
     is_own = False
@@ -257,7 +262,7 @@ def get_options(state: Child) -> Options:
         for name, count in _HOOKS
         if getattr(options, name) is None and _is_hook(type(state), name, count)
     }
-    found = replace(options, **hooks) if hooks else options
+    found = options._replace(**hooks) if hooks else options
     data.with_hooks = options, found
     return found
 
@@ -267,13 +272,8 @@ def hook_problems(state: Child) -> Iterator[str]:
     for name, count in _HOOKS:
         if getattr(state._smachpy.options, name) is None and _is_hook(type(state), name, count):
             method = _defined(type(state), name)
-            kinds = {
-                "async": inspect.iscoroutinefunction(method) or inspect.isasyncgenfunction(method),
-                "generator": inspect.isgeneratorfunction(method),
-            }
-            for word, is_so in kinds.items():
-                if is_so:
-                    yield f"{name}: got the {word} {name_of(method)}; expected a plain method."
+            if kind := unrun_kind(method):
+                yield f"{name}: got the {kind} {name_of(method)}; expected a plain method."
 
 
 def _defined(kind: type, name: str) -> object:
@@ -288,7 +288,7 @@ def _defined(kind: type, name: str) -> object:
 def _is_hook(kind: type, name: str, count: int) -> bool:
     """Return whether a class has the method `name`, and it can be called with `count` arguments."""
     method = _defined(kind, name)
-    return inspect.isfunction(method) and takes(method, count)
+    return isinstance(method, FunctionType) and takes(method, count)
 
 
 def runner_of(

@@ -10,7 +10,6 @@ The table is drawn in docs/preemption.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -244,19 +243,21 @@ class Why(Enum):
     UNKNOWN = "the child has no such outcome"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class End:
     """The container ends with this outcome."""
 
-    outcome: str
-    final: Literal[True] = True  # a slot is found faster than a class attribute; see `Step`
+    __slots__ = ("final", "outcome")
+
+    def __init__(self, outcome: str) -> None:
+        self.outcome = outcome
+        # A slot is found faster than a class attribute; see `Step`.
+        self.final: Literal[True] = True
 
 
 PREEMPTED = End("preempted")
 
 
-@dataclass(frozen=True, slots=True)
-class Override:
+class Override(NamedTuple):
     """An operator's choice instead of a child's own outcome: another outcome, or a jump.
 
     Without either, the child's own outcome counts: the operator has stopped it, and no more.

@@ -15,7 +15,6 @@ from __future__ import annotations
 import sys
 import threading
 from collections import defaultdict
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias
 
 from actionlib_core.clock import wall_time
@@ -293,7 +292,6 @@ _WITHIN = {
 """Kind -> prefix of the path in the key under which `thin` keeps events of this kind."""
 
 
-@dataclass(slots=True, eq=False)
 class _Kept:
     """The places of the events of one state, or of its goals, that are kept.
 
@@ -304,10 +302,11 @@ class _Kept:
         within: Slot -> the newest event of that slot since then.
     """
 
-    first: int = -1
-    opened: int = -1
-    closed: int = -1
-    within: dict[str, int] = field(default_factory=dict)
+    def __init__(self) -> None:
+        self.first = -1
+        self.opened = -1
+        self.closed = -1
+        self.within: dict[str, int] = {}
 
     def open(self, place: int) -> None:
         self.opened, self.closed = place, -1

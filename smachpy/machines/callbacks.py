@@ -6,7 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from smachpy.base import log
-from smachpy.base.problems import Problems, name_of
+from smachpy.base.functions import name_of
+from smachpy.base.problems import Problems
 from smachpy.engine.callback import call_bounded
 from smachpy.engine.described import EPOCH
 from smachpy.events.buffer import MAX_BUFFER_EVENTS, EventBuffer

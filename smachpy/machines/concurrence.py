@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.base import log
-from smachpy.base.problems import Problems, name_of, no_coroutine, plain, unknown_name
+from smachpy.base.functions import name_of, no_coroutine
+from smachpy.base.problems import Problems, plain, unknown_name
 from smachpy.base.slips import accepts
 from smachpy.engine.callback import call_bounded
 from smachpy.engine.described import ContainerData
@@ -42,16 +42,18 @@ if TYPE_CHECKING:
 __all__ = ["Concurrence", "Rule", "all_of", "any_of", "n_of"]
 
 
-@dataclass(slots=True, eq=False)
 class ConcurrenceData(ContainerData):
     """The library's data of one concurrence; see the arguments of `Concurrence`."""
 
-    rules: tuple[tuple[str, Rule], ...] = ()
-    default_outcome: str = ""
-    outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None
-    child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None
+    __slots__ = ("child_termination_cb", "default_outcome", "outcome_cb", "rules")
+    _kept = __slots__
 
-    _kept = ("rules", "default_outcome", "outcome_cb", "child_termination_cb")
+    def __init__(self) -> None:
+        super().__init__()
+        self.rules: tuple[tuple[str, Rule], ...] = ()
+        self.default_outcome = ""
+        self.outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None
+        self.child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None
 
 
 class Concurrence(Container):
@@ -237,6 +239,8 @@ class Concurrence(Container):
 
     def describe_structure(self) -> Structure:
         """Return the children and the rules."""
+        from dataclasses import replace
+
         from smachpy.events.introspection import RuleRecord
 
         data = self._smachpy

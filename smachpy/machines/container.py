@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-import inspect
 import sys
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.base.context import current_frame
-from smachpy.base.problems import Problems, plain, takes, unknown_name
+from smachpy.base.functions import signature_text, takes
+from smachpy.base.problems import Problems, plain, unknown_name
 from smachpy.base.slips import accepts
 from smachpy.engine.container import run_container
 from smachpy.engine.described import EPOCH, NESTED, ContainerData, walk
@@ -463,7 +463,7 @@ def state_problems(state: State) -> Iterator[str]:
     elif not takes(execute, 1):
         name = type(state).__name__
         problem = (
-            f"execute: got {name}.execute{inspect.signature(execute, follow_wrapped=False)}, which "
+            f"execute: got {name}.execute{signature_text(execute)}, which "
             "cannot be called with the userdata; expected `def execute(self, userdata):`."
         )
         if not accepts(problem):

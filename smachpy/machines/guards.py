@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from smachpy.base.problems import Problems, name_of, no_coroutine, plain
+from smachpy.base.frozen import Frozen
+from smachpy.base.functions import name_of, no_coroutine
+from smachpy.base.problems import Problems, plain
 from smachpy.engine.errors import raised
 from smachpy.exceptions import InvalidUserCodeError, error_text
 from smachpy.userdata.user_data import data_of
@@ -22,8 +23,7 @@ __all__ = ["Cases", "Target", "When", "when"]
 EXPECTED = "when(CONDITION, TARGET), ..., and last the target if none holds"
 
 
-@dataclass(frozen=True, slots=True)
-class When:
+class When(Frozen):
     """One case of a transition; made by `when`.
 
     Attributes:
@@ -31,9 +31,19 @@ class When:
         target: Label of the next state, or outcome of the machine.
     """
 
+    __slots__ = ("condition", "target", "_expression")  # noqa: RUF023  as the arguments
+
     condition: str | Callable[[Any], object]
     target: str
-    _expression: Expression | None = field(default=None, compare=False, repr=False)
+    _expression: Expression | None
+
+    def __init__(
+        self,
+        condition: str | Callable[[Any], object],
+        target: str,
+        _expression: Expression | None = None,
+    ) -> None:
+        self._set(condition=condition, target=target, _expression=_expression)
 
     @property
     def text(self) -> str:
@@ -53,7 +63,6 @@ class When:
         return bool(no_coroutine(self.condition(userdata)))
 
 
-@dataclass(frozen=True, slots=True)
 class Between:
     """A state between an outcome and its target, such as that of `smachpy.states.confirm`.
 
@@ -63,9 +72,10 @@ class Between:
         transitions: Its own.
     """
 
-    prefix: str
-    state: Any
-    transitions: Mapping[str, str]
+    def __init__(self, prefix: str, state: Any, transitions: Mapping[str, str]) -> None:
+        self.prefix = prefix
+        self.state = state
+        self.transitions = transitions
 
     def __repr__(self) -> str:
         """Name what made it, as it is in errors about where it cannot stand."""
@@ -140,7 +150,6 @@ def split(given: Any, problems: Problems) -> tuple[Any, dict[str, Cases]]:
     return targets, guards
 
 
-@dataclass(slots=True, eq=False)
 class Choice:
     """The place of a target until its condition is known.
 
@@ -150,10 +159,12 @@ class Choice:
         userdata: The userdata of the machine.
     """
 
-    cases: tuple[tuple[When, Any], ...]
-    otherwise: Any
-    userdata: Any
-    final: bool = False
+    final = False
+
+    def __init__(self, cases: tuple[tuple[When, Any], ...], otherwise: Any, userdata: Any) -> None:
+        self.cases = cases
+        self.otherwise = otherwise
+        self.userdata = userdata
 
     def decide(self, frame: Frame) -> Any:
         """Return the step or end to which the first case that holds leads.

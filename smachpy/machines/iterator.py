@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from smachpy.base.problems import Problems, name_of, unknown_name
+from smachpy.base.functions import name_of
+from smachpy.base.problems import Problems, unknown_name
 from smachpy.base.slips import accepts
 from smachpy.engine.callback import call_bounded
 from smachpy.engine.child import run_child
@@ -40,7 +40,6 @@ _PLAIN = frozenset({list, tuple, range, set, dict, str})  # iterating runs no co
 _END = object()
 
 
-@dataclass(slots=True, eq=False)
 class IteratorData(ContainerData):
     """The library's data of one iterator; see the arguments of `Iterator`.
 
@@ -48,18 +47,21 @@ class IteratorData(ContainerData):
         used_up: Items that give themselves, such as a generator, once a run has had all of them.
     """
 
-    items: Any = ()
-    used_up: Any = None
-    items_label: str = ""
-    exhausted_outcome: str = ""
-    loop_outcomes: tuple[str, ...] = ()
-    break_outcomes: tuple[str, ...] = ()
-    final_outcome_map: dict[str, str] = field(default_factory=dict)
-
     _kept = (
         *("items", "items_label", "exhausted_outcome"),
         *("loop_outcomes", "break_outcomes", "final_outcome_map"),
     )
+    __slots__ = (*_kept, "used_up")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.items: Any = ()
+        self.used_up: Any = None
+        self.items_label = ""
+        self.exhausted_outcome = ""
+        self.loop_outcomes: tuple[str, ...] = ()
+        self.break_outcomes: tuple[str, ...] = ()
+        self.final_outcome_map: dict[str, str] = {}
 
 
 class Iterator(Container):
@@ -233,6 +235,8 @@ class Iterator(Container):
 
     def describe_structure(self) -> Structure:
         """Return the child, its edges and the loop's rules."""
+        from dataclasses import replace
+
         from smachpy.events.introspection import RuleRecord, TransitionRecord
 
         structure, data = super().describe_structure(), self._smachpy

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias, TypeVar, overload
 
 from smachpy.base.problems import Problems
 from smachpy.userdata.secret import add_secret_names
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
 _ATTRIBUTE: Final = "_smachpy_mission"
 
 
-@dataclass(frozen=True, slots=True)
-class MissionInfo:
+class MissionInfo(NamedTuple):
     """The arguments of `@smachpy.mission`.
 
     Attributes:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from smachpy.base.frozen import Frozen
 from smachpy.base.problems import as_number, plain, unique_names
 from smachpy.exceptions import InvalidStateError
 
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(Frozen):
     """Holds if at least `need` of the conditions hold.
 
     Attributes:
@@ -22,8 +21,13 @@ class Rule:
         conditions: Pairs (child label, outcomes); it holds if the child has one of these outcomes.
     """
 
+    __slots__ = ("need", "conditions")  # noqa: RUF023  in the order of the arguments
+
     need: int
     conditions: tuple[tuple[str, tuple[str, ...]], ...]
+
+    def __init__(self, need: int, conditions: tuple[tuple[str, tuple[str, ...]], ...]) -> None:
+        self._set(need=need, conditions=conditions)
 
     def holds(self, outcomes: Mapping[str, str | None]) -> bool:
         """Return whether the children's outcomes fulfil the rule."""

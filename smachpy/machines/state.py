@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from threading import TIMEOUT_MAX
 from typing import (
     TYPE_CHECKING,
@@ -18,7 +17,8 @@ from typing import (
 
 from actionlib_core.clock import current_clock
 from smachpy.base.context import THREAD, current_path, is_left_behind
-from smachpy.base.problems import Problems, as_number, name_of, unique_names, unknown_arguments
+from smachpy.base.functions import is_coroutine_function, name_of
+from smachpy.base.problems import Problems, as_number, unique_names, unknown_arguments
 from smachpy.base.slips import accepts
 from smachpy.engine import frame as frames
 from smachpy.engine import step as steps
@@ -553,7 +553,7 @@ class CBState(State):
         self.__kwargs = problems.mapping("cb_kwargs", cb_kwargs, "name -> value")
         self._smachpy.code = (cb,)
         self._smachpy.is_function = type(self).__module__ == __name__  # no subclass of the user's
-        self._smachpy.is_async = inspect.iscoroutinefunction(cb)
+        self._smachpy.is_async = is_coroutine_function(cb)
         call = "cb(userdata, *cb_args, **cb_kwargs)"
         count = 1 + len(self.__args)
         problems.function("cb", cb, call, count, self.__kwargs, optional=False, plain=False)

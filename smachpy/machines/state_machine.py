@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, get_args
 
 from smachpy.base import log
@@ -46,7 +45,6 @@ Reenter: TypeAlias = Literal["first", "last", "deep"]
 __all__ = ["Sequence", "StateMachine"]
 
 
-@dataclass(slots=True, eq=False)
 class MachineData(ContainerData):
     """What the library knows of one state machine.
 
@@ -60,23 +58,21 @@ class MachineData(ContainerData):
         connector_outcome: Of a `Sequence`: the outcome that connects its children.
     """
 
-    transitions: dict[str, dict[str, str | None]] = field(default_factory=dict)
-    guards: dict[str, dict[str, Cases]] = field(default_factory=dict)
-    constants: dict[str, dict[str, Any]] = field(default_factory=dict)
-    initial: str | None = None
-    next_initial: str | None = None
-    follow_connectors: tuple[str, tuple[str, ...]] | None = None
-    connector_outcome: str = ""
-
-    _kept = (
-        "transitions",
-        "guards",
-        "constants",
-        "initial",
-        "next_initial",
-        "follow_connectors",
-        "connector_outcome",
+    __slots__ = (
+        *("transitions", "guards", "constants", "initial", "next_initial"),
+        *("follow_connectors", "connector_outcome"),
     )
+    _kept = __slots__
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.transitions: dict[str, dict[str, str | None]] = {}
+        self.guards: dict[str, dict[str, Cases]] = {}
+        self.constants: dict[str, dict[str, Any]] = {}
+        self.initial: str | None = None
+        self.next_initial: str | None = None
+        self.follow_connectors: tuple[str, tuple[str, ...]] | None = None
+        self.connector_outcome = ""
 
 
 def _copied(value: Any) -> Any:
@@ -369,6 +365,8 @@ class StateMachine(Container):
 
     def describe_structure(self) -> Structure:
         """Return the children and the edges between them."""
+        from dataclasses import replace
+
         from smachpy.events.introspection import TransitionRecord
 
         children = self._smachpy.others()

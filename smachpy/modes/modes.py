@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from smachpy.base.functions import name_of as name_of_code
 from smachpy.base.problems import Problems, unknown_name
-from smachpy.base.problems import name_of as name_of_code
 from smachpy.engine.child import run_child
 from smachpy.engine.preempt import ask_child, asking, choose
 from smachpy.engine.visit import Override, Why

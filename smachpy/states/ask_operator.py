@@ -22,8 +22,9 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import FreshSubscriber, Publisher
+from smachpy.base.functions import name_of
 from smachpy.base.log import logwarn
-from smachpy.base.problems import Problems, name_of
+from smachpy.base.problems import Problems
 from smachpy.engine.frame import current_scope
 from smachpy.engine.preempt import on_preempt
 from smachpy.events import QuestionAnswered, QuestionAsked

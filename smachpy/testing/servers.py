@@ -13,7 +13,8 @@ from actionlib_core.node import Node
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.topic import Publisher, WatchingSubscriber
 from actionlib_core.transport.faulty import DELIVERED, DROPPED, FaultyTransport
-from smachpy.base.problems import Problems, name_of
+from smachpy.base.functions import name_of
+from smachpy.base.problems import Problems
 from smachpy.exceptions import error_text
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ parameter: one that ends with `password`, `token`, `api_key` and the like, or th
 from __future__ import annotations
 
 import copy
-import dataclasses
 import re
 from collections import UserDict, UserList, deque
 from functools import lru_cache
@@ -28,13 +27,13 @@ _LAST: Final = frozenset(
     | {"apikey", "passwords", "passphrases", "secrets"}
 )
 _KEYS: Final = frozenset({"api", "access", "private", "secret"})  # before "key"
-_PART: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
-_NAMED: Final = re.compile(
-    r"(?<![\w-])([A-Za-z_][\w-]{0,200})[\"']?[ \t]{0,9}[:=][ \t]{0,9}"
-    r"(?!(?:true|false|null|none|~)\b|@)[^\s,}]",
-    re.IGNORECASE,
+# `re` compiles and keeps them when they are first used, as most programs look for no secret.
+_PART: Final = r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+"
+_NAMED: Final = (
+    r"(?i)(?<![\w-])([A-Za-z_][\w-]{0,200})[\"']?[ \t]{0,9}[:=][ \t]{0,9}"
+    r"(?!(?:true|false|null|none|~)\b|@)[^\s,}]"
 )
-_LOGIN: Final = re.compile(r"://[^/\s:@]{0,200}:[^/\s@]{1,200}@")  # "://user:password@"
+_LOGIN: Final = r"://[^/\s:@]{0,200}:[^/\s@]{1,200}@"  # "://user:password@"
 _ATOMS: Final = frozenset({type(None), bool, int, float, complex, str, bytes})
 _MAPPINGS: Final = (dict, UserDict, MappingProxyType)
 _LISTS: Final = (list, tuple, set, frozenset, deque, UserList)
@@ -106,7 +105,7 @@ def is_secret_name(name: str) -> bool:
         return True
     if len(name) > 200:  # noqa: PLR2004  no name that a person has written
         return False
-    parts = [part.lower() for part in _PART.findall(name)]
+    parts = [part.lower() for part in re.findall(_PART, name)]
     return parts[-1:] != [] and (
         parts[-1] in _LAST
         or (parts[-1] in {"key", "keys"} and parts[-2:-1] != [] and parts[-2] in _KEYS)
@@ -115,7 +114,7 @@ def is_secret_name(name: str) -> bool:
 
 def holds_secret(text: str) -> bool:
     """Return whether a text has a secret in it: `password: x`, `token=x`, or a login in a URL."""
-    return bool(_LOGIN.search(text)) or any(map(is_secret_name, _NAMED.findall(text)))
+    return bool(re.search(_LOGIN, text)) or any(map(is_secret_name, re.findall(_NAMED, text)))
 
 
 def is_secret(value: object) -> bool:
@@ -204,8 +203,10 @@ def _masked_list(value: Any, depth: int, known: dict[int, list[Any]]) -> Any:
 
 def _names_in(value: Any, kind: Any) -> Iterable[str]:
     """Return what a value has by name: fields of a message, of a dataclass and the like."""
-    if dataclasses.is_dataclass(kind):
-        return [field.name for field in dataclasses.fields(kind)]
+    if hasattr(kind, "__dataclass_fields__"):
+        from dataclasses import fields
+
+        return [field.name for field in fields(kind)]
     if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
         names: Iterable[str] = kind.__slots__
         return names

@@ -28,7 +28,6 @@ import binascii
 import math
 from collections import UserDict, UserList, deque
 from collections.abc import Callable, ItemsView, KeysView, ValuesView
-from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -61,13 +60,13 @@ _MAPPINGS = (dict, UserDict, MappingProxyType)
 _LISTS = (list, tuple, set, frozenset, deque, UserList, KeysView, ValuesView, ItemsView)
 
 
-@dataclass(slots=True)
 class Room:
     """The remaining room in a record; `above` has the ids of the values around the present one."""
 
-    items: int = MAX_TOTAL_ITEMS
-    text: int = MAX_TOTAL_TEXT
-    above: set[int] = field(default_factory=set)
+    def __init__(self, items: int = MAX_TOTAL_ITEMS, text: int = MAX_TOTAL_TEXT) -> None:
+        self.items = items
+        self.text = text
+        self.above: set[int] = set()
 
 
 def text_of(value: Any, room: Room, depth: int = 0) -> str:
@@ -138,6 +137,8 @@ def _fields(value: Any) -> list[tuple[str, Any]] | None:
     """Return pairs (prefix, part) of a value whose `repr` looks like a call."""
     kind: Any = type(value)
     if hasattr(kind, "__dataclass_fields__") and hasattr(kind.__repr__, "__wrapped__"):
+        from dataclasses import fields
+
         names = [field.name for field in fields(value) if field.repr]
         return [(f"{name}=", getattr(value, name)) for name in names]
     if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
@@ -274,6 +275,8 @@ def _named(kind: Any, value: Any) -> dict[str, Any] | None:
     if hasattr(kind, "to_nsec") and hasattr(kind, "nsecs"):
         return {"secs": value.secs, "nsecs": value.nsecs}
     if hasattr(kind, "__dataclass_fields__"):
+        from dataclasses import fields
+
         return {one.name: getattr(value, one.name, None) for one in fields(value) if one.repr}
     if issubclass(kind, tuple) and hasattr(kind, "_fields"):
         return dict(zip(kind._fields, value, strict=False))

@@ -6,9 +6,8 @@ the state. Whether the state has these keys at all, only the state knows: that i
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
 import typing
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -49,6 +48,11 @@ def key_problems(function: Any, declared: Collection[str]) -> Iterator[str]:
 
 def _kind_of(function: Any) -> Any:
     """Return the class that describes the keys; None for any other annotation, or none."""
+    plain = getattr(function, "__func__", function)
+    if isinstance(plain, FunctionType) and not plain.__annotations__:
+        return None
+    import inspect  # here: most programs have no such types
+
     try:
         parameters = inspect.signature(function, follow_wrapped=False).parameters
     except (TypeError, ValueError):  # implemented in C, without a signature
@@ -63,7 +67,7 @@ def _kind_of(function: Any) -> Any:
             first = getattr(first, part, None)
     if not isinstance(first, type):
         return None
-    is_plain = dataclasses.is_dataclass(first) or typing.is_typeddict(first)
+    is_plain = hasattr(first, "__dataclass_fields__") or typing.is_typeddict(first)
     return first if is_plain or getattr(first, "_is_protocol", False) else None
 
 

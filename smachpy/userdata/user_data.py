@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import dataclasses
 import types
 import typing
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -262,15 +261,17 @@ class Fields:
 
     def defaults(self) -> dict[str, Any]:
         """Return field -> default, for the fields that have one; default factories are called."""
-        if not dataclasses.is_dataclass(self.kind):
+        if not hasattr(self.kind, "__dataclass_fields__"):
             return {
                 name: getattr(self.kind, name) for name in self.types if name in vars(self.kind)
             }
+        from dataclasses import MISSING, fields
+
         found: dict[str, Any] = {}
-        for field in dataclasses.fields(self.kind):
-            if field.default is not dataclasses.MISSING:
+        for field in fields(self.kind):
+            if field.default is not MISSING:
                 found[field.name] = field.default
-            elif field.default_factory is not dataclasses.MISSING:
+            elif field.default_factory is not MISSING:
                 found[field.name] = field.default_factory()
         return found
 

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import RealClock, VirtualClock
-from smachpy.base.problems import Problems, name_of, unknown_arguments
+from smachpy.base.functions import name_of
+from smachpy.base.problems import Problems, unknown_arguments
 from smachpy.engine.described import walk
 from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
