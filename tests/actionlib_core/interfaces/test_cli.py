@@ -12,6 +12,7 @@ from actionlib_core import interfaces
 from actionlib_core.cli import interface
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import _cli
+from actionlib_core.interfaces._registry import registry
 
 
 def run(*arguments: str) -> int:
@@ -71,7 +72,12 @@ def test_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert list(json.loads(capsys.readouterr().out)) == ["action"]
 
 
-def test_stubs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_stubs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Other tests in this process have defined interfaces, also some that cannot be read.
+    monkeypatch.setattr(registry.sources, "_inline", {})
+    monkeypatch.setattr(registry.sources, "_added", [])
     assert run("stubs", str(tmp_path), "std_srvs", "--json") == 0
     written = [Path(p) for p in json.loads(capsys.readouterr().out)]
     assert [p.relative_to(tmp_path).as_posix() for p in written] == [
