@@ -22,6 +22,7 @@ from actionlib_core.transport._keys import is_for_another_key, key_mark
 from actionlib_core.transport._zenoh_config import is_local, new_session_id
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.zenoh import ZenohTransport
+from actionlib_core.wire.private_network import _free_domain
 from tests.free_port import free_port
 
 CLOCK = RealClock()
@@ -100,8 +101,10 @@ def wait_until(condition):
 @pytest.mark.parametrize("set_by", [0.0, -3600.0])
 def test_of_two_peers_the_later_one_dials(monkeypatch, set_by):
     """Also if the computer's clock was put back: the later one was then found within 8 s only."""
-    config = Config(domain=DOMAIN)
-    with sessions(config) as earlier:
+    with ExitStack() as stack:
+        # No other session: one of an earlier test may be in the network of this process.
+        config = Config(domain=stack.enter_context(_free_domain()))
+        earlier = stack.enter_context(sessions(config))
         monkeypatch.setattr(
             RealClock, "time_ns", staticmethod(lambda: time.time_ns() + int(set_by * 1e9))
         )
