@@ -46,6 +46,7 @@ import json
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NotRequired, TypedDict
 
 from actionlib_core.inputs.checked_data import DataError, Stamp, checked
+from smachpy.engine.visit import Override, choice_after
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -549,17 +550,16 @@ class Position:
         if "override" in entry:
             visit = self.visits.get(entry["path"])
             if visit is not None:  # it may have ended meanwhile
-                override = entry["override"]  # outcome, label, maybe whether only if it stopped
                 before = visit.get("asked") or {}
-                earlier = before.get("override")
-                # As `smachpy.engine.visit.choice_after`.
-                if override is None:
-                    override = None if earlier and earlier[2:] == [True] else earlier
-                elif override[2:] == [True] and before:
-                    override = earlier
+                # Each is outcome, label, and maybe whether only if it stopped.
+                earlier, later = (
+                    given and Override(*given)
+                    for given in (before.get("override"), entry["override"])
+                )
+                chosen = choice_after(earlier, later, asked=bool(before))
                 left = entry.get("goes_on") or before.get("goes_on")
                 kept = {"goes_on": left} if left else {}
-                visit["asked"] = {**request, "override": override, **kept}
+                visit["asked"] = {**request, "override": chosen and list(chosen), **kept}
             return
         visit = self.visits.get(entry["path"])
         if visit is not None:
