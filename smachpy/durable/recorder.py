@@ -279,11 +279,15 @@ class Recorder(RunJournal):
             return False
         return True
 
+    @property
+    def is_taken_over(self) -> bool:
+        return isinstance(self.broken, FencedError)
+
     def stop(self, error: Exception) -> None:
         """Preempt the run because its journal cannot be written; only the first `error` counts."""
         if self.broken is not None or self._is_suspended:
             return
-        self.broken, self.is_taken_over = error, isinstance(error, FencedError)
+        self.broken = error
         if self.on_fenced is not None and isinstance(error, FencedError):
             self.on_fenced(error)
         log.logerr(f"{self._root}: the journal cannot be written, the run is preempted: {error}")

@@ -27,14 +27,17 @@ class RunJournal:
     Attributes:
         run: The run's name in recordings and viewers; "" has none.
         is_durable: Whether another process may go on with the run.
-        is_taken_over: Whether another process goes on with it already, and follows its goals.
 
     Threads: any thread of the run.
     """
 
     run = ""
     is_durable = False
-    is_taken_over = False
+
+    @property
+    def is_taken_over(self) -> bool:
+        """Whether another process goes on with the run already, and follows its goals."""
+        return False
 
     # -- the run and its children --------------------------------------------------------------
 
