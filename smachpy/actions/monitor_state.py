@@ -101,14 +101,14 @@ class MonitorState(State):
         Blocks: see above.
         """
         with Wakeup(self) as wake:
-            inlet = _Inlet(self.__topic, self.__msg_type, wake, latest=self.__latest)
+            inlet = _WaitingMessages(self.__topic, self.__msg_type, wake, latest=self.__latest)
             subscriber = NotingSubscriber(
                 self.__topic, self.__msg_type, inlet.take_in, node=self.__node
             )
             with subscriber, subscriber.telling():
                 return self.__watch(ud, wake, inlet)
 
-    def __watch(self, ud: Any, wake: Wakeup, inlet: _Inlet) -> str:
+    def __watch(self, ud: Any, wake: Wakeup, inlet: _WaitingMessages) -> str:
         clock = wake.clock
         verdicts = border.Verdicts(current_path() or "", self.__topic, clock)
         until = None if self.__timeout_s is None else clock.now() + self.__timeout_s
@@ -158,7 +158,7 @@ class MonitorState(State):
         return kind, (*own, *details)
 
 
-class _Inlet:
+class _WaitingMessages:
     """The messages that wait for the condition.
 
     Threads: `take_in` on the network's thread, `take` in the state's.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import pytest
 
 from actionlib_core.exceptions import TypeMismatchError
@@ -17,7 +15,6 @@ from actionlib_core.interfaces.std_srvs.srv import (
 from actionlib_core.pubsub.service import Service
 from actionlib_core.time import Duration
 from smachpy import (
-    Concurrence,
     InvalidStateError,
     InvalidUserCodeError,
     StateMachine,
@@ -25,6 +22,7 @@ from smachpy import (
     cb_interface,
 )
 from smachpy.actions.service_state import ServiceState
+from tests.smachpy.actions.left_behind import leave_behind
 from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
@@ -254,18 +252,7 @@ def test_a_program_that_ends_during_a_call_without_limit_preempts(world):
 
 def test_a_request_callback_that_was_left_behind_calls_nothing(world):
     world.serve()
-
-    def swallows(userdata, request):
-        until = world.clock.now() + 30.0
-        while world.clock.now() < until:
-            with contextlib.suppress(BaseException):
-                world.clock.sleep(1.0)
-
-    branches = Concurrence(["done", "preempted"], "done")
-    branches.add("A", world.state(request_cb=swallows, preempt_timeout=0.2))
-    world.clock.call_later(1.0, branches.request_preempt)
-    assert branches.execute() == "preempted"
-    world.clock.sleep(90.0)
+    leave_behind(world, "request_cb")
     assert world.requests == []
 
 

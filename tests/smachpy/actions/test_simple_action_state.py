@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 
 import pytest
@@ -45,6 +44,7 @@ from smachpy import (
     events,
 )
 from smachpy.actions.simple_action_state import SimpleActionState
+from tests.smachpy.actions.left_behind import leave_behind
 from tests.two_nodes import TwoNodes
 
 OUTCOMES = ["succeeded", "aborted", "preempted"]
@@ -737,18 +737,7 @@ def test_a_name_that_breaks_the_rules_of_ros_is_refused_when_the_state_is_made(m
 def test_a_goal_callback_that_was_left_behind_sends_no_goal(world):
     """It was told that nobody asked, once it had returned: the robot drove after the mission."""
     world.serve(count)
-
-    def swallows(userdata, goal):
-        until = world.clock.now() + 30.0
-        while world.clock.now() < until:
-            with contextlib.suppress(BaseException):
-                world.clock.sleep(1.0)
-
-    branches = Concurrence(["done", "preempted"], "done")
-    branches.add("A", world.state(goal_cb=swallows, preempt_timeout=0.2))
-    world.clock.call_later(1.0, branches.request_preempt)
-    assert branches.execute() == "preempted"
-    world.clock.sleep(90.0)
+    leave_behind(world, "goal_cb")
     assert world.goals == []
 
 

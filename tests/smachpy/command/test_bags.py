@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
@@ -16,20 +18,27 @@ SEVEN = b"\0\1\0\0\7\0\0\0"  # of an Int32, in CDR
 BEGAN_NS = 1_700_000_000_000_000_000
 
 
-def mcap_of_ros1(folder):
+@contextmanager
+def written(path):
+    """Write an MCAP file."""
     from mcap.writer import Writer
 
-    path = folder / "drive.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
+        yield writer
+        writer.finish()
+
+
+def mcap_of_ros1(folder):
+    path = folder / "drive.mcap"
+    with written(path) as writer:
         schema = writer.register_schema("sensor_msgs/BatteryState", "ros1msg", b"")
         channel = writer.register_channel("/akku", "ros1", schema)
         for at, percentage in [(0.0, 0.9), *TIMES]:
             stamp = BEGAN_NS + round(at * 1e9)
             data = BatteryState(percentage=percentage).to_bytes()
             writer.add_message(channel, stamp, data, stamp)
-        writer.finish()
     return path
 
 
@@ -115,12 +124,8 @@ def test_what_is_no_bag_is_refused_in_one_line(tmp_path):
 
 def mixed_mcap(folder):
     """A bag whose other topic has a schema that nobody here reads."""
-    from mcap.writer import Writer
-
     path = folder / "mixed.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with written(path) as writer:
         number = writer.register_schema("std_msgs/msg/Int32", "ros2msg", b"int32 data\n")
         other = writer.register_schema("mine/msg/Other", "ros2idl", b"module mine {};")
         channels = [
@@ -130,7 +135,6 @@ def mixed_mcap(folder):
         for at in range(3):
             for channel in channels:
                 writer.add_message(channel, BEGAN_NS + at * 10**9, SEVEN, 0)
-        writer.finish()
     return path
 
 
@@ -151,15 +155,10 @@ def test_a_file_that_is_cut_off_is_called_so(size, tmp_path):
 
 
 def test_a_message_that_is_none_names_bag_and_topic(tmp_path):
-    from mcap.writer import Writer
-
     file = tmp_path / "drive.mcap"
-    with file.open("wb") as out:
-        writer = Writer(out)
-        writer.start()
+    with written(file) as writer:
         schema = writer.register_schema("sensor_msgs/BatteryState", "ros1msg", b"")
         writer.add_message(writer.register_channel("/akku", "ros1", schema), BEGAN_NS, b"zz", 0)
-        writer.finish()
     with pytest.raises(BagError, match=r"drive.mcap': topic 'akku': .*got 2 bytes"):
         next(read_bag(file))
 
