@@ -43,7 +43,8 @@ class RecordBag(State):
     Args:
         path: The file, ending in `.mcap`; its folder is made.
         topics: Topic -> class of its messages, of ROS 1 or ROS 2.
-        seconds: How long it records [s]; None: until a preempt, 0: the latched messages only.
+        seconds: How long it records [s]; None: until a preempt. Latched messages take a moment to
+            arrive: with 0 none does.
         key: The userdata key that gets the path of the file, a text; None: none does.
         **options: See `smachpy.machines.state.StateOptions`.
 
