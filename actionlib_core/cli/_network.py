@@ -140,9 +140,10 @@ def find_ends(
     full = node.resolve(name, f"{what} name")
     found = find_by_name(node, full, kinds, timeout)
     if not found:
-        missing, way_out = "not there", f"Try 'actionlib {listing}'."
+        within = "" if timeout is None else f" within {timeout:g} s"
+        missing, way_out = f"not there{within}", f"Try 'actionlib {listing}'."
         if Kind.ACTION_CLIENT not in kinds and what == "action":
-            missing = "got no server" + ("" if timeout is None else f" within {timeout:g} s")
+            missing = f"got no server{within}"
             way_out = f"Try 'actionlib {listing}', or start its server."
         there = which_there_are(full, list_names(node, kinds))
         if what == "action" and node.config.ros2:

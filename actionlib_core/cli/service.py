@@ -58,7 +58,7 @@ def _call(args: argparse.Namespace) -> int:
         if type_name:
             service = typed_class(node, "service", type_name)
         else:
-            ends = find_ends(node, args.name, SERVICE_KINDS)
+            ends = find_ends(node, args.name, SERVICE_KINDS, args.timeout)
             only_type(ends, args.name)
             service = class_of_end(node, ends[0])
         request = service._request_class.from_yaml(text)

@@ -13,6 +13,7 @@ from actionlib_core.cli._command import add_command, json_text, print_progress
 from actionlib_core.cli._feed import Feed
 from actionlib_core.cli._listing import add_list, add_type
 from actionlib_core.cli._network import (
+    FIND_S,
     TOPIC_KINDS,
     class_of_end,
     find_ends,
@@ -60,7 +61,10 @@ def _register_echo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--once", action="store_true", help="end after the first message")
     parser.add_argument("-n", "--count", type=count, metavar="N", help="end after N messages")
     parser.add_argument(
-        "--timeout", type=seconds, metavar="S", help="longest wait for a message [s]"
+        "--timeout",
+        type=seconds,
+        metavar="S",
+        help="longest wait for the topic and for each message [s]",
     )
     parser.add_argument(
         "--filter", metavar="EXPR", help="only messages for which this holds: 'data > 3'"
@@ -151,7 +155,7 @@ def _message_class(node: Node, args: argparse.Namespace) -> type[Message]:
 
     if args.type:
         return typed_class(node, "message", args.type)  # type: ignore[no-any-return] # a message
-    ends = find_ends(node, args.name, TOPIC_KINDS)
+    ends = find_ends(node, args.name, TOPIC_KINDS, args.timeout or FIND_S)
     type_name = only_type(ends, args.name)
     try:
         return class_of_end(node, ends[0])  # type: ignore[no-any-return] # as above

@@ -64,7 +64,10 @@ def test_call_reads_standard_input(cli, grip, capsys, monkeypatch):
 
 def test_bad_input_is_told_with_exit_code_2(cli, grip, capsys):
     for words, text in (
-        (("call", "nope", "{}"), "service '/nope': not there; expected one of ['/grip']"),
+        (
+            ("call", "nope", "{}"),
+            "service '/nope': not there within 10 s; expected one of ['/grip']",
+        ),
         (("call", "nope", "std_srvs/SetBool", "--timeout", "1"), "no server: got none in 1 s"),
         (("call", "grip", "std_srvs/Trigger"), "types differ"),
         (("call", "grip", "{date: 1}"), "date"),

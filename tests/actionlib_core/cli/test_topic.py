@@ -6,6 +6,7 @@ import io
 import json
 import math
 import sys
+from functools import partial
 
 import pytest
 from ruamel.yaml import YAML
@@ -55,6 +56,20 @@ def test_list(cli, robot, capsys):
     }  # fmt: skip
 
 
+def test_the_limit_of_an_echo_includes_the_wait_for_the_topic(cli, clock, robot, capsys):
+    """A bridge or a robot that starts offers its topics later than the 2 s of a mistyped name."""
+    there = []
+    publisher = partial(Publisher, "chatter", String, latch=True, node=robot)
+    clock.call_later(30.0, lambda: there.append(publisher()))
+    clock.call_later(31.0, lambda: there[0].publish(data="hello"))
+    assert cli("echo", "chatter", "--once", "--timeout", "40") == 0
+    assert "hello" in capsys.readouterr().out
+    start = clock.now()
+    assert cli("echo", "nobody", "--once", "--timeout", "40") == 2
+    assert clock.now() - start == pytest.approx(40.0)
+    assert "topic '/nobody': not there within 40 s; expected" in capsys.readouterr().err
+
+
 def test_json_of_numbers_that_json_lacks(cli, robot, capsys):
     """They were written as NaN and Infinity, which parsers of JSON refuse."""
     scan = Publisher("scan", Float64MultiArray, latch=True, node=robot)
@@ -89,7 +104,7 @@ def check_unknown_topic(cli, capsys):
     for words in (("type", "nope"), ("info", "nope"), ("echo", "nope")):
         assert cli(*words) == 2
         error = capsys.readouterr().err
-        assert "topic '/nope': not there; expected one of ['/chatter']" in error
+        assert "topic '/nope': not there within 2 s; expected one of ['/chatter']" in error
     assert cli("info", "a b") == 2
     assert "invalid topic name" in capsys.readouterr().err
 
@@ -295,7 +310,9 @@ def test_numbers_that_are_no_use(cli, capsys, words, expected):
 
 def test_a_name_nearby_is_suggested(cli, robot, capsys):
     assert cli("type", "chatter") == 2
-    assert "not there; expected one, but there is none at all." in capsys.readouterr().err
+    assert (
+        "not there within 2 s; expected one, but there is none at all." in capsys.readouterr().err
+    )
     with Publisher("chatter", String, node=robot):
         assert cli("type", "chater") == 2
     assert "Did you mean '/chatter'?" in capsys.readouterr().err
