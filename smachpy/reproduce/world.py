@@ -323,9 +323,12 @@ def _add_servers(world: World, inputs: list[dict[str, Any]]) -> None:
     made: dict[str, float] = {}
     sessions: dict[str, str] = {}  # of the clients
     there: defaultdict[str, set[str]] = defaultdict(set)
+    sent: set[str] = set()  # goals until now: the next one may be sent when the server dies
     for one in inputs:
         what, name, t = one["what"], one.get("name", ""), one["t"]
-        if what == "client" and name not in made:
+        if what == "goal":
+            sent.add(one.get("key", ""))
+        elif what == "client" and name not in made:
             made[name] = t
             sessions[name] = one.get("key", "")
             world.actions[name].is_there = False
@@ -343,7 +346,7 @@ def _add_servers(world: World, inputs: list[dict[str, Any]]) -> None:
             there[name].discard(one.get("key", ""))
             if not there[name]:
                 survived = any(
-                    goal.t <= t
+                    goal.id in sent
                     and (end := goal.end)
                     and end.state != "LOST"
                     and (goal.ended or t) > t

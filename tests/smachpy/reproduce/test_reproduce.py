@@ -56,6 +56,13 @@ def test_random_machines_among_random_servers_are_reproduced(plan):
         assert found.comparison.same == found.comparison.total > 0
 
 
+def test_a_goal_that_is_sent_as_the_server_dies_does_not_outlive_it(tmp_path):
+    """It was taken for one that did: the server was cut off, and its first goal hung."""
+    plan = Plan((("drive", 1, 1), ("drive", -1, -1)), (("die", 0.213),), (), (), None)
+    found = reproduce(recorded(plan, tmp_path), make=plan.machine)
+    assert found.is_same, lines_of(found)
+
+
 MISSION = """
 import smachpy
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
