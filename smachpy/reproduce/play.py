@@ -331,9 +331,7 @@ class Player:
         why, root = str(act.value), f"/{self._machine_name()}"
         try:
             if act.state in {"signal", "shutdown"}:
-                with asking(act.state, act.text, why):
-                    self._machine.request_preempt()
-                    self._kit.shutdown.request(act.text)
+                self._kit.shutdown.request(act.text)  # which asks the run
             elif act.state == "operator" and why.startswith("jump to "):
                 control.jump(why.removeprefix("jump to "))
             elif act.state == "operator" and why.startswith("force "):

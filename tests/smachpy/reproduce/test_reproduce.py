@@ -642,6 +642,48 @@ def test_answers_and_commands_of_operators_come_again(tmp_path):
     assert again == kinds
 
 
+def driving_home():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="DRIVES")
+    with sm:
+        both = smachpy.Concurrence(
+            ["succeeded", "aborted", "preempted"],
+            default_outcome="aborted",
+            outcome_map={"preempted": {"DRIVE": "preempted"}},
+        )
+        with both:
+            both.add("DRIVE", smachpy.SimpleActionState("move_base", MoveBaseAction))
+            both.add("LIFT", smachpy.SimpleActionState("lift", MoveBaseAction))
+        sm.add("BOTH", both, {"preempted": "HOME"})
+        sm.add("HOME", smachpy.SimpleActionState("move_base", MoveBaseAction))
+    return sm
+
+
+@pytest.mark.parametrize("reason", ["SIGTERM", "requested", ""])
+def test_a_signal_and_the_end_of_a_program_ask_once_again(tmp_path, reason):
+    path = tmp_path / "run.jsonl"
+    with mission_kit() as kit:
+        kit.action_server("lift", MoveBaseAction).never_finish()
+        robot = kit.action_server("move_base", MoveBaseAction)
+        robot.never_finish()
+        robot.reply(duration=3.0)
+        if reason:
+            kit.trigger(lambda _: kit.shutdown.request(reason), at=2.0)
+        else:
+            kit.interrupt(at=2.0)
+        machine = driving_home()
+        with Recorder(path, machine):
+            assert kit(machine).outcome == "succeeded"
+    recording = read_recording(path)
+    found = reproduce(recording, make=driving_home)
+    assert found.is_same, lines_of(found)
+    asked = [
+        [(e["path"], e["source"], e["by"]) for e in events if e["kind"] == "PreemptRequested"]
+        for events in (recording.events, found.events)
+    ]
+    assert sorted(asked[0]) == sorted(asked[1])
+    assert len(asked[0]) == (4 if reason else 8)  # the test's own request comes beside it
+
+
 def written(path, folder, *arguments):
     file = folder / "test_incident.py"
     file.unlink(missing_ok=True)
