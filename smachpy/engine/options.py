@@ -61,7 +61,7 @@ class Retry(Frozen):
         if isinstance(result, BaseException):
             kinds = tuple(kind for kind in self.on if isinstance(kind, type))
             return isinstance(result, kinds)
-        return result in self.on
+        return isinstance(result, str) and result in self.on
 
     def wait_s(self, attempt: int) -> float:
         """Return the pause after attempt number `attempt` (from 1) [s]."""

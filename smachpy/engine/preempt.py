@@ -141,7 +141,7 @@ class Visit:
         It did if the outcome is 'preempted' or if it called `service_preempt()`. A child that just
         finished its work did not.
         """
-        if outcome == "preempted":
+        if isinstance(outcome, str) and outcome == "preempted":
             return self.is_asked() or self.phase is Phase.LEFT_BEHIND
         if not self.is_asked():
             return False

@@ -361,15 +361,16 @@ def after(
         override: An operator's choice.
     """
     decision = followed(outcome, leads)
+    is_preempted = isinstance(outcome, str) and outcome == "preempted"  # an array answers with one
     chosen = None
     if override is not None and not run_asked and override.holds(answered=answered):
         chosen = override
-    if decision.why is Why.UNKNOWN and outcome == "preempted" and chosen is None:
+    if decision.why is Why.UNKNOWN and is_preempted and chosen is None:
         return STOPPED
     if run_asked and decision.why is FOLLOWED and not decision.target.final:
         if answered:
             return decision._replace(why=Why.ANSWERED)
-        return STOPPED if outcome == "preempted" else STOPPED._replace(target=decision.target)
+        return STOPPED if is_preempted else STOPPED._replace(target=decision.target)
     if chosen is not None:
         if chosen.label is not None:
             return Decision(Why.JUMPED, chosen.label)

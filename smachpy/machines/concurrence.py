@@ -351,9 +351,9 @@ class Concurrence(Container):
                 self, group.frame, self._smachpy.child_termination_cb, (_outcomes(group),)
             )
             no_coroutine(answer)
-            labels = _labels(answer)
         except Exception as error:
             raise raised(group.frame.path, "child_termination_cb", error) from error
+        labels = _labels(group.frame.path, answer)
         with asking("concurrence", branch.here(), f"ended with {branch.outcome!r}"):
             group.ask(self.__chosen(group, labels))
 
@@ -403,19 +403,44 @@ class Concurrence(Container):
         assert self._smachpy.outcome_cb is not None
         try:
             answer = call_bounded(self, frame, self._smachpy.outcome_cb, (dict(outcomes),))
+            no_coroutine(answer)
         except Exception as error:
             raise raised(frame.path, "outcome_cb", error) from error
+        if _is_nothing(answer):
+            return None
         known = self._smachpy.outcomes
-        if answer and answer not in known:
-            raise InvalidTransitionError(unknown_name(f"{frame.path}: outcome_cb", answer, known))
-        return plain(answer) if answer else None
+        if isinstance(answer, str) and answer in known:
+            return plain(answer)
+        problem = unknown_name(f"{frame.path}: outcome_cb", answer, known)
+        hint = "" if isinstance(answer, str) else " None lets the rules decide."
+        raise InvalidTransitionError(f"{problem}{hint}")
 
 
-def _labels(answer: Any) -> list[Any] | bool:
-    """Return the labels in an answer of `child_termination_cb`, or the truth of any other."""
+def _is_nothing(answer: Any) -> bool:
+    try:
+        return not answer
+    except Exception:  # noqa: BLE001  of the user's object, such as an array of NumPy
+        return False
+
+
+def _labels(path: str, answer: Any) -> list[Any] | bool:
+    """Return the labels in an answer of `child_termination_cb`, or the truth of any other.
+
+    Raises:
+        InvalidUserCodeError: it has none, as an array of NumPy.
+    """
     if isinstance(answer, str):
         return [answer]
-    return list(answer) if isinstance(answer, (list, tuple, set, frozenset)) else bool(answer)
+    if isinstance(answer, (list, tuple, set, frozenset)):
+        return list(answer)
+    try:
+        return bool(answer)
+    except Exception as error:
+        raise InvalidUserCodeError(
+            f"{path}: child_termination_cb: got {answer!r}; expected True, False, or labels in a "
+            "list.",
+            path=path,
+        ) from error
 
 
 def _outcomes(group: Group) -> dict[str, str | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 import threading
 
 import pytest
@@ -475,8 +476,16 @@ def test_child_termination_cb_preempts_just_the_labels_it_names(clock):
 class Truthless:
     """As an array of NumPy: it is neither true nor false."""
 
+    __hash__ = None
+
+    def __eq__(self, other):
+        return self
+
     def __bool__(self):
         raise ValueError("the truth value is ambiguous")
+
+    def __repr__(self):
+        return "array([1, 2])"
 
 
 @pytest.mark.parametrize(
@@ -485,7 +494,10 @@ class Truthless:
         (["X"], r"got labels \['X'\]"),
         (["X", 3], r"got labels \[3, 'X'\]"),
         ([["B"]], r"got labels \[\['B'\]\]"),
-        (Truthless(), "child_termination_cb raised ValueError: the truth value"),
+        (
+            Truthless(),
+            r"child_termination_cb: got array\(\[1, 2\]\); expected True, False, or labels",
+        ),
     ],
     ids=["unknown", "mixed", "nested", "truthless"],
 )
@@ -505,6 +517,54 @@ def test_a_wrong_answer_of_child_termination_cb_raises_when_all_have_ended(clock
     with pytest.raises(smach.InvalidUserCodeError, match=said):
         made.execute()
     assert ends == ["/SM_ROOT/A", "/SM_ROOT/B", "/SM_ROOT/DOCK"]
+
+
+@pytest.mark.parametrize("answer", [Truthless(), ["ok"], 3, {"done"}], ids=repr)
+def test_a_wrong_answer_of_outcome_cb_is_an_error_with_its_place(clock, answer):
+    """An array was a bare ValueError about a truth value."""
+    made = both(Say("ok"), Say("ok"), outcome_cb=lambda outcomes: answer)
+    text = re.escape(f"/SM_ROOT: outcome_cb: got {answer!r}; expected one of ['done'")
+    with pytest.raises(smach.InvalidTransitionError, match=f"{text}.*None lets the rules decide"):
+        made.execute()
+    assert not made.is_running()
+
+
+@pytest.mark.parametrize("answer", [None, "", False, []], ids=repr)
+def test_an_outcome_cb_that_answers_nothing_lets_the_rules_decide(clock, answer):
+    made = both(Say("ok"), Say("ok"), outcome_cb=lambda outcomes: answer)
+    assert made.execute() == "done"
+
+
+@pytest.mark.parametrize("kind", ["machine", "concurrence"])
+@pytest.mark.parametrize("watched", [False, True])
+@pytest.mark.parametrize(
+    "options", [{}, {"timeout": 60.0}, {"retry": (2, 0.0, "ok")}, {"preempt_timeout": 1.0}], ids=str
+)
+def test_a_strange_outcome_of_a_state_that_is_asked_to_stop_is_unknown(
+    clock, kind, watched, options
+):
+    """An array was a bare ValueError, and the visit of the state was not ended."""
+
+    class Strange(smach.State):
+        def __init__(self):
+            super().__init__(["ok"], **options)
+
+        def execute(self, userdata):
+            made.request_preempt()
+            return Truthless()
+
+    strange = Strange()
+    if kind == "machine":
+        made = smach.StateMachine(["ok", "aborted", "preempted"])
+        made.add("A", strange)
+    else:
+        made = both(strange, Sleeper())
+    if watched:
+        made.subscribe(lambda event: None)
+    with pytest.raises(smach.SmachError, match=r"/SM_ROOT/A: unknown outcome: got array"):
+        made.execute()
+    assert not strange._preempt_requested
+    assert clock.now() < 60.0
 
 
 def test_child_termination_cb_true_preempts_all_others(clock):
