@@ -132,5 +132,8 @@ class Process:
             timer.cancel()
         return timer
 
+    def interrupt(self, ident: int, error: BaseException) -> bool:
+        return self._clock.interrupt(ident, error)
+
     def run_async(self, main: Coroutine[object, object, Any]) -> Any:
         return self._clock.run_async(main)

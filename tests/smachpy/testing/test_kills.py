@@ -76,6 +76,15 @@ def forgetful():
     return root
 
 
+def test_a_state_of_a_process_is_interrupted_as_one_of_the_test(capsys):
+    """The thread that called the timer was interrupted in its stead."""
+    root = StateMachine(["ok", "bad", "preempted"], name="ONE")
+    root.add("A", leaf())
+    deaf, both = explore(root, faults=["deaf"]), explore(root, faults=["deaf", "kill"])
+    assert both.counterexample.reason == deaf.counterexample.reason
+    assert "Exception in thread" not in capsys.readouterr().err
+
+
 def test_what_a_state_keeps_in_attributes_is_found_missing_and_repeated():
     found = explore(forgetful, faults=["kill"], keep=["COUNT"], preempts=0)
     assert found.stopped_by == "counterexample"
