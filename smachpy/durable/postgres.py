@@ -20,11 +20,14 @@ from psycopg import conninfo, errors
 
 from actionlib_core.clock import RealClock
 from actionlib_core.clock.forks import is_copy
-from smachpy.durable.sql import TABLES, VERSION, Cursor, Dialect, SqlStore
+from smachpy.durable.sql import SqlStore
 from smachpy.durable.store import Reason, StoreError
+from smachpy.durable.tables import TABLES, VERSION, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
+
+    from smachpy.durable.sql_base import Cursor
 
 T = TypeVar("T")
 

@@ -29,11 +29,14 @@ from actionlib_core.clock import RealClock, current_clock
 from actionlib_core.clock.forks import is_copy
 from actionlib_core.process.private_files import make_private_file, make_private_folder
 from smachpy.durable.processes import boot_clock
-from smachpy.durable.sql import TABLES, VERSION, Cursor, Dialect, SqlStore
+from smachpy.durable.sql import SqlStore
 from smachpy.durable.store import Reason, StoreError
+from smachpy.durable.tables import TABLES, VERSION, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from smachpy.durable.sql_base import Cursor
 
 T = TypeVar("T")
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import pytest
 
-from smachpy.durable import sql, sqlite
+from smachpy.durable import sql, sql_queue, sqlite
 from smachpy.durable.processes import this_runner
 from smachpy.durable.store import (
     FencedError,
@@ -154,7 +154,9 @@ def test_what_can_begin_is_found_behind_a_long_queue_that_cannot(store):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_mission_is_taken_as_if_all_were_looked_at_in_order(store, seed, monkeypatch):
-    monkeypatch.setattr(sql, "_FRONT", sql._FRONT.replace(f"LIMIT {sql.FRONT}", "LIMIT 2"))
+    monkeypatch.setattr(
+        sql_queue, "_FRONT", sql_queue._FRONT.replace(f"LIMIT {sql_queue.FRONT}", "LIMIT 2")
+    )
     chance = random.Random(seed)
     some = {
         "robot": [None, "r1", "r2", "r3", "r10"],
