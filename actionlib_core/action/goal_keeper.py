@@ -208,7 +208,8 @@ class GoalKeeper:
     def _tidy_file_soon(self) -> None:
         """Remove from the file, in another thread, what the goals have forgotten."""
         if self.goals.forgotten:
-            self._clock.spawn(self._tidy_file, name=f"{self.name} file")
+            with contextlib.suppress(RuntimeError):  # no thread is left: the next call does it
+                self._clock.spawn(self._tidy_file, name=f"{self.name} file")
 
     def _tidy_file(self) -> None:
         with self._tidying:  # in the order in which it was forgotten

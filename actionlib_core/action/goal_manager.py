@@ -811,10 +811,10 @@ class GoalManager:
         # One timer serves all goals. Running too early does no harm: it is then set again.
         if self._closed or self._due <= due:
             return
+        timer = self.clock.call_later(due - self.clock.now(), self._on_timer)  # or it raises
         if self._timer is not None:
             self._timer.cancel()
-        self._due = due
-        self._timer = self.clock.call_later(due - self.clock.now(), self._on_timer)
+        self._timer, self._due = timer, due
 
     def _look_at_goals(self, now: float) -> list[tuple[ClientGoalHandle, Duty]]:
         """Look at the goals that are due; return what to send for them. Needs the lock."""

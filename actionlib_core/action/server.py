@@ -316,15 +316,21 @@ class ActionServer:
             self._on_stopped()
 
     def _deliver_goal(self, handle: ServerGoalHandle) -> None:
-        self.callback_queue.call(self._run_goal_callback, handle)
-        self.keeper.status.on_arrival()
+        try:
+            self.callback_queue.call(self._run_goal_callback, handle)
+        except RuntimeError as error:  # no thread can be started, the system's limit
+            self.keeper.give_up(handle, f"The goal cannot run: {error}")
+        else:
+            self.keeper.status.on_arrival()
 
     def _run_goal_callback(self, handle: ServerGoalHandle) -> None:
-        """Call the goal callback; if it raises, end the goal, which would otherwise stay."""
+        """Call the goal callback, unless the goal has ended; if it raises, end the goal."""
         # Under the lock: a cancel came before this and waits, or will be delivered on its own.
         with self.lock:
             handle.begun = True
             cancelled = handle.cancel_waits
+        if handle.record.status in TERMINAL:  # ended as its turn came too late
+            return
         if cancelled:
             self.callback_queue.call_urgently(self._run_cancel_callback, handle)
         try:

@@ -94,10 +94,7 @@ class StatusPublisher:
         with self._lock:
             if self._closed or self._change_waits:
                 return
-            self._change_waits = True
-            due = self._clock.now() + GAP_S
-            if self._timer is None or due < self._due:
-                self._arm(due)
+            self._change_waits = self._runs_by(self._clock.now() + GAP_S)
 
     def claim(self, now: float, *, at_once: bool = False) -> bool:
         """Prepare for a goal's change. The caller holds the lock until it has made the list.
@@ -112,13 +109,11 @@ class StatusPublisher:
         if at_once or due <= now:
             self._change_waits = False
             self._published = now
-            if self._timer is None or now + PERIOD_S < self._due:
-                self._arm(now + PERIOD_S)
+            self._runs_by(now + PERIOD_S)
             return True
         if not self._change_waits:
-            self._change_waits = True
-            if self._timer is None or due < self._due:
-                self._arm(due)
+            self._change_waits = self._runs_by(due)
+            return not self._change_waits
         return False
 
     def expire_later(self) -> None:
@@ -126,7 +121,7 @@ class StatusPublisher:
         with self._lock:
             soonest = self._goals.expire(self._clock.now())
             if self._timer is None and soonest is not None:
-                self._arm(soonest)
+                self._runs_by(soonest)
 
     def _send(self, listed: list[StatusEntry]) -> None:
         try:
@@ -140,12 +135,21 @@ class StatusPublisher:
         if self._change_waits and len(self._goals.tracked) <= SHORT:
             self.publish()
 
-    def _arm(self, due: float) -> None:
-        """Let the timer run at `due`. Needs the lock."""
+    def _runs_by(self, due: float) -> bool:
+        """Let the timer run at `due` at the latest; return whether it will. Needs the lock.
+
+        Not if the system has no thread left for it: a goal can begin and end all the same.
+        """
+        if self._timer is not None and self._due <= due:
+            return True
+        try:
+            timer = self._clock.call_later(due - self._clock.now(), self._on_timer)
+        except RuntimeError:
+            return False
         if self._timer is not None:
             self._timer.cancel()
-        self._due = due
-        self._timer = self._clock.call_later(due - self._clock.now(), self._on_timer)
+        self._timer, self._due = timer, due
+        return True
 
     def _on_timer(self) -> None:
         with self._lock:
@@ -158,11 +162,11 @@ class StatusPublisher:
             if not due:
                 repeated = self._published + PERIOD_S
                 if now < repeated:  # a list was sent after the timer was set
-                    self._arm(repeated)
+                    self._runs_by(repeated)
                 elif self._goals.listed():
                     due = True
                 elif soonest is not None:  # an empty list is not repeated
-                    self._arm(soonest)
+                    self._runs_by(soonest)
         self._on_expired()
         if not due:
             return

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from actionlib_core.clock._protocol import Clock, Task
 
+LATE_S = 0.1  # when the system has no thread left, one is tried again after this time
+
 
 class SerialExecutor:
     """Runs submitted callables in order, one at a time, in a task that ends when idle.
@@ -39,10 +41,18 @@ class SerialExecutor:
         # Held while a task runs the queue. It is never waited for: a signal handler that submits
         # may have interrupted a `submit` of the same thread at any line.
         self._busy = _thread.allocate_lock()
+        self._is_late = False  # a timer tries again to start a task
         self._pid = os.getpid()
 
     def submit(self, function: Callable[[], object]) -> None:
-        """Run `function` after everything submitted before it; in a forked process do nothing."""
+        """Run `function` after everything submitted before it; in a forked process do nothing.
+
+        If no thread can be started it runs later.
+
+        Raises:
+            RuntimeError: there is no thread for the clock's timers either, or the interpreter is
+                exiting: it runs after the next call, if there is one.
+        """
         if is_copy(self._pid):
             return
         self._queue.append(function)
@@ -67,9 +77,25 @@ class SerialExecutor:
         if self._queue and self._busy.acquire(blocking=False):
             try:
                 self._spawn(self._drain, name=self._name)
-            except BaseException:  # no thread could be started
+            except BaseException as error:
                 self._busy.release()
+                if not isinstance(error, RuntimeError) or not threading.main_thread().is_alive():
+                    raise
+                self._start_late()
+
+    def _start_late(self) -> None:
+        """Try again later: what waits here may be the last for long."""
+        if not self._is_late:
+            self._is_late = True
+            try:
+                self._clock.call_later(LATE_S, self._start_again)
+            except BaseException:
+                self._is_late = False
                 raise
+
+    def _start_again(self) -> None:
+        self._is_late = False
+        self._start()
 
     def _drain(self) -> None:
         try:

@@ -117,7 +117,11 @@ class Bursts(Generic[T]):
         self.waiting.append(item)
         if not self._called:
             self._called = True
-            self._spawn(self._gather, "feedback")
+            try:
+                self._spawn(self._gather, "feedback")
+            except RuntimeError:  # the system has no thread left
+                self._called = False
+                self.flush()
 
     def flush(self) -> None:
         """Hand on everything that was taken before."""

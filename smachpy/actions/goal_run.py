@@ -459,7 +459,11 @@ class GoalFollower:
         # In another thread: the caller may hold the run's lock, or have interrupted a lock's
         # holder.
         if self._inside:
-            self._wake.clock.spawn(self._act_if_busy, name=f"goal of {self._client.ns}")
+            clock = self._wake.clock
+            try:
+                clock.spawn(self._act_if_busy, name=f"goal of {self._client.ns}")
+            except RuntimeError:  # the system has no thread left: that of the timers does it
+                clock.call_later(0.0, self._act_if_busy)
 
     def _act_if_busy(self) -> None:
         if self._inside:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from actionlib_core import (
@@ -278,6 +280,108 @@ def test_a_goal_for_which_no_thread_can_be_started_is_rejected(world, monkeypatc
         assert sender.wait_for_result(5.0)
         assert ran == [2][: goal - 1]
         assert sender.get_state() == (Status.REJECTED, Status.SUCCEEDED)[goal - 1]
+
+
+def refuse(*_arguments, **_options):
+    raise RuntimeError("can't start new thread")
+
+
+def test_a_goal_whose_callback_gets_a_thread_late_runs_then_and_is_cancelled(world, monkeypatch):
+    """It stayed pending, whatever its client did, and ran when the next goal came."""
+    ran = []
+
+    def take(handle):
+        ran.append(handle.get_goal().goal)
+        handle.set_accepted()
+
+    robot = ActionServer("a", TestAction, take, lambda goal: goal.set_canceled(), node=world.robot)
+    sender = client(world)
+    with monkeypatch.context() as without:
+        without.setattr(robot.callback_queue._executor, "_spawn", refuse)
+        sender.send_goal(TestGoal(1))
+        world.clock.sleep(1.0)
+        sender.cancel_goal()
+        world.clock.sleep(1.0)
+    assert ran == []
+    assert sender.wait_for_result(5.0)
+    assert (ran, sender.get_state()) == ([1], Status.PREEMPTED)
+
+
+@pytest.mark.parametrize("simple", [True, False])
+def test_a_goal_is_rejected_when_no_thread_can_be_started_at_all(world, monkeypatch, simple):
+    """Not even one for the timers, which the status list needs, too."""
+    ran = []
+    if simple:
+        simple = SimpleActionServer("a", TestAction, ran.append, False, node=world.robot)
+        simple.start()
+        robot = simple.action_server
+    else:
+        robot = ActionServer("a", TestAction, ran.append, node=world.robot)
+    sender = client(world)
+    full = SimpleNamespace(now=world.clock.now, call_later=refuse)
+    with monkeypatch.context() as without:
+        without.setattr(robot.keeper.status, "_clock", full)
+        without.setattr(robot.callback_queue._executor, "_clock", full)
+        without.setattr(robot.callback_queue._executor, "_spawn", refuse)
+        if simple:
+            without.setattr(simple, "_start", refuse)
+        sender.send_goal(TestGoal(1))
+        assert sender.wait_for_result(5.0)
+    assert (ran, sender.get_state()) == ([], Status.REJECTED)
+    sender.send_goal(TestGoal(2))
+    assert sender.wait_for_result(5.0) == bool(simple)
+    assert len(ran) == 1  # the rejected one does not come after all
+
+
+def test_a_goal_that_has_ended_before_its_callback_had_its_turn_is_not_begun(world):
+    """Behind a callback that blocked, it came after the server had stopped and rejected it."""
+    ran, held = [], world.clock.event()
+
+    def take(handle):
+        ran.append(handle.get_goal().goal)
+        held.wait(60.0)
+
+    robot = ActionServer("a", TestAction, take, node=world.robot)
+    for goal in (1, 2):
+        client(world).send_goal(TestGoal(goal))
+        world.clock.sleep(1.0)
+    robot.stop()
+    held.set()
+    world.clock.sleep(1.0)
+    assert ran == [1]
+
+
+def test_every_goal_of_a_dead_server_is_lost_though_one_can_start_no_thread(world, monkeypatch):
+    """Those after it were followed for ever."""
+    ActionServer("a", TestAction, lambda goal: goal.set_accepted(), node=world.robot)
+    clients = [ActionClient("a", TestAction, node=world.mission) for _ in range(3)]
+    clients[0].wait_for_server()
+    goals = [one.send_goal(TestGoal(1), transition_cb=bool) for one in clients]
+    world.clock.sleep(1.0)
+    with monkeypatch.context() as without:
+        for one in clients:
+            without.setattr(one._owner.callbacks._executor, "_spawn", refuse)
+        world.robot.transport.kill()
+        world.clock.sleep(1.0)
+    assert [goal.get_goal_status() for goal in goals] == [Status.LOST] * 3
+    assert all(goal.wait(5.0) for goal in goals)
+
+
+def test_a_client_repeats_later_goals_after_its_timer_could_not_be_started(world, monkeypatch):
+    """It took the timer that it had not got for one that runs, and set no other."""
+    sender = ActionClient("a", TestAction, node=world.mission)
+    manager, call_later = sender.manager, world.clock.call_later
+
+    def call_others(delay, callback):
+        return refuse() if callback == manager._on_timer else call_later(delay, callback)
+
+    with monkeypatch.context() as without:
+        without.setattr(world.clock, "call_later", call_others)
+        with pytest.raises(RuntimeError, match="new thread"):
+            sender.send_goal(TestGoal(1))
+    goal = sender.send_goal(TestGoal(2), ack_timeout=1.0)
+    world.clock.sleep(5.0)
+    assert goal.get_goal_status() == Status.LOST
 
 
 def test_a_stopped_client_follows_no_goal_of_another_one(world):

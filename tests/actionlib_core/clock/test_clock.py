@@ -256,6 +256,24 @@ def test_serial_executor_takes_what_a_signal_handler_submits_amid_a_submit():
     assert (order, depth) == (["program", "handler"], [0])
 
 
+def test_serial_executor_runs_its_work_later_if_no_thread_can_be_started(any_clock):
+    """It waited for the next `submit`, which may never come."""
+    order, done, refused = [], any_clock.event(), []
+
+    def spawn(target, *, name):
+        if len(refused) < 3:
+            refused.append(name)
+            raise RuntimeError("can't start new thread")
+        return any_clock.spawn(target, name=name)
+
+    executor = SerialExecutor(any_clock, "serial", spawn)
+    executor.submit(lambda: order.append(1))
+    executor.submit(lambda: order.append(2))
+    executor.submit(done.set)
+    assert done.wait(60)
+    assert order == [1, 2]
+
+
 def test_serial_executor_accepts_work_from_its_own_work(any_clock):
     executor, done = SerialExecutor(any_clock, "serial"), any_clock.event()
     executor.submit(lambda: executor.submit(done.set))

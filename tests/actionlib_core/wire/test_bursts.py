@@ -51,6 +51,23 @@ def test_rest_of_a_burst_comes_together(desk):
     assert list(whens) == [pytest.approx(PAUSE_S)]
 
 
+def test_a_burst_is_handed_on_at_once_while_no_thread_can_be_started(desk, monkeypatch):
+    """It waited for the next status list, and so did all feedback from then on."""
+
+    def refuse(*_arguments, **_options):
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as without:
+        without.setattr(desk.clock, "spawn", refuse)
+        for number in range(50):
+            desk.bursts.take(number)
+        assert desk.items == list(range(50))
+    for number in range(50, 100):
+        desk.bursts.take(number)
+    desk.clock.sleep(2 * PAUSE_S)
+    assert desk.items == list(range(100))
+
+
 def test_flush_hands_on_what_waits_before_something_else_is_done(desk):
     for number in range(50):
         desk.bursts.take(number)

@@ -372,6 +372,37 @@ def test_exec_timeout_cancels_and_aborts(world, caplog):
     assert "PREEMPTED: cancelled after exec_timeout=2 s: stopped" in caplog.text
 
 
+@pytest.mark.parametrize("kind", ["preempt", "exec_timeout"])
+def test_a_goal_is_cancelled_beside_a_callback_though_no_thread_can_be_started(
+    world, monkeypatch, kind
+):
+    """The thread of the state was the only one left to do it, and that was in the callback."""
+    cancelled, spawn = [], world.clock.spawn
+
+    def spawn_others(target, *, name):
+        if name.startswith("goal of"):
+            raise RuntimeError("can't start new thread")
+        return spawn(target, name=name)
+
+    def run(handle):
+        handle.set_accepted()
+        handle.publish_feedback(Feedback(1))
+
+    def end(handle):
+        cancelled.append(world.clock.now())
+        handle.set_canceled()
+
+    world.serve_raw(run, end)
+    monkeypatch.setattr(world.clock, "spawn", spawn_others)
+    limit = {"exec_timeout": 2.0} if kind == "exec_timeout" else {}
+    state = world.state(feedback_cb=lambda *_: world.clock.sleep(8.0), **limit)
+    machine = world.machine(state)
+    if kind == "preempt":
+        world.clock.call_later(2.0, machine.request_preempt)
+    machine.execute()
+    assert cancelled == [2.0]
+
+
 @pytest.mark.parametrize(("wait", "runs", "outcome"), [(29, 2, "succeeded"), (29, 4, "aborted")])
 def test_exec_timeout_does_not_count_while_the_goal_waits_at_the_server(world, wait, runs, outcome):
     """It was recalled from the queue, before it was started."""
