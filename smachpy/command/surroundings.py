@@ -305,6 +305,11 @@ class _Network:
     def wait(self, timeout: float) -> bool:
         assert self._wait is not None
         missing = self._wait.wait(timeout, self._robot)
+        if self._robot is not None and not (self._robot.ready() or shutdown.requested()):
+            raise MissionError(
+                f"--start-robot: the robot is not ready after {timeout:g} s; expected it to be. "
+                "Try a longer --server-timeout."
+            )
         if missing:
             text, way_out = self._explain(missing, timeout)
             # A real robot may lack what the mission needs only in some cases.
@@ -464,7 +469,7 @@ class ServerWait:
                 return {}
             left = deadline - self._clock.now()
             if left <= 0:
-                return dict(self._missing) or {get_node().resolve("move_base"): "move_base"}
+                return dict(self._missing)
             self._wake.wait(left)
             self._wake.clear()
         return {}
@@ -516,7 +521,8 @@ def missing_text(missing: Mapping[str, str], there: Collection[str], timeout: fl
     if any(name.strip("/") != full for full, name in missing.items()):
         called = ", ".join(repr(name) for _, name in sorted(missing.items()))
         text += f" The mission calls {'it' if len(missing) == 1 else 'them'} {called}."
-    near = {close for full in missing for close in _close_names(full, there)}
+    # One that is missing may have come before `there` was looked up.
+    near = {close for full in missing for close in _close_names(full, there)} - {*missing}
     if near:
         text += f" Did you mean {' or '.join(repr(f'/{name}') for name in sorted(near))}?"
     full = min(missing)

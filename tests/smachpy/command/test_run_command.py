@@ -207,6 +207,7 @@ def test_bad_input_is_one_screen_without_traceback(arguments, text, capsys):
     ("arguments", "text"),
     [
         (["--server-timeout", "0.3"], "Try --start-robot"),
+        (["--start-robot", "--server-timeout", "0.01"], "the robot is not ready after 0.01 s"),
         (["--out", "/dev/null/x"], "expected a folder"),
         (["--start-robot", "--map", "nowhere.yaml"], "nowhere.yaml: got"),
         (["--start-robot", "--pose", "0", "0", "0"], "Try --pose X Y YAW"),

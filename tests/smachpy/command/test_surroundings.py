@@ -332,6 +332,11 @@ def test_what_has_no_server_is_named_in_full_with_those_that_may_be_meant(missin
     assert text.count("charge'") <= 4
 
 
+def test_what_has_a_server_just_now_is_not_what_may_be_meant():
+    text = missing_text({"move_base": "move_base"}, ["move_base", "robot_1/move_base"], 2.0)
+    assert "Did you mean '/robot_1/move_base'? Try" in text
+
+
 @pytest.mark.parametrize(("needed", "names", "there"), [
     ({"move_base": "move_base_msgs/MoveBaseAction"}, ("**",), "goals of action '/move_base' would be sent to the ROS 2"),
     ({"go": "nav2_msgs/action/NavigateToPose", "x": "actionlib/TestAction"}, (), "goals of action '/go' would be sent"),
