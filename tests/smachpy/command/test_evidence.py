@@ -229,6 +229,15 @@ def test_scripts_of_ros1_have_no_evidence(capsys):
         assert "got --ros1 beside it" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_recordings_that_are_not_there_are_told_before_the_work(there, capsys):
+    if there:
+        Path("none").mkdir()
+    assert main(["certify", "later.py", "--recordings", "none", "-o", "e.json"]) == 2
+    err = capsys.readouterr().err
+    assert ("got none; expected *.jsonl" if there else "no such file or folder") in err
+
+
 @pytest.mark.slow
 def test_what_is_certified_is_run_by_runners_and_nothing_else(folder, capfd):
     certify = ["certify", "good.py", "--runs", "3", "--input", "word=y", "--jobs", "1"]

@@ -785,6 +785,16 @@ def test_an_existing_file_is_not_overwritten(night, tmp_path, capsys):
     assert (tmp_path / "test_incident.py").read_text() == "mine"
 
 
+@pytest.mark.parametrize("option", ["-o", "--record", "--junit"])
+def test_what_cannot_be_written_is_told_before_the_work(night, tmp_path, capsys, option):
+    _, path = night
+    nowhere = str(tmp_path / "nowhere" / "test_it.py")
+    assert main(["runs", "reproduce", str(path), f"--allow={path.parent}", option, nowhere]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f"{option} {nowhere!r}: cannot write: no such folder" in err
+
+
 def test_expect_needs_a_file_to_write(night, capsys):
     _, path = night
     assert (

@@ -21,7 +21,7 @@ from smachpy.command.run import add_input, read_inputs
 from smachpy.userdata.secret import MASK, hides, holds_secret
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from smachpy.base.cluster import Cluster
     from smachpy.command.arguments import Text
@@ -119,6 +119,7 @@ def _run(args: argparse.Namespace) -> int:
         raise UsageError(f"{where}: expected a name that ends with .json.")
     if args.output.exists() or not args.output.parent.is_dir():
         raise UsageError(f"{where}: expected a new file, in a folder that exists.")
+    recordings = _recordings(args.recordings)
     target, inputs = load_target(args.mission, allow=args.allow), read_inputs(args.input)
     # First: the mission of these files is tried.
     mission, library = mission_facts(target, args.mission), library_facts()
@@ -137,16 +138,17 @@ def _run(args: argparse.Namespace) -> int:
     }
     taken: dict[str, set[str]] = {"explored": set(), "simulated": set(), "recorded": set()}
     with opened_cluster(args.on, _named(args), args.allow) as cluster:
-        for name, part in (
-            ("check", _checked(args, inputs)),
-            ("explore", _explored(args, inputs, taken["explored"], cluster)),
-            ("simulate", _simulated(args, inputs, taken["simulated"], cluster)),
-            ("reproduce", _reproduced(args, taken["recorded"], cluster)),
-        ):
-            evidence[name] = part
+        parts: dict[str, Callable[[], dict[str, Any]]] = {
+            "check": lambda: _checked(args, inputs),
+            "explore": lambda: _explored(args, inputs, taken["explored"], cluster),
+            "simulate": lambda: _simulated(args, inputs, taken["simulated"], cluster),
+            "reproduce": lambda: _reproduced(args, recordings, taken["recorded"], cluster),
+        }
+        for name, try_it in parts.items():
+            part = evidence[name] = try_it()
             print(printable(f"{target.name}: {name}: {part['said']}"), flush=True)
     evidence["taken"] = {kind: sorted(found) for kind, found in taken.items()}
-    evidence["ok"] = all(evidence[n]["ok"] for n in ("check", "explore", "simulate", "reproduce"))
+    evidence["ok"] = all(evidence[name]["ok"] for name in parts)
     if mission_facts(target, args.mission) != mission:
         raise UsageError(f"{where}: the mission's files have changed meanwhile; expected the same.")
     try:
@@ -273,22 +275,35 @@ def _simulated(
     }
 
 
+def _recordings(place: str | None) -> list[str]:
+    """Return the files to reproduce.
+
+    Raises:
+        RecordingError, UsageError: there are none, although a place is given.
+    """
+    from smachpy.events.recording import find_recordings
+
+    if place is None:
+        return []
+    paths = [str(path) for path in find_recordings([place])]
+    if not paths:
+        raise UsageError(
+            f"smachpy certify: --recordings {place!r}: got none; expected *.jsonl files."
+        )
+    return paths
+
+
 def _reproduced(
-    args: argparse.Namespace, taken: set[str], cluster: Cluster | None
+    args: argparse.Namespace, paths: list[str], taken: set[str], cluster: Cluster | None
 ) -> dict[str, Any]:
     from smachpy.command.evidence import transitions_of
-    from smachpy.events.recording import find_recordings, read_recording
+    from smachpy.events.recording import read_recording
     from smachpy.reproduce.report import summary
     from smachpy.reproduce.task import Options
     from smachpy_viz.runs.reproduce_cli import verdicts_of
 
-    if args.recordings is None:
-        return {"ok": True, "said": "no recordings", "recordings": []}
-    paths = [str(path) for path in find_recordings([args.recordings])]
     if not paths:
-        raise UsageError(
-            f"smachpy certify: --recordings {args.recordings!r}: got none; expected *.jsonl files."
-        )
+        return {"ok": True, "said": "no recordings", "recordings": []}
     options = Options(_named(args), tuple(args.allow))
     verdicts = list(verdicts_of(paths, options, args.jobs, cluster))
     for one in verdicts:

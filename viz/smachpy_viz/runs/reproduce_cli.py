@@ -102,6 +102,7 @@ def _write(args: argparse.Namespace) -> int:
         raise UsageError(f"{where}: got {got}; expected one recording.")
     if args.output.suffix != ".py":
         raise UsageError(f"{where} {str(args.output)!r}: expected a name that ends with .py.")
+    _check_new(args.output, "-o")
     with quiet():
         written = write_test(
             read_recording(args.places[0]),
@@ -138,6 +139,7 @@ def _run(args: argparse.Namespace) -> int:
             f"smachpy runs reproduce: {' '.join(args.places)}: got no recordings; expected *.jsonl "
             "files."
         )
+    _check_outputs(args, len(paths))
     options = Options(args.mission, tuple(args.allow), args.seed, tuple(args.tolerate))
     if args.on is not None:  # as the workers know them
         mission, allow = whole_target(args.mission), map(whole_place, args.allow)
@@ -164,6 +166,35 @@ def _run(args: argparse.Namespace) -> int:
             ) from error
     kinds = {verdict.kind for verdict in verdicts}
     return 2 if "failed" in kinds else 1 if "differs" in kinds else 0
+
+
+def _check_outputs(args: argparse.Namespace, recordings: int) -> None:
+    if args.junit is not None:
+        _check_folder(args.junit, "--junit")
+    if args.record is None:
+        return
+    if recordings > 1 or args.on is not None:
+        raise UsageError(
+            f"smachpy runs reproduce: --record: got {recordings} recordings, or --on; expected one "
+            "recording here."
+        )
+    _check_new(args.record, "--record")
+
+
+def _check_new(path: Path, option: str) -> None:
+    """Refuse a file that cannot be written, before the work for it is done."""
+    if path.exists() or path.is_symlink():
+        raise UsageError(
+            f"smachpy runs reproduce: {option} {str(path)!r}: cannot write: File exists."
+        )
+    _check_folder(path, option)
+
+
+def _check_folder(path: Path, option: str) -> None:
+    if not path.parent.is_dir():
+        raise UsageError(
+            f"smachpy runs reproduce: {option} {str(path)!r}: cannot write: no such folder."
+        )
 
 
 def _record(path: Path | None, found: Reproduction) -> None:
@@ -208,11 +239,6 @@ def verdicts_of(
     if len(paths) == 1 and cluster is None:
         yield reproduce_file(paths[0], options, partial(_record, record))
         return
-    if record is not None:
-        raise UsageError(
-            f"smachpy runs reproduce: --record: got {len(paths)} recordings, or --on; expected one "
-            "recording here."
-        )
     count = min(jobs or cores(), len(paths)) if cluster is None else cluster.count
     workers = cluster or Workers(count)
     begun: deque[tuple[str, Future[Verdict]]] = deque()
