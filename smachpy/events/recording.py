@@ -498,7 +498,7 @@ def read_summary(path: str | Path) -> Summary:
             )
             _, line = _last_line(file)
     except OSError as error:
-        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+        raise _unreadable(path, error) from error
     end: Any = None
     has_end = _is_end(line)
     if has_end:
@@ -603,7 +603,7 @@ def each_event(path: str | Path) -> Iterator[dict[str, Any]]:
                 if record is not None and record["kind"] not in _NO_EVENTS:
                     yield record
     except OSError as error:
-        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+        raise _unreadable(path, error) from error
 
 
 def _records(path: Path, file: TextIO) -> Iterator[tuple[int, dict[str, Any] | None]]:
@@ -742,7 +742,7 @@ def read_recording(
                 raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
             return _read(path, file, newest)
     except OSError as error:
-        raise RecordingError(path, f"cannot read: {error.strerror or error}.") from error
+        raise _unreadable(path, error) from error
 
 
 def _read(path: Path, file: TextIO, newest: int | None) -> Recording:
@@ -872,6 +872,12 @@ def _read_line(path: Path, number: int, line: str) -> dict[str, Any]:
         raise RecordingError(
             path, f"line {number}: got {line[:60]!r} ({error}); expected an event."
         ) from error
+
+
+def _unreadable(path: Path, error: OSError) -> RecordingError:
+    if isinstance(error, IsADirectoryError):
+        return RecordingError(path, "got a folder; expected one recorded run. Try a file in it.")
+    return RecordingError(path, f"cannot read: {error.strerror or error}.")
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[Path]:

@@ -471,6 +471,13 @@ def test_a_large_recording_is_explained_event_by_event(record, monkeypatch, caps
     assert capsys.readouterr().out == whole
 
 
+def test_a_folder_is_no_run_whose_end_has_a_cause(tmp_path, capsys):
+    from smachpy.command import main
+
+    assert main(["runs", "why", str(tmp_path)]) == 2
+    assert "got a folder; expected one recorded run. Try a file in it." in capsys.readouterr().err
+
+
 def test_of_a_large_recording_the_page_has_the_newest_events_and_says_so(
     record, monkeypatch, tmp_path, capsys
 ):
