@@ -1,8 +1,38 @@
-"""Waiting for a page in a browser."""
+"""A browser, and waiting for a page in it."""
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 import time
+
+import pytest
+
+# The shell has no window and no services of a desktop: with it the tests take half of the CPU time.
+BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser")
+CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-background-networking",
+    "--font-render-hinting=none",  # texts are as wide in the shell as they are on a screen
+]
+
+
+@contextlib.contextmanager
+def opened_browser():
+    """A browser for a `with`; where there is none the test is skipped."""
+    if CHROMIUM is None:
+        pytest.skip("needs a browser; try: .ci/chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        try:
+            yield browser
+        finally:
+            browser.close()
 
 
 def wait_for(page, condition, timeout=120.0):

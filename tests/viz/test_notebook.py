@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import shutil
 import threading
 import time
 
@@ -13,10 +12,9 @@ import pytest
 
 from smachpy import CBState, State, StateMachine, viz
 from smachpy_viz.pictures.drawing import PictureError
+from tests.browser import opened_browser
 
 pytest.importorskip("anywidget")
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 class Held(State):
@@ -125,28 +123,20 @@ def test_an_interval_that_is_no_time_is_refused(machine, interval):
 
 @pytest.mark.browser
 def test_its_script_shows_the_picture_and_follows(machine, widget):
-    if CHROMIUM is None:
-        pytest.skip("needs a browser; try: apt-get install chromium")
-    from playwright.sync_api import sync_playwright
-
     facts = {"picture": widget.picture, "status": "<b>running</b>"}
     script = widget._esm.replace("export default", "window.widget =")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        try:
-            page = browser.new_page()
-            page.set_default_timeout(60_000)
-            page.set_content(f"<div id='el'></div><script>{script}</script>")
-            page.evaluate(
-                """(facts) => { const on = {}; window.changed = (name, value) => { facts[name] = value;
-                on[`change:${name}`]?.(); }; const model = { get: (name) => facts[name], off() {},
-                on: (name, f) => { on[name] = f; } };
-                window.widget.render({ model, el: document.getElementById("el") }); }""",
-                facts,
-            )
-            page.wait_for_function("document.querySelector('img').naturalWidth > 50")
-            assert page.text_content("p") == "<b>running</b>"
-            page.evaluate(f"changed('status', {json.dumps('ended: done')})")
-            assert page.text_content("p") == "ended: done"
-        finally:
-            browser.close()
+    with opened_browser() as browser:
+        page = browser.new_page()
+        page.set_default_timeout(60_000)
+        page.set_content(f"<div id='el'></div><script>{script}</script>")
+        page.evaluate(
+            """(facts) => { const on = {}; window.changed = (name, value) => { facts[name] = value;
+            on[`change:${name}`]?.(); }; const model = { get: (name) => facts[name], off() {},
+            on: (name, f) => { on[name] = f; } };
+            window.widget.render({ model, el: document.getElementById("el") }); }""",
+            facts,
+        )
+        page.wait_for_function("document.querySelector('img').naturalWidth > 50")
+        assert page.text_content("p") == "<b>running</b>"
+        page.evaluate(f"changed('status', {json.dumps('ended: done')})")
+        assert page.text_content("p") == "ended: done"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -20,15 +19,9 @@ from actionlib_core.config import DOMAIN_VARIABLE
 from actionlib_core.wire.private_network import _free_domain
 from smachpy import CBState, StateMachine
 from smachpy.events.introspection import describe
+from tests.browser import opened_browser
 
 HERE = Path(__file__).parent
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-dev-shm-usage",
-    "--disable-background-networking",
-]
 # A busy computer is no failure: a command waits for its answer, a notice stays until the next one.
 PATIENT = """
 AbortController.prototype.abort = () => {};
@@ -260,14 +253,8 @@ def commanding(simulation):
 
 @pytest.fixture(scope="module")  # its event loop would be in the way of other modules' tests
 def chromium():
-    if CHROMIUM is None:
-        pytest.skip("needs a browser; try: apt-get install chromium")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    with opened_browser() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture
