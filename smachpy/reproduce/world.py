@@ -399,12 +399,14 @@ def _add_messages(world: World, inputs: list[dict[str, Any]]) -> None:
     made: dict[str, float] = {}  # subscriber -> when
     heard: defaultdict[str, int] = defaultdict(int)  # subscriber -> number of its messages
     joined: Counter[str] = Counter()  # topic -> number of its subscribers so far
-    newest: dict[str, list[tuple[float, Any, set[str]]]] = defaultdict(list)  # topic -> messages
+    born: dict[str, int] = {}  # subscriber -> number of its record
+    # Topic -> messages: when, value, subscribers, number of the record.
+    newest: dict[str, list[tuple[float, Any, set[str], int]]] = defaultdict(list)
     own: defaultdict[str, list[tuple[float, Any]]] = defaultdict(list)  # what the mission published
-    for one in inputs:
+    for number, one in enumerate(inputs):
         what, key = one["what"], one.get("key", "")
         if what == "subscriber":
-            made[key] = one["t"]
+            made[key], born[key] = one["t"], number
             joined[one["name"]] += 1
         elif what == "published":
             own[one["name"]].append((one["t"], one.get("value")))
@@ -423,13 +425,18 @@ def _add_messages(world: World, inputs: list[dict[str, Any]]) -> None:
                 world.topics[name] = True
                 known[-1][2].add(key)
                 continue
-            same = next(
-                (m for m in reversed(known[-_NEWEST:]) if m[1] == value and key not in m[2]), None
+            same = next(  # which the subscriber has got, too: it was there, or it was latched
+                (
+                    m
+                    for m in reversed(known[-_NEWEST:])
+                    if m[1] == value and key not in m[2] and (is_first or m[3] > born.get(key, -1))
+                ),
+                None,
             )
             if same is not None and t - same[0] < TWICE_S:
                 same[2].add(key)
                 continue
-            known.append((t, value, {key}))
+            known.append((t, value, {key}, number))
             world.acts.append(Act(t, "message", name, one["type"], value, subscribers=joined[name]))
 
 

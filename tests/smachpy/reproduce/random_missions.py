@@ -45,6 +45,7 @@ class Plan:
         calls: Whether the service answers, after how long [s].
         numbers: When the topic publishes which number.
         preempt: When the mission is asked to stop [s], or None.
+        by: Who asks: "preempt", or a signal.
     """
 
     states: tuple[tuple[str, int, int], ...]
@@ -52,6 +53,7 @@ class Plan:
     calls: tuple[tuple[bool, float], ...]
     numbers: tuple[tuple[float, int], ...]
     preempt: float | None
+    by: str = "preempt"
 
     def machine(self) -> StateMachine:
         """Return a new machine."""
@@ -84,8 +86,12 @@ class Plan:
         numbers = kit.topic("number", Int32)
         for at, value in self.numbers:
             numbers.publish_at(at, data=value)
-        if self.preempt is not None:
+        if self.preempt is None:
+            return
+        if self.by == "preempt":
             kit.preempt(at=self.preempt)
+        else:
+            kit.trigger(lambda _: kit.shutdown.request(self.by), at=self.preempt)
 
 
 def _reply(robot: Any, word: str, seconds: float) -> None:
@@ -174,4 +180,5 @@ def plans(draw: Any) -> Plan:
         tuple(draw(st.lists(st.tuples(st.booleans(), times(0.0113)), max_size=2))),
         tuple(sorted(draw(st.lists(st.tuples(times(0.0171), st.integers(0, 9)), max_size=6)))),
         draw(st.none() | times(0.0057)),
+        draw(st.sampled_from(["preempt", "SIGTERM"])),
     )

@@ -28,6 +28,7 @@ from smachpy.events.recording import Recorder, read_recording
 from smachpy.reproduce.compare import compare, steps_of
 from smachpy.reproduce.report import lines_of
 from smachpy.reproduce.run import ReproductionError, reproduce
+from smachpy.reproduce.world import world_of
 from smachpy.testing import mission_kit
 from tests.smachpy.reproduce.random_missions import Plan, plans
 
@@ -61,6 +62,15 @@ def test_a_goal_that_is_sent_as_the_server_dies_does_not_outlive_it(tmp_path):
     plan = Plan((("drive", 1, 1), ("drive", -1, -1)), (("die", 0.213),), (), (), None)
     found = reproduce(recorded(plan, tmp_path), make=plan.machine)
     assert found.is_same, lines_of(found)
+
+
+def test_a_message_comes_again_that_was_like_one_before_its_subscriber(tmp_path):
+    """It was taken for that one, of which two subscribers had got a copy."""
+    states = (("watch", -1, 1), ("watch", -1, -1))
+    plan = Plan(states, (), (), ((1.0, 9), (1.2, 3), (1.4, 9)), None)
+    recording = recorded(plan, tmp_path)
+    assert [act.t for act in world_of(recording).acts] == [1.0, 1.2, 1.4]
+    assert reproduce(recording, make=plan.machine).is_same
 
 
 MISSION = """
