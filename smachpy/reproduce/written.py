@@ -157,6 +157,13 @@ def write_test(
     return Written(text, trial.runs, tuple(script.gaps))
 
 
+def beside(recording: Recording, mission: str) -> Path:
+    """Return the folder of the mission's file, or else that of the recording."""
+    then = {} if recording.origin is None else recording.origin["mission"]
+    place = (mission or str(then.get("target"))).partition(":")[0]
+    return Path(place if names_file(place) else recording.path).resolve().parent
+
+
 class _Trial:
     """Tries whether the mission takes the recorded way with a script."""
 
@@ -430,7 +437,7 @@ def _import_lines(ends: Iterable[End], imports: list[str]) -> list[str]:
             *plain,
             "",
             *sorted(wanted),
-            "",
+            *([""] if wanted else []),
             *first,
             "",
             *[f"{line}  # noqa: E402" for line in own],

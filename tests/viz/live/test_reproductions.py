@@ -96,12 +96,14 @@ def test_a_run_is_reproduced_and_the_new_one_is_a_machine_outside_the_list(opene
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_test_is_written(opened):
+def test_a_test_is_written_to_be_saved_beside_its_mission(opened, tmp_path):
     _, reproductions, _ = opened
     found = ended(reproductions, reproductions.start({"machine": "night", "what": "test"}))["found"]
     assert (found["kind"], found["file"]) == ("test", "test_night_one.py")
     assert "def test_" in found["test"]
     assert 'assert_path(["WAIT", "EYE"])' in found["test"]
+    assert "sys.path.insert(0, str(Path(__file__).parent))" in found["test"]
+    assert found["notes"] == [f"save it in {str(tmp_path)!r}"]
     asked = {"machine": "night", "what": "test", "expect": "aborted"}
     found = ended(reproductions, reproductions.start(asked))["found"]
     assert "aborted" in found["test"]

@@ -171,7 +171,7 @@ class Reproductions:
                 raise ReproductionRequestError(
                     f"reproductions: {error.strerror or error}."
                 ) from error
-            one = _Started(number, what, file, folder, None)  # type: ignore[arg-type]
+            one = _Started(number, what, file.absolute(), folder, None)  # type: ignore[arg-type]
             with errors:
                 one.process = start_command(self._words(one, expect), errors)
             self._known[number] = one
@@ -236,7 +236,8 @@ class Reproductions:
         words += [f"--allow={place}" for place in self._allow]
         if one.what == "run":
             return [*words, "--json", f"--record={one.output}"]
-        return [*words, f"--output={one.output}", *([f"--expect={expect}"] if expect else [])]
+        words += ["--beside-mission", f"--output={one.output}"]
+        return [*words, *([f"--expect={expect}"] if expect else [])]
 
     def _kill(self, one: _Started) -> None:
         if one.process.poll() is None:

@@ -85,13 +85,15 @@ def add(actions: Any) -> None:
         metavar="OUTCOME",
         help="with -o: the test wants this outcome, and fails until the mission is mended",
     )
+    # For the page: nobody knows where the test will be saved.
+    parser.add_argument("--beside-mission", action="store_true", help=argparse.SUPPRESS)
     parser.set_defaults(run=_run)
 
 
 def _write(args: argparse.Namespace) -> int:
     from smachpy.events.recording import read_recording
     from smachpy.reproduce.task import quiet
-    from smachpy.reproduce.written import write_test
+    from smachpy.reproduce.written import beside, write_test
 
     where = "smachpy runs reproduce: -o"
     if args.record is not None:
@@ -103,13 +105,15 @@ def _write(args: argparse.Namespace) -> int:
     if args.output.suffix != ".py":
         raise UsageError(f"{where} {str(args.output)!r}: expected a name that ends with .py.")
     _check_new(args.output, "-o")
+    recording = read_recording(args.places[0])
+    folder = beside(recording, args.mission) if args.beside_mission else args.output.parent
     with quiet():
         written = write_test(
-            read_recording(args.places[0]),
+            recording,
             mission=args.mission,
             allow=args.allow,
             expect=args.expect,
-            folder=args.output.parent,
+            folder=folder,
         )
     try:
         with args.output.open("x", encoding="utf-8") as file:
@@ -119,7 +123,8 @@ def _write(args: argparse.Namespace) -> int:
             f"{where} {str(args.output)!r}: cannot write: {error.strerror or error}."
         ) from error
     print(printable(f"{args.output}: shortened in {written.runs} runs"))
-    for note in written.notes:
+    needs_place = args.beside_mission and "__file__" in written.text
+    for note in (*written.notes, *([f"save it in {str(folder)!r}"] if needs_place else [])):
         print(printable(f"  note: {note}"))
     return 0
 
