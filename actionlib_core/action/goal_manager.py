@@ -12,7 +12,6 @@ lead back into the client.
 from __future__ import annotations
 
 import contextlib
-import heapq
 import itertools
 import logging
 import math
@@ -23,6 +22,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core import border
+from actionlib_core.clock._deadlines import Deadlines
 from actionlib_core.exceptions import ActionlibError, TransportError
 from actionlib_core.goal.bounded import Recent
 from actionlib_core.goal.client import STATUS_LIST_TIMEOUT_S, STATUSES, Duty, KnownServers
@@ -48,7 +48,6 @@ MISMATCH_S = 0.2
 TICK_S = 0.05  # repetitions and acknowledgements due within this time are sent together
 ACK_AT = 64  # this number of waiting acknowledgements is sent at once
 REPEATED_AT_ONCE = 100  # goals for which something is sent again in one tick
-LOOKS = 256  # planned looks at goals that may belong to ended ones
 REMEMBERED = 1024  # ids of ended goals whose result may arrive again
 LATE_S = 2.0  # a timer that is so late means that this process stood still
 UNREAD_S = 1.0  # what servers have sent meanwhile is read within this time
@@ -157,8 +156,8 @@ class GoalManager:
         self._absence_told = False
         self._absence_timer: Timer | None = None
         self._waiters: list[Event] = []  # of `wait_for_server`; each waking removes them
-        # When to look at which goal, a heap; the number decides between equal times.
-        self._looks: list[tuple[float, int, ClientGoalHandle]] = []
+        # When to look at which goal; not again if there was an earlier look, or it has ended.
+        self._looks: Deadlines[tuple[float, ClientGoalHandle]] = Deadlines(self._is_planned)
         self._numbers = itertools.count()
         self._timer: Timer | None = None
         self._due = math.inf  # when the timer runs [s, clock]; without one, never
@@ -798,13 +797,14 @@ class GoalManager:
         if due >= handle.look_at:  # it looks earlier anyway, and then again
             return
         handle.look_at = due
-        looks = self._looks
-        heapq.heappush(looks, (due, next(self._numbers), handle))
-        if len(looks) > LOOKS + 4 * len(self._goals):  # most of them belong to ended goals
-            self._looks = [(at, n, h) for at, n, h in looks if at == h.look_at and not h.goal.over]
-            heapq.heapify(self._looks)
+        self._looks.push(due, next(self._numbers), (due, handle))
         if due < self._due:
             self._arm(due)
+
+    @staticmethod
+    def _is_planned(_number: int, look: tuple[float, ClientGoalHandle]) -> bool:
+        due, handle = look
+        return due == handle.look_at and not handle.goal.over
 
     def _arm(self, due: float) -> None:
         """Let the timer run at `due` at the latest. Needs the lock."""
@@ -821,11 +821,14 @@ class GoalManager:
         duties: list[tuple[ClientGoalHandle, Duty]] = []
         # The rest is for the next tick: repetitions for thousands of goals at once would keep a
         # busy server from the goals themselves.
-        while self._looks and self._looks[0][0] <= now and len(duties) < REPEATED_AT_ONCE:
-            at, _, handle = heapq.heappop(self._looks)
-            if at != handle.look_at or self._goals.get(handle.goal.id) is not handle:
-                continue  # it has ended, or there was an earlier look
+        while len(duties) < REPEATED_AT_ONCE:
+            first = self._looks.first()
+            if first is None or first[0] > now:
+                break
+            _, handle = self._looks.pop()
             handle.look_at = math.inf
+            if self._goals.get(handle.goal.id) is not handle:
+                continue  # another handle follows the goal now, or it was never sent
             path, duty = handle.goal.tick(now, self.port.lost_link)
             self._pass(handle, path)
             if duty:
@@ -852,7 +855,8 @@ class GoalManager:
                     or f"{who} has sent no status list for {self._status_list_timeout:g} s",
                 )
             duties = self._look_at_goals(now)
-            dues = [self._looks[0][0]] if self._looks else []
+            first = self._looks.first()
+            dues = [] if first is None else [first[0]]
             dues.extend(self._servers.away.values())
             dues.extend(self._servers.foreign.values())
             if dues:

@@ -18,6 +18,7 @@ from actionlib_core import (
 from actionlib_core.action.sent_goal import SentGoal
 from actionlib_core.clock import VirtualClock, use_clock
 from actionlib_core.interfaces.actionlib import msg
+from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
 from actionlib_core.node import Node
 from actionlib_core.transport.memory import MemoryNetwork
 
@@ -169,3 +170,28 @@ def test_goal_that_a_signal_handler_cancels_as_it_is_sent_does_not_run():
                 break
             n += 1
     assert n > 15
+
+
+def test_goal_that_a_signal_handler_sends_as_old_deadlines_are_dropped_has_its_deadline():
+    """It went into a list that was just being replaced: nobody repeated or gave up that goal."""
+    with VirtualClock() as clock, use_clock(clock):
+        node = Node("client", transport=MemoryNetwork(clock).session())
+        client, sent = ActionClient("drive", msg.TestAction, node=node), []
+
+        def send(frame, event, _arg):
+            if event == "return" and frame.f_code.co_name == "_is_planned":
+                sys.setprofile(None)
+                sent.append(client.send_goal(msg.TestGoal(1), ack_timeout=2.0))
+
+        before = sys.getprofile()
+        sys.setprofile(send)
+        try:
+            for _ in range(1000):
+                client.send_goal(msg.TestGoal(0)).cancel()
+        finally:
+            sys.setprofile(before)
+        clock.sleep(5.0)
+        assert sent[0].get_goal_status() == GoalStatus.LOST
+        client.stop()
+        node.close()
+        node.transport.close()
