@@ -22,6 +22,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core import border
+from actionlib_core.clock import SerialExecutor
 from actionlib_core.clock._deadlines import Deadlines
 from actionlib_core.exceptions import ActionlibError, TransportError
 from actionlib_core.goal.bounded import Recent
@@ -159,6 +160,7 @@ class GoalManager:
         # When to look at which goal; not again if there was an earlier look, or it has ended.
         self._looks: Deadlines[tuple[float, ClientGoalHandle]] = Deadlines(self._is_planned)
         self._numbers = itertools.count()
+        self._sender = SerialExecutor(node.clock, f"{name} repetitions")
         self._timer: Timer | None = None
         self._due = math.inf  # when the timer runs [s, clock]; without one, never
         self._closed = False
@@ -861,10 +863,16 @@ class GoalManager:
             dues.extend(self._servers.foreign.values())
             if dues:
                 self._arm(max(min(dues), now + TICK_S))
+        # Without the lock, for which the network's threads may wait, and not in the timers' thread:
+        # queries, which is all that ROS 2 has, wait while a link is full.
+        if duties:
+            self._sender.submit(partial(self._send_all, duties))
+
+    def _send_all(self, duties: list[tuple[ClientGoalHandle, Duty]]) -> None:
+        """Send what goals need again."""
         try:
-            # Sent without the lock, for which the network's threads may wait.
             for handle, duty in duties:
-                self._fulfil(handle, duty, wait=False)  # a full link must not delay other timers
+                self._fulfil(handle, duty, wait=False)
         except TransportError as error:  # the program has closed the session, not the client
             if not self._closed:
                 log.warning("action '%s': its goals are LOST: %s", self.name, error)

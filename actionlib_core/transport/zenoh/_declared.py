@@ -399,7 +399,9 @@ class Subscriber(Declared):
         def on_done() -> None:
             if not answered and retries:
                 again = partial(self._ask, key, retries - 1)
-                self._transport.clock.call_later(LATCH_RETRY_S, again)
+                # Not in the timers' thread: a query waits while a link is full.
+                later = partial(self._transport.loopback.submit, again)
+                self._transport.clock.call_later(LATCH_RETRY_S, later)
 
         self._transport.ask(key, on_reply, on_done)
 

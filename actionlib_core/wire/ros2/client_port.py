@@ -15,6 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 from uuid import uuid4
 
+from actionlib_core.clock import SerialExecutor
 from actionlib_core.exceptions import ActionlibError, TransportError
 from actionlib_core.goal.ports import StatusEntry
 from actionlib_core.goal.states import Status
@@ -153,6 +154,7 @@ class RosClientPort:
             self._on_silent,
         )
         self._readable = Readable(log)
+        self._later = SerialExecutor(node.clock, f"{name} queries")
         self._feedback: Bursts[Sample] = Bursts(node.clock, spawn, self._on_feedback)
 
     def open(self, listener: ClientListener) -> None:
@@ -338,7 +340,7 @@ class RosClientPort:
         if step & Duty.QUEUE:
             self._enqueue(goal)
         if step & Duty.ASK_LATER:
-            self._clock.call_later(goal.pause, partial(self._ask_again, goal))
+            self._clock.call_later(goal.pause, partial(self._ask_apart, goal))
             goal.pause = min(2 * goal.pause, MAX_PAUSE_S)
         if step & Duty.CANCEL:
             self._ask_cancel(goal)
@@ -451,6 +453,10 @@ class RosClientPort:
         for on_done in callbacks:
             on_done()
         self._do(goal, step)
+
+    def _ask_apart(self, goal: _OpenGoal) -> None:
+        """Request a result again, not in the timers' thread: a query waits while a link is full."""
+        self._later.submit(partial(self._ask_again, goal))
 
     def _ask_again(self, goal: _OpenGoal) -> None:
         """Request a result again, if there is a server to answer."""

@@ -8,9 +8,11 @@ has never had a goal has no list yet; it gets a request for the result of an unk
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from typing import TYPE_CHECKING
 
+from actionlib_core.clock import SerialExecutor
 from actionlib_core.exceptions import TransportError
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ class LinkProbe:
     Attributes:
         last_received: When something was received last [s, clock].
 
-    Threads: any; the functions are called by the clock's timer thread.
+    Threads: any; `ask` is called in a thread of its own, the other functions by the clock's timers.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class LinkProbe:
         self._wanted = wanted
         self._on_silent = on_silent
         self._lock = threading.Lock()
+        self._sender = SerialExecutor(clock, "probe of a link")
         self._timer: Timer | None = None
         self._asked: Closable | None = None
         self._asked_at = 0.0
@@ -96,10 +99,12 @@ class LinkProbe:
         else:
             self._asked_at = self._clock.now()
             self._later(min(self._every, WAIT_S), self._judge)
-            try:
-                self._keep(self._ask())
-            except TransportError:  # the session is closed
-                return
+            # Not in the timers' thread: a query waits while a link is full.
+            self._sender.submit(self._send)
+
+    def _send(self) -> None:
+        with contextlib.suppress(TransportError):  # the session is closed
+            self._keep(self._ask())
 
     def _judge(self) -> None:
         self._timer = None
@@ -120,6 +125,7 @@ class LinkProbe:
     def _keep(self, asked: Closable | None) -> None:
         """Close the last probe and keep `asked` instead."""
         with self._lock:
-            last, self._asked = self._asked, asked
-        if last is not None:
-            last.close()
+            last, self._asked = self._asked, None if self._closed else asked
+        for old in (last, asked if self._closed else None):  # it may have been closed meanwhile
+            if old is not None:
+                old.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from actionlib_core.action.client import ActionClient
+from actionlib_core.action.server import ActionServer
 from actionlib_core.action.simple_server import SimpleActionServer
 from actionlib_core.interfaces.actionlib import msg
 from actionlib_core.transport.memory import DEFAULT_QUALITY, MemoryTransport
@@ -73,3 +74,28 @@ def test_what_a_server_answers_on_the_networks_thread_waits_for_no_link(sent):
         recalled = sent.count(("result", True))
         server.action_server.keeper.on_goal(handles[1].get_goal_id(), 1, msg.TestGoal(1), "")
         assert sent.count(("result", True)) == recalled
+
+
+def test_what_a_client_asks_by_itself_holds_up_no_timer_while_a_link_is_full(monkeypatch):
+    """A query waits 5 s then: limits and graces of all missions of the process came as late."""
+    with TwoNodes() as world:
+        query, asked = MemoryTransport.query, []
+
+        def ask(self, *arguments, **options):
+            asked.append(world.clock.now())
+            world.clock.sleep(5.0)
+            return query(self, *arguments, **options)
+
+        monkeypatch.setattr(MemoryTransport, "query", ask)
+        ActionServer("do", msg.TestAction, lambda goal: goal.set_accepted(), node=world.robot)
+        client = ActionClient("do", msg.TestAction, node=world.mission)
+        goal = client.send_goal(msg.TestGoal(1))
+        world.clock.sleep(1.0)
+        goal.cancel()  # the server's code does not answer
+        world.clock.sleep(2.0)
+        assert asked
+        fired = []
+        world.clock.call_later(0.1, lambda: fired.append(world.clock.now()))
+        due = world.clock.now() + 0.1
+        world.clock.sleep(10.0)
+        assert fired == [due]

@@ -580,7 +580,7 @@ class StoppedOnce:
     """The clock of a process that stands still for 60 s after its first probe: SIGSTOP, a debugger."""
 
     def __init__(self, clock):
-        self.now = clock.now
+        self.now, self.spawn = clock.now, clock.spawn
         self._clock = clock
         self._delays = iter((0.0, 60.0))
 
