@@ -16,6 +16,7 @@ const PACKAGES = {
   "@preact/signals-core": {},
   uplot: {},
   gifenc: {},
+  mediabunny: {},
   "@fontsource-variable/inter": { "files/inter-latin-wght-normal.woff2": "inter.woff2" },
   "@fontsource-variable/jetbrains-mono": { "files/jetbrains-mono-latin-wght-normal.woff2": "jetbrains-mono.woff2" },
 };
@@ -35,7 +36,7 @@ async function files() {
   const made = {
     "page.js": await bundle("src/app.tsx", { format: "esm" }),
     "hub-worker.js": await bundle("src/core/hub_worker.ts", { format: "iife" }),
-    "film-worker.js": await bundle("src/drawing/film_worker.ts", { format: "iife" }),
+    "film-worker.js": await bundle("src/drawing/film_worker.ts", { format: "iife", minify: true }), // in each saved page
     "page.css": await bundle("styles/index.css", { external: ["*.woff2"] }),
   };
   const sources = [];

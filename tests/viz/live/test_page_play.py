@@ -302,6 +302,59 @@ def test_the_last_seconds_are_saved_as_a_gif_without_moving_anything(served, loo
     assert page.evaluate(SHOWN).startswith("00:3")
 
 
+PLAYED = """async (bytes) => {
+  const film = document.createElement('video');
+  film.muted = true;
+  film.src = URL.createObjectURL(new Blob([Uint8Array.from(bytes)], { type: 'video/mp4' }));
+  const told = (name) => new Promise((done, failed) => {
+    film.addEventListener(name, done, { once: true });
+    film.addEventListener('error', () => failed(new Error(film.error.message)), { once: true }); });
+  await told('loadeddata');
+  const canvas = new OffscreenCanvas(film.videoWidth, film.videoHeight), g = canvas.getContext('2d');
+  const pictures = [];
+  for (const t of [0.1, film.duration - 0.1]) {
+    const shown = told('seeked');
+    film.currentTime = t;
+    await shown;
+    g.drawImage(film, 0, 0);
+    pictures.push([...g.getImageData(0, 0, canvas.width, canvas.height).data].join());
+  }
+  return [film.videoWidth, film.videoHeight, film.duration, pictures[0] === pictures[1]]; }"""
+
+
+def test_a_video_of_the_selected_stretch_plays_in_the_browser(served, look, tmp_path):
+    served.add("one", events=run())
+    page = look(served.start())
+    page.evaluate(
+        "() => { const { store } = smachpy;"
+        " store.playback.selectStretch(store.data.run.first() + 19000, store.data.run.first() + 21000); }"
+    )
+    with page.expect_download() as download:
+        page.click(".share button:text-is('Video')")
+    assert download.value.suggested_filename.endswith(".mp4")
+    download.value.save_as(tmp_path / "run.mp4")
+    film = (tmp_path / "run.mp4").read_bytes()
+    assert film[4:8] == b"ftyp"
+    blank = page.context.new_page()  # our page plays nothing: its policy forbids it
+    width, height, seconds, is_still = blank.evaluate(PLAYED, list(film))
+    assert 300 < width <= 960
+    assert height > 100
+    assert seconds == pytest.approx(2.2)  # eleven pictures, five a second
+    assert not is_still  # /JOB/B begins on the way
+    page.wait_for_selector(".share button:text-is('Video')")
+
+
+def test_where_the_browser_encodes_no_video_only_a_gif_is_offered(served, look):
+    """Over http, from another computer, browsers have no encoder."""
+    served.add("one", events=run())
+    page = look(served.start())
+    page.wait_for_selector(".share button:text-is('Video')")
+    page.add_init_script("delete window.VideoEncoder;")
+    page.reload()
+    page.wait_for_selector(".share button:text-is('GIF')")
+    assert not page.query_selector(".share button:text-is('Video')")
+
+
 def test_a_film_of_a_large_machine_has_its_tiles_without_an_image_of_all_elements(
     served, look, tmp_path
 ):

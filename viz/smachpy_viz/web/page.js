@@ -10498,18 +10498,20 @@ var WIDEST = 960;
 var HEAD5 = 32;
 var FONTS_MS = 150;
 var MOST_IN_IMAGE = 1e3;
-async function saveFilm(page2) {
+var SUFFIXES = { "image/gif": "gif", "video/mp4": "mp4" };
+var makesVideos = () => "VideoEncoder" in globalThis;
+async function saveFilm(page2, kind) {
   const { run } = store.data;
   store.playback.playing.value = null;
   const shown = store.playback.cursor.value;
   const to = store.playback.nowMs();
   const stretch = store.playback.stretch.value ?? { from: Math.max(run.first() ?? to, to - LAST_MS), to };
   if (store.playback.filmed.value !== null || stretch.from >= stretch.to) return;
-  const name = `${page2.fileName()}.gif`;
+  const name = page2.fileName();
   store.playback.filmed.value = 0;
   try {
-    const film = await draw(page2, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
-    if (film) saveFile(film, name);
+    const film = await draw(page2, kind, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
+    if (film) saveFile(new Blob([film.data], { type: film.type }), `${name}.${SUFFIXES[film.type]}`);
   } catch (error) {
     store.view.notify(`No film: ${messageOf(error)}`, "error");
   } finally {
@@ -10517,19 +10519,19 @@ async function saveFilm(page2) {
     if (run === store.data.run) store.playback.seek(shown);
   }
 }
-async function draw(page2, stretch, isWanted) {
+async function draw(page2, kind, stretch, isWanted) {
   const instants2 = framesOf(stretch);
   const style = await styleText();
   const canvas2 = document.createElement("canvas");
   const g5 = canvas2.getContext("2d", { willReadFrequently: true });
   const worker = await makeWorker("film");
   const ask2 = (told, transfer = []) => new Promise((done, failed) => {
-    worker.onmessage = ({ data }) => done(data.film);
+    worker.onmessage = ({ data }) => "error" in data ? failed(new Error(data.error)) : done(data.film);
     worker.onerror = (e4) => failed(new Error(e4.message || "the encoder cannot be started"));
     worker.postMessage(told, transfer);
   });
   try {
-    worker.postMessage({ frameMs: FILM_FRAME_MS });
+    await ask2({ kind, frameMs: FILM_FRAME_MS });
     for (const [i4, t4] of instants2.entries()) {
       if (!isWanted()) return null;
       store.playback.seek(t4);
@@ -10538,8 +10540,7 @@ async function draw(page2, stretch, isWanted) {
       await ask2({ data, width, height }, [data.buffer]);
       if (isWanted()) store.playback.filmed.value = Math.round(100 * (i4 + 1) / instants2.length);
     }
-    const film = await ask2("end");
-    return film && new Blob([film], { type: "image/gif" });
+    return await ask2("end");
   } finally {
     worker.terminate();
   }
@@ -10551,7 +10552,7 @@ async function paint(page2, canvas2, style, isFirst) {
   const wide = stage.w + floor3.clientWidth;
   const below = timeline.clientWidth ? timeline.clientHeight * wide / timeline.clientWidth : 0;
   const scale = Math.min(1, WIDEST / wide);
-  const [width, height] = [wide * scale, (HEAD5 + stage.h + below) * scale].map(Math.round);
+  const [width, height] = [wide * scale, (HEAD5 + stage.h + below) * scale].map((size) => 2 * Math.round(size / 2));
   if (isFirst) Object.assign(canvas2, { width, height });
   const isLarge = page2.diagram.picture.states.size > MOST_IN_IMAGE;
   let picture = isLarge ? null : await pictureOf(svg2, style);
@@ -10623,20 +10624,21 @@ function ShareButtons({ page: page2 }) {
     saved2.click();
   };
   const done = store.playback.filmed.value;
+  const films = [["gif", "GIF"], ...makesVideos() ? [["video", "Video"]] : []];
   const stop = () => {
     store.playback.filmed.value = null;
   };
   return /* @__PURE__ */ a4("span", { class: "share", children: [
-    done === null ? /* @__PURE__ */ a4(
+    done === null ? films.map(([kind, name]) => /* @__PURE__ */ a4(
       "button",
       {
         class: "film",
-        title: "GIF of the selected stretch, or of the 20 s before the instant shown",
-        onClick: () => saveFilm(page2),
-        children: "GIF"
-      }
-    ) : /* @__PURE__ */ a4("button", { class: "on", title: "stop", onClick: stop, children: [
-      "GIF ",
+        title: `${name} of the selected stretch, or of the 20 s before the instant shown`,
+        onClick: () => saveFilm(page2, kind),
+        children: name
+      },
+      kind
+    )) : /* @__PURE__ */ a4("button", { class: "on", title: "stop", onClick: stop, children: [
       done,
       " % ✕"
     ] }),

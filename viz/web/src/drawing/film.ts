@@ -1,4 +1,5 @@
-// Saves a stretch of the run as a GIF: shows one instant after another and encodes a picture of the page for each.
+// Saves a stretch of the run as a GIF or video: shows one instant after another and encodes a picture of the page for
+// each.
 
 import { makeWorker } from "#core/page_file.ts";
 import type { Stretch } from "#core/playback.ts";
@@ -6,6 +7,7 @@ import { FILM_FRAME_MS, framesOf } from "#core/playback.ts";
 import { messageOf } from "#core/requests.ts";
 import { saveFile } from "#core/share.ts";
 import { store } from "#core/store.ts";
+import type { Answer, Film, Kind, Told } from "#drawing/film_worker.ts";
 import type { Page } from "#drawing/page.ts";
 import { sketch } from "#drawing/sketch.ts";
 import { isDark } from "#drawing/theme.ts";
@@ -16,19 +18,24 @@ const HEAD = 32; // height of the line with the machine's name and the instant [
 const FONTS_MS = 150; // until then the font of the first picture may not be loaded
 const MOST_IN_IMAGE = 1000; // states; an image of more takes longer than a second
 
+const SUFFIXES: Record<Film["type"], string> = { "image/gif": "gif", "video/mp4": "mp4" };
+
+/** Whether this browser can encode a video; over http, most can only for a viewer of the same computer. */
+export const makesVideos = () => "VideoEncoder" in globalThis;
+
 /** Save a film of the selected stretch, otherwise of the last seconds before the instant shown. */
-export async function saveFilm(page: Page) {
+export async function saveFilm(page: Page, kind: Kind) {
   const { run } = store.data;
   store.playback.playing.value = null; // playing would change the instant between two pictures
   const shown = store.playback.cursor.value;
   const to = store.playback.nowMs();
   const stretch = store.playback.stretch.value ?? { from: Math.max(run.first() ?? to, to - LAST_MS), to };
   if (store.playback.filmed.value !== null || stretch.from >= stretch.to) return;
-  const name = `${page.fileName()}.gif`;
+  const name = page.fileName();
   store.playback.filmed.value = 0;
   try {
-    const film = await draw(page, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
-    if (film) saveFile(film, name);
+    const film = await draw(page, kind, stretch, () => run === store.data.run && store.playback.filmed.value !== null);
+    if (film) saveFile(new Blob([film.data], { type: film.type }), `${name}.${SUFFIXES[film.type]}`);
   } catch (error) {
     store.view.notify(`No film: ${messageOf(error)}`, "error");
   } finally {
@@ -38,23 +45,21 @@ export async function saveFilm(page: Page) {
 }
 
 /** @param isWanted whether the film is still wanted */
-async function draw(page: Page, stretch: Stretch, isWanted: () => boolean) {
+async function draw(page: Page, kind: Kind, stretch: Stretch, isWanted: () => boolean) {
   const instants = framesOf(stretch);
   const style = await styleText();
   const canvas = document.createElement("canvas");
   const g = canvas.getContext("2d", { willReadFrequently: true }) as CanvasRenderingContext2D;
   const worker = await makeWorker("film");
-  const ask: (told: object | "end", transfer?: Transferable[]) => Promise<Uint8Array<ArrayBuffer> | null> = (
-    told,
-    transfer = [],
-  ) =>
-    new Promise((done, failed) => {
-      worker.onmessage = ({ data }) => done(data.film);
+  const ask = (told: Told, transfer: Transferable[] = []) =>
+    new Promise<Film | null>((done, failed) => {
+      worker.onmessage = ({ data }: MessageEvent<Answer>) =>
+        "error" in data ? failed(new Error(data.error)) : done(data.film);
       worker.onerror = (e) => failed(new Error(e.message || "the encoder cannot be started"));
       worker.postMessage(told, transfer);
     });
   try {
-    worker.postMessage({ frameMs: FILM_FRAME_MS });
+    await ask({ kind, frameMs: FILM_FRAME_MS });
     for (const [i, t] of instants.entries()) {
       if (!isWanted()) return null;
       store.playback.seek(t);
@@ -63,8 +68,7 @@ async function draw(page: Page, stretch: Stretch, isWanted: () => boolean) {
       await ask({ data, width, height }, [data.buffer]);
       if (isWanted()) store.playback.filmed.value = Math.round((100 * (i + 1)) / instants.length);
     }
-    const film = await ask("end");
-    return film && new Blob([film], { type: "image/gif" });
+    return await ask("end");
   } finally {
     worker.terminate();
   }
@@ -78,7 +82,8 @@ async function paint(page: Page, canvas: HTMLCanvasElement, style: string, isFir
   const wide = stage.w + floor.clientWidth;
   const below = timeline.clientWidth ? (timeline.clientHeight * wide) / timeline.clientWidth : 0;
   const scale = Math.min(1, WIDEST / wide);
-  const [width, height] = [wide * scale, (HEAD + stage.h + below) * scale].map(Math.round);
+  // Encoders of videos take even numbers only.
+  const [width, height] = [wide * scale, (HEAD + stage.h + below) * scale].map((size) => 2 * Math.round(size / 2));
   if (isFirst) Object.assign(canvas, { width, height });
   const isLarge = page.diagram.picture.states.size > MOST_IN_IMAGE;
   let picture = isLarge ? null : await pictureOf(svg, style);

@@ -1,8 +1,26 @@
 // Encodes the pictures of a film, in a worker of its own: it takes most of the time.
 import { applyPalette, GIFEncoder, quantize } from "gifenc";
+import {
+  BufferTarget,
+  getFirstEncodableVideoCodec,
+  Mp4OutputFormat,
+  Output,
+  QUALITY_HIGH,
+  VideoSample,
+  VideoSampleSource,
+} from "mediabunny";
 
-export type Picture = { width: number; height: number; data: Uint8ClampedArray };
-export type Told = { frameMs: number } | Picture | "end";
+export type Kind = "gif" | "video";
+export type Picture = { width: number; height: number; data: Uint8ClampedArray<ArrayBuffer> };
+export type Film = { data: ArrayBuffer; type: "image/gif" | "video/mp4" };
+export type Told = { kind: Kind; frameMs: number } | Picture | "end";
+export type Answer = { film: Film | null } | { error: string };
+
+/** Encodes one film. */
+interface Encoder {
+  add(picture: Picture): void | Promise<void>;
+  end(): Film | Promise<Film>;
+}
 
 const COLOURS = 255; // a GIF has 256: one is transparent
 
@@ -19,7 +37,7 @@ export function keepUnchanged(now: Uint32Array, before: Uint32Array, indexes: Ui
   return isOther;
 }
 
-export class Encoder {
+export class Gif implements Encoder {
   #before: Uint32Array | null = null;
   #due = 0; // duration of the waiting frame [frames]
   /** The frame before; how long it is shown is known when the picture changes. */
@@ -56,19 +74,62 @@ export class Encoder {
   end() {
     this.#write();
     this.#gif.finish();
-    return this.#gif.bytes();
+    return { data: this.#gif.bytes().slice().buffer, type: "image/gif" as const };
+  }
+}
+
+/** An MP4: with H.264, which all programs play, where the browser can encode it. */
+class Video implements Encoder {
+  #made: { output: Output<Mp4OutputFormat, BufferTarget>; source: VideoSampleSource } | null = null;
+  #count = 0;
+  readonly #frameS: number;
+
+  constructor(frameMs: number) {
+    this.#frameS = frameMs / 1000;
+  }
+
+  async #begin(width: number, height: number) {
+    const codec = await getFirstEncodableVideoCodec(["avc", "vp9", "av1"], { width, height });
+    if (!codec) throw new Error("this browser encodes none of H.264, VP9 and AV1; save a GIF");
+    const output = new Output({ format: new Mp4OutputFormat(), target: new BufferTarget() });
+    const source = new VideoSampleSource({ codec, bitrate: QUALITY_HIGH });
+    output.addVideoTrack(source);
+    await output.start();
+    return { output, source };
+  }
+
+  async add({ data, width, height }: Picture) {
+    this.#made ??= await this.#begin(width, height);
+    const place = { timestamp: this.#count * this.#frameS, duration: this.#frameS };
+    const sample = new VideoSample(data, { format: "RGBX", codedWidth: width, codedHeight: height, ...place });
+    this.#count += 1;
+    await this.#made.source.add(sample);
+    sample.close();
+  }
+
+  async end(): Promise<Film> {
+    if (!this.#made) throw new Error("it has no pictures");
+    const { output } = this.#made;
+    await output.finalize();
+    if (!output.target.buffer) throw new Error("the encoder gave nothing");
+    return { data: output.target.buffer, type: "video/mp4" };
   }
 }
 
 let encoder: Encoder | null = null;
 
-function take({ data: told }: MessageEvent<Told>) {
-  if (told === "end") postMessage({ film: encoder?.end() });
-  else if ("frameMs" in told) encoder = new Encoder(told.frameMs);
-  else {
-    encoder?.add(told);
-    postMessage({ film: null });
-  }
+/** Tell the page the film at its end, null for each picture before. */
+async function take(told: Told): Promise<Film | null> {
+  if (told === "end") return (await encoder?.end()) ?? null;
+  if ("kind" in told) encoder = told.kind === "gif" ? new Gif(told.frameMs) : new Video(told.frameMs);
+  else await encoder?.add(told);
+  return null;
 }
 
-if ("WorkerGlobalScope" in globalThis) globalThis.onmessage = take;
+if ("WorkerGlobalScope" in globalThis)
+  globalThis.onmessage = ({ data }: MessageEvent<Told>) => {
+    take(data).then(
+      (film) => postMessage({ film }, film ? { transfer: [film.data] } : {}),
+      (error) => postMessage({ error: String(error?.message ?? error) }),
+    );
+  };

@@ -6,7 +6,7 @@ import { encoded, link } from "#core/requests.ts";
 import { copyText } from "#core/share.ts";
 import { addNote, isShared, removeNote } from "#core/shared_notes.ts";
 import { store } from "#core/store.ts";
-import { saveFilm } from "#drawing/film.ts";
+import { makesVideos, saveFilm } from "#drawing/film.ts";
 import type { Page } from "#drawing/page.ts";
 import { Dialog, fieldValue, Section } from "#panels/components.tsx";
 
@@ -20,22 +20,26 @@ export function ShareButtons({ page }: { page: Page }) {
     saved.click();
   };
   const done = store.playback.filmed.value;
+  const films = [["gif", "GIF"] as const, ...(makesVideos() ? [["video", "Video"] as const] : [])];
   const stop = () => {
     store.playback.filmed.value = null;
   };
   return (
     <span class="share">
       {done === null ? (
-        <button
-          class="film"
-          title="GIF of the selected stretch, or of the 20 s before the instant shown"
-          onClick={() => saveFilm(page)}
-        >
-          GIF
-        </button>
+        films.map(([kind, name]) => (
+          <button
+            key={kind}
+            class="film"
+            title={`${name} of the selected stretch, or of the 20 s before the instant shown`}
+            onClick={() => saveFilm(page, kind)}
+          >
+            {name}
+          </button>
+        ))
       ) : (
         <button class="on" title="stop" onClick={stop}>
-          GIF {done} % ✕
+          {done} % ✕
         </button>
       )}
       <button title="note at the instant shown (n)" onClick={() => store.notes.begin()}>
