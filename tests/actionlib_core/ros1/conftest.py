@@ -27,6 +27,9 @@ PROGRAMS = Path(__file__).parent / "programs"
 ROSMASTER = shutil.which("rosmaster")
 ROS_PYTHON = "/usr/bin/python3"  # the one that Debian's packages are for
 START_S = 60.0
+# What the master's state has, in this order.
+WITHDRAW = ("unregisterPublisher", "unregisterSubscriber", "unregisterService")
+PATIENT_S = 60.0  # without a status list of a server in ROS: a busy one sends none for a while
 
 
 class Ros:
@@ -93,12 +96,26 @@ class Ros:
         return started
 
     def end_programs(self) -> None:
+        """Kill the programs, and take from the master what it still has of them."""
         for program in self.programs:
             program.end()
         self.programs.clear()
+        for part, withdraw in zip(self.ask("getSystemState"), WITHDRAW, strict=True):
+            for name, nodes in part:
+                for node in nodes:
+                    self._withdraw(withdraw, name, node)
+
+    def _withdraw(self, method: str, name: str, node: str) -> None:
+        with xmlrpc.client.ServerProxy(self.uri) as master:
+            of_services = method == "unregisterService"
+            _, _, uri = (
+                master.lookupService(node, name) if of_services else master.lookupNode(node, node)
+            )
+            getattr(master, method)(node, name, uri)
 
     def end(self) -> None:
-        self.end_programs()
+        for program in self.programs:
+            program.end()
         self.end_master()
 
 
@@ -168,13 +185,23 @@ def bridge(ros: Ros, node: Node):
     opened = []
 
     def bridge(**options):
-        opened.append(ros1.bridge(options.pop("master", ros.uri), **options))
+        options = {"master": ros.uri, "status_timeout": PATIENT_S, **options}
+        opened.append(ros1.bridge(options.pop("master"), **options))
         assert opened[-1].wait_for_master(START_S)
         return opened[-1]
 
     yield bridge
     for each in opened:
         each.close()
+
+
+@contextlib.contextmanager
+def impatient(bridge, action: str) -> Iterator[None]:
+    """Let a server in ROS be gone after a moment without a status, while it cannot send any."""
+    side = bridge._actions[action]._side
+    side._status_timeout = 0.5
+    yield
+    side._status_timeout = PATIENT_S
 
 
 @pytest.fixture

@@ -83,7 +83,7 @@ def run(*arguments):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=WAIT_S,
+        timeout=4 * WAIT_S,
     )
     return done.returncode, done.stdout, done.stderr
 

@@ -44,7 +44,8 @@ def test_a_topic_of_ros_arrives_here_in_order(ros, bridge, node):
     bridge(topics=["/chatter"], namespace="robot_1")
     heard = Heard("robot_1/chatter", node, 100)
     assert heard.subscriber.wait_for_connections(1, WAIT_S)
-    (end,) = (e for e in list_endpoints(node.transport) if e.kind is Kind.PUBLISHER)
+    name = "robot_1/chatter"
+    (end,) = list_endpoints(node.transport, kind=Kind.PUBLISHER, name=name, timeout=WAIT_S)
     assert (end.node, end.type, end.md5) == ("robot_1/talker", String._type, String._md5sum)
     assert topics.ask("connections /chatter") == "1"  # rospy counts it after it has said so
     for number in range(100):

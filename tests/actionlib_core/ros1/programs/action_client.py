@@ -13,7 +13,7 @@ from actionlib.msg import TestAction, TestGoal
 rospy.init_node("ros_client")
 begun = threading.Event()
 client = actionlib.SimpleActionClient(sys.argv[1], TestAction)
-print("ready" if client.wait_for_server(rospy.Duration(30)) else "no server", flush=True)
+print("ready" if client.wait_for_server(rospy.Duration(60)) else "no server", flush=True)
 for line in sys.stdin:
     word = line.strip()
     if word == "cancel":
@@ -30,7 +30,7 @@ for line in sys.stdin:
         if int(word) < 0:
             print("sent", flush=True)
             continue
-    client.wait_for_result(rospy.Duration(30))
+    client.wait_for_result(rospy.Duration(60))
     result = client.get_result()
     value = result.result if result else None
     print(client.get_state(), value, client.get_goal_status_text(), flush=True)

@@ -1,7 +1,8 @@
 """What PNP's `PNPActionServer` looks like from outside, on rospy, written from its description.
 
-Actions last 1 s or until an "interrupt" or "end" goal of their id; cancels are not listened to. A
-condition holds while an event of its name is newer than 2 s. Each goal is a line of output; each
+Actions last until an "interrupt" or "end" goal of their id, at most 60 s, and all but `wander` at
+most 0.1 s; cancels are not listened to. A condition holds while an event of its name is newer than
+60 s, not 2 s as in PNP: a busy computer asks late. Each goal is a line of output; each
 line of standard input is published as an event by a node of the robot.
 """
 
@@ -75,21 +76,21 @@ def take(handle):
     handle.set_accepted()
     if goal.function == "start":
         stop = running[goal.id] = threading.Event()
-        threading.Thread(target=run, args=(handle, stop), daemon=True).start()
+        threading.Thread(target=run, args=(handle, goal.name, stop), daemon=True).start()
         return
     if goal.id in running:
         running[goal.id].set()
     handle.set_succeeded()
 
 
-def run(handle, stop):
-    stop.wait(1.0)
+def run(handle, name, stop):
+    stop.wait(60.0 if name == "wander" else 0.1)
     handle.set_succeeded()
 
 
 def answer(request):
     since = events.get(request.cond)
-    holds = since is not None and (rospy.Time.now() - since).to_sec() < 2.0
+    holds = since is not None and (rospy.Time.now() - since).to_sec() < 60.0
     return Condition._response_class(int(holds))
 
 

@@ -27,7 +27,7 @@ print("ready", flush=True)
 for line in sys.stdin:
     name, value = line.split()
     try:
-        rospy.wait_for_service(name, 20)
+        rospy.wait_for_service(name, 60)
         if value == "persistent":
             proxy = rospy.ServiceProxy(name, SetBool, persistent=True)
             first, second = proxy(True), proxy(True)

@@ -6,6 +6,7 @@ import rospy
 from roscpp.msg import Logger
 from std_msgs.msg import String
 
+LONG_S = 60
 rospy.init_node(sys.argv[1])
 publishers = {}
 subscribers = {}
@@ -43,13 +44,13 @@ for line in sys.stdin:
     elif word == "connections":
         (name,) = arguments
         end = publishers.get(name) or subscribers[name]
-        deadline = rospy.get_time() + 20
+        deadline = rospy.get_time() + LONG_S
         while not end.get_num_connections() and rospy.get_time() < deadline:
             rospy.sleep(0.01)
         answer = str(end.get_num_connections())
     elif word == "heard":
         texts, count = heard[arguments[0]], int(arguments[1])
-        deadline = rospy.get_time() + 20
+        deadline = rospy.get_time() + LONG_S
         while len(texts) < count and rospy.get_time() < deadline:
             rospy.sleep(0.01)
         answer = " ".join(texts)
