@@ -46,14 +46,17 @@ SLOW = {
     "guided_recovery.md",
 }
 MARKED = [
-    pytest.param(page, marks=pytest.mark.slow) if page.name in SLOW else page for page in PAGES
+    pytest.param(page, marks=[pytest.mark.slow, pytest.mark.timeout(900)])
+    if page.name in SLOW
+    else page
+    for page in PAGES
 ]
 FENCE = re.compile(
     r"(?:<!-- (?P<directive>file|exit|shown): (?P<value>.*?) -->\n+)?"
     r"^```(?P<language>\w+)[^\n]*\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-COMMAND_S = 60
+COMMAND_S = 250
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from actionlib_core.transport.zenoh._declared import (
     _pack_numbers,
 )
 from actionlib_core.transport.zenoh._shared import FEW
+from actionlib_core.wire.private_network import _free_domain
 from tests.free_port import free_port
 
 pytestmark = pytest.mark.zenoh
@@ -214,7 +215,7 @@ def test_close_does_not_wait_for_a_process_that_does_not_read(monkeypatch):
         def flood():
             try:
                 while True:
-                    timer = CLOCK.call_later(0.3, stuck.set)
+                    timer = CLOCK.call_later(3.0, stuck.set)  # on a busy computer one takes long
                     publisher.put(bytes(1_000_000))
                     timer.cancel()
             except TransportError:
@@ -408,14 +409,15 @@ def test_what_cannot_work_is_an_error(fields, text):
 
 
 def test_domains_do_not_meet():
-    first, second = load_config().domain, load_config().domain % 9999 + 1
-    sessions = [ZenohTransport(Config(domain=domain, settle=0.3)) for domain in (first, second)]
-    try:
-        sessions[0].declare_alive("@test/a")
-        assert sessions[1].list_alive("@test/*", 0.5) == []
-    finally:
-        for session in sessions:
-            session.close()
+    with _free_domain() as second:
+        first = load_config().domain
+        sessions = [ZenohTransport(Config(domain=domain, settle=0.3)) for domain in (first, second)]
+        try:
+            sessions[0].declare_alive("@test/a")
+            assert sessions[1].list_alive("@test/*", 0.5) == []
+        finally:
+            for session in sessions:
+                session.close()
 
 
 def test_settled_session_knows_the_others_when_it_is_open():
@@ -437,7 +439,7 @@ def test_no_thread_of_ours_while_idle():
     try:
         for number in range(50):
             transport.subscribe(f"key/{number}", print)
-        assert {t for t in threading.enumerate() if t.name.startswith("transport")} == before
+        assert {t for t in threading.enumerate() if t.name.startswith("transport")} <= before
     finally:
         transport.close()
 

@@ -14,6 +14,16 @@ from smachpy.exceptions import MissionError
 from smachpy.states.questions import Question
 
 COMMAND = [sys.executable, "-m", "smachpy.command"]
+# The same, but it takes a network on which it finds nothing at once for a busy one.
+PATIENT = """
+import sys
+from actionlib_core.wire import presence
+from smachpy.command import main
+
+presence.FIRST_S = presence.SETTLE_MOST_S = 60.0
+presence.is_busy = lambda: True
+sys.exit(main())
+"""
 MISSION = """
     import smachpy
     from smachpy.events import QuestionAsked
@@ -41,9 +51,9 @@ def question(path):
 def test_a_mission_in_another_process_is_answered_by_name(tmp_path):
     (tmp_path / "ask.py").write_text(textwrap.dedent(MISSION))
 
-    def answer(*words):
+    def answer(*words, command=(sys.executable, "-c", PATIENT)):
         done = subprocess.run(
-            [*COMMAND, "answer", *words], capture_output=True, text=True, timeout=200
+            [*command, "answer", *words], capture_output=True, text=True, timeout=200
         )
         return done.returncode, done.stdout, done.stderr
 
@@ -70,8 +80,8 @@ def test_a_mission_in_another_process_is_answered_by_name(tmp_path):
     events = [json.loads(line) for line in record.read_text().splitlines()]
     (answered,) = (event for event in events if event.get("kind") == "QuestionAnswered")
     assert (answered["answer"], answered["by"]) == ("yes", "ann")
-    assert answer()[0] == 1  # nobody asks any more
-    code, _, told = answer("yes")
+    assert answer(command=COMMAND)[0] == 1  # nobody asks any more
+    code, _, told = answer("yes", command=COMMAND)
     assert code == 2
     assert "no question" in told
 

@@ -161,7 +161,7 @@ def test_a_mission_that_is_killed_takes_its_robot_along(far):
         (robot,) = children_of(process.pid)
         process.kill()
         process.wait()
-        wait_gone(robot, 30.0)
+        wait_gone(robot, 60.0)
 
 
 @pytest.mark.slow
