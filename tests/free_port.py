@@ -9,7 +9,7 @@ from pathlib import Path
 
 FIRST = 10_000
 _RANGE = Path("/proc/sys/net/ipv4/ip_local_port_range")
-_numbers = itertools.count(50 * os.getpid())  # the workers of a run are processes in a row
+_numbers = itertools.count(1000 * os.getpid())  # the workers of a run are processes in a row
 
 
 def free_port() -> int:

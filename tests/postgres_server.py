@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 QUICK = (
     "-c fsync=off -c listen_addresses=127.0.0.1 -c unix_socket_directories= -c max_connections=40"
 )
-WITHIN_S = 60
+WITHIN_S = 250
 
 
 def programs() -> Path | None:

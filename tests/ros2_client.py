@@ -43,7 +43,7 @@ class Pending:
         self.replies: list[Reply] = []
         self.done: Event = clock.event()
 
-    def answer(self, timeout: float = 20.0) -> Answer:
+    def answer(self, timeout: float = 60.0) -> Answer:
         assert self.done.wait(timeout), "the query has not ended"
         if not self.replies:
             return Answer(None)

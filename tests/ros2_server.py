@@ -95,7 +95,7 @@ class Ros2Server:
         for end in (*self.ends, *self.declared, self.feedback, self.status):
             end.close()
 
-    def wait(self, condition: Callable[[], object], timeout: float = 30.0) -> None:
+    def wait(self, condition: Callable[[], object], timeout: float = 60.0) -> None:
         deadline = self.clock.now() + timeout
         while not condition():
             self.news.clear()
