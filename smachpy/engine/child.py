@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from smachpy.base.problems import plain
 from smachpy.engine.callback import call_bounded
-from smachpy.engine.errors import user_error
+from smachpy.engine.errors import error_of, user_error
 from smachpy.engine.interrupt import Interruption, uninterrupted
 from smachpy.engine.preempt import asking, choose, end_visit, forget_visit, request_soon, start
 from smachpy.engine.shutdown_check import is_shutdown
@@ -55,17 +55,27 @@ def run_child(frame: Frame, step: Step) -> Decision:
         if frame.dead:
             raise
         outcome = step.outcome_if_interrupted(outcome)
-    except BaseException as error:
+    except BaseException as error:  # noqa: BLE001  raised below
         uninterrupted(frame, partial(forget_visit, frame))
         step.forget_choices()  # the journal may have raised after the conditions had decided
-        if frame.is_branch or isinstance(error, SmachError) or not isinstance(error, Exception):
-            raise
-        raise user_error(step.path_in(frame), step.state, error) from error
+        raise _as_raised(frame, step, error)  # noqa: B904  it has its cause
     try:
         decision = end_visit(frame, outcome)
     except Interruption:  # injected just before the child ended, which counts
         decision = uninterrupted(frame, partial(end_visit, frame, outcome))
     return decision if step.choices is None else _decided(frame, step, decision)
+
+
+def _as_raised(frame: Frame, step: Step, error: BaseException) -> BaseException:
+    """Return what the container raises if a child has raised `error`."""
+    own = error_of(error)
+    if own is None:
+        return error
+    if frame.is_branch or isinstance(own, SmachError):
+        return own
+    made = user_error(step.path_in(frame), step.state, own)
+    made.__cause__ = own
+    return made
 
 
 def _decided(frame: Frame, step: Step, decision: Decision) -> Decision:

@@ -100,18 +100,19 @@ def run_with_cleanup(frame: Frame, step: Step, run_others: Callable[[], str]) ->
     """Run the other children of the container of `frame`, then its clean-up `step`.
 
     It does not run if the container was asked to stop before it has begun: then nothing has been
-    started that needs it. Nor does it after what ends the process, such as a second Ctrl-C.
+    started that needs it. Nor does it after what ends the process, such as a second Ctrl-C, or
+    `sys.exit()` in a durable run, whose goals the next process follows.
 
     Returns:
         The outcome of the others; that of the clean-up, or its exception, is only reported.
 
     Raises:
-        Exception: the others raised it.
+        Exception, SystemExit: the others raised it.
         Interruption: the thread was left behind.
     """
     container, journal = frame.container, frame.run.journal
     before_resume = journal.ending(frame)
-    failure: Exception | None = None
+    failure: Exception | SystemExit | None = None
     outcome = ""
     if before_resume is not None:
         ending = Ending(*before_resume)
@@ -127,8 +128,8 @@ def run_with_cleanup(frame: Frame, step: Step, run_others: Callable[[], str]) ->
             if frame.dead:
                 raise
             outcome = "preempted" if frame.answered else frame.end_preempted()
-        except Exception as error:  # raised below, after the clean-up
-            if frame.dead:
+        except (Exception, SystemExit) as error:  # raised below, after the clean-up
+            if frame.dead or (journal.is_durable and isinstance(error, SystemExit)):
                 raise
             failure = error
         asked = container._preempt_requested or frame.answered

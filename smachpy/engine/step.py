@@ -15,7 +15,7 @@ from smachpy.base.functions import is_coroutine_function, name_of, takes, unrun_
 from smachpy.base.slips import ACCEPTING
 from smachpy.engine.callback import call_bounded
 from smachpy.engine.container import run_container
-from smachpy.engine.errors import raised
+from smachpy.engine.errors import error_of, raised
 from smachpy.engine.frame import clock_of_run
 from smachpy.engine.interrupt import Interruption, ProgramEnds, uninterrupted
 from smachpy.engine.options import NO_OPTIONS
@@ -428,9 +428,9 @@ def _with_options(
         try:
             if not wait or _begins_again(frame, state, wait):
                 outcome = _attempts(frame, state, options, execute, userdata, attempt)
-        except (Exception, Interruption) as error:
+        except (Exception, SystemExit, Interruption) as error:
             if options.on_exit is not None and not frame.dead:
-                left = None if isinstance(error, Exception) else outcome
+                left = outcome if isinstance(error, Interruption) else None
                 _tidy_up(frame, state, options.on_exit, userdata, left)
             raise
         if options.on_exit is not None:
@@ -458,8 +458,8 @@ def _attempts(
         timed_out = False
         try:
             result = "preempted" if passed else execute(userdata)
-        except (Exception, Interruption) as error:  # noqa: BLE001  raised below
-            result = error
+        except BaseException as error:  # noqa: BLE001  raised below
+            result = _result_of(error)
         finally:
             if timer is not None:
                 timed_out = uninterrupted(frame, partial(timer.end, result))
@@ -481,6 +481,18 @@ def _attempts(
             makes = "on_exception makes it" if decision != "preempted" else "asked to stop:"
             log.logwarn(f"{frame.here()}: {error_text(result)}; {makes} {decision!r}")
         return decision
+
+
+def _result_of(error: BaseException) -> BaseException:
+    """Return the result of an attempt that raised `error`.
+
+    Raises:
+        BaseException: `error`, if it ends the program.
+    """
+    result = error if isinstance(error, Interruption) else error_of(error)
+    if result is None:
+        raise error
+    return result
 
 
 def _begins_again(frame: Frame, state: Child, wait: float) -> bool:

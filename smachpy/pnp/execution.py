@@ -137,8 +137,8 @@ class Execution:
         except BaseException as error:
             with asking("plan", frame.path, f"raised {type(error).__name__}"):
                 self.branches.ask(self.branches.threads())
-            # Not for a KeyboardInterrupt or SystemExit, nor if this thread was left behind.
-            if isinstance(error, (Exception, Interruption)) and not frame.dead:
+            # Not for a KeyboardInterrupt, nor if this thread was left behind.
+            if isinstance(error, (Exception, SystemExit, Interruption)) and not frame.dead:
                 self._await_all()
             raise
         finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 import threading
 import warnings
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import smachpy
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
 from smachpy import (
     Concurrence,
     Ending,
@@ -24,6 +26,8 @@ from smachpy import (
     StateMachine,
 )
 from smachpy.checks import after_any_end, check
+from smachpy.engine import shutdown_check
+from smachpy.events import PreemptRequested
 from smachpy.pnp import PetriNetPlan
 from smachpy.testing import explore, mission_kit
 from tests.smachpy.pnp.nets import net_of
@@ -523,3 +527,189 @@ def test_it_is_not_lost_if_an_operator_holds_it_for_longer_than_its_grace():
             mission(both)
         assert mission.clock.now() >= 65.0
     assert len(dock.endings) == 2
+
+
+class Ends(State):
+    """Raises what it is given, if it is."""
+
+    def __init__(self, error: BaseException | None, **options: Any) -> None:
+        super().__init__(["done", "aborted"], **options)
+        self.runs = 0
+        self.error = error
+
+    def execute(self, userdata: Any) -> str:
+        self.runs += 1
+        if self.error is None:
+            return "done"
+        raise self.error
+
+
+def concurrence_of(state: State, cleanup: State) -> Concurrence:
+    both = Concurrence(["done", "preempted"], "done", name="C")
+    both.add("WORK", state)
+    both.add("OTHER", Step(60.0))
+    both.add_cleanup("STOP", cleanup)
+    return both
+
+
+CONTAINERS = [machine_of, concurrence_of, iterator_of, plan_of]
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"timeout": 60.0}, {"retry": (2, 0.0, "aborted")}], ids=str
+)
+@pytest.mark.parametrize("make", CONTAINERS)
+def test_it_runs_after_sys_exit_of_a_state_which_ends_the_program_afterwards(make, options):
+    dock = Dock(0.0)
+    machine = make(Ends(SystemExit(3), **options), dock)
+    for _ in range(2):
+        with use_clock(VirtualClock()), pytest.raises(SystemExit) as ends:
+            machine.execute()
+        assert ends.value.code == 3
+    assert dock.endings == [Ending(None, "SystemExit: 3", preempted=False)] * 2
+
+
+@pytest.mark.parametrize("make", CONTAINERS)
+def test_what_ends_the_program_at_once_ends_it_without(make):
+    dock = Dock(0.0)
+    with use_clock(VirtualClock()), pytest.raises(KeyboardInterrupt):
+        make(Ends(KeyboardInterrupt()), dock).execute()
+    assert dock.endings == []
+
+
+def test_sys_exit_in_a_durable_mission_leaves_all_to_the_next_process(tmp_path):
+    """As its goals, which are followed there."""
+    dock, where = Dock(0.0), tmp_path / "missions.db"
+    with pytest.raises(SystemExit):
+        smachpy.run_durable(machine_of(Ends(SystemExit(3)), dock), where, mission="m")
+    assert dock.endings == []
+    assert smachpy.run_durable(machine_of(Ends(None), dock), where, mission="m") == "done"
+    assert dock.endings == [Ending("done", "", preempted=False)]
+
+
+@pytest.mark.parametrize("options", [{}, {"timeout": 60.0}, {"on_enter": repr}], ids=str)
+@pytest.mark.parametrize("make", CONTAINERS)
+def test_a_cancelled_error_of_asyncio_is_an_error_of_the_state(make, options):
+    """It went through all machines, without clean-ups, and cancelled who waited for the mission."""
+    dock = Dock(0.0)
+    with use_clock(VirtualClock()), pytest.raises(InvalidUserCodeError, match=CANCELLED) as caught:
+        make(Ends(asyncio.CancelledError(), **options), dock).execute()
+    assert len(dock.endings) == 1
+    assert caught.value.path.endswith(("/WORK", "/EACH"))
+
+
+CANCELLED = "RuntimeError: got a CancelledError of asyncio; expected an outcome"
+
+
+def test_a_cancelled_error_of_asyncio_is_retried_and_covered_by_on_exception():
+    options = {"retry": (3, 0.0, RuntimeError), "on_exception": {RuntimeError: "aborted"}}
+    work = Ends(asyncio.CancelledError(), **options)
+    sm = StateMachine(["done", "aborted"])
+    sm.add("WORK", work)
+    assert sm.execute() == "aborted"
+    assert work.runs == 3
+
+
+class Answers(State):
+    """Services its request, and tells by its outcome what it has done."""
+
+    def __init__(self) -> None:
+        super().__init__(["parked", "preempted"])
+
+    def execute(self, userdata: Any) -> str:
+        self.wait_preempt()
+        self.service_preempt()
+        return "parked"
+
+
+@pytest.mark.parametrize("cleanup", [False, True])
+def test_the_machine_above_goes_on_after_a_serviced_request_as_it_would_without(cleanup):
+    dock = Dock()
+    inner = StateMachine(["parked", "preempted"])
+    inner.add("WORK", Answers())
+    if cleanup:
+        inner.add_cleanup("DOCK", dock)
+    outer = StateMachine(["done", "preempted"], name="O")
+    outer.add("IN", inner, {"parked": "NEXT"})
+    outer.add("NEXT", Step())
+    with mission_kit() as mission:
+        mission.preempt(at=1.0)
+        run = mission(outer)
+    assert (run.outcome, run.visits("NEXT")) == ("done", 1)
+    assert dock.endings == ([Ending("parked", "", preempted=True)] if cleanup else [])
+
+
+def test_termination_callbacks_get_the_state_that_ended_the_machine():
+    ends = []
+    sm = machine_of(Step(0.0), Dock(0.0))
+    sm.register_termination_cb(lambda userdata, labels, outcome: ends.append((labels, outcome)))
+    sm.execute()
+    assert ends == [(["WORK"], "done")]
+
+
+def block(*_: Any) -> None:
+    current_clock().event("nothing").wait()
+
+
+@pytest.mark.parametrize("during", [False, True])
+def test_a_termination_callback_that_blocks_has_its_grace_after_the_clean_up(during):
+    sm = machine_of(Step(5.0), Dock(3.0), preempt_timeout=2.0)
+    sm.register_termination_cb(block)
+    with mission_kit() as mission:
+        mission.preempt(on="DOCK" if during else "WORK", after=1.0)
+        run = mission(sm)
+    assert run.outcome == "preempted"
+    assert run.duration == pytest.approx(5.0 * during + 1.0 * (not during) + 3.0 + 2.0, abs=0.2)
+
+
+def test_it_runs_after_a_callback_that_was_interrupted():
+    dock = Dock(3.0)
+    sm = StateMachine(["done", "preempted"], name="M", preempt_timeout=2.0)
+    sm.add("WORK", Step(1.0), {"done": "MORE"})
+    sm.add("MORE", Step())
+    sm.add_cleanup("DOCK", dock)
+    sm.register_transition_cb(block)
+    with mission_kit() as mission:
+        mission.preempt(at=4.0)
+        run = mission(sm)
+    assert (run.outcome, run.path) == ("preempted", ("/M/WORK", "/M/DOCK"))
+    assert run.duration == pytest.approx(4.0 + 2.0 + 3.0, abs=0.2)
+    assert dock.endings == [Ending("preempted", "", preempted=True)]
+
+
+def test_a_shutdown_check_that_has_stopped_the_others_does_not_stop_it():
+    answers = iter([False, True])
+    dock = Dock(30.0)
+    try:
+        smachpy.set_shutdown_check(lambda: next(answers, True))
+        sm = machine_of(Step(), dock)
+        sm.add("MORE", Step())
+        sm._smachpy.transitions["WORK"]["done"] = "MORE"
+        with mission_kit() as mission:
+            run = mission(sm)
+    finally:
+        shutdown_check.reset_shutdown_check()
+    assert (run.outcome, run.path, run.duration) == ("preempted", ("/M/WORK", "/M/DOCK"), 31.0)
+
+
+def test_a_mission_that_has_raised_goes_on_with_that_state_and_cleans_up_again(tmp_path):
+    dock, where = Dock(0.0), tmp_path / "missions.db"
+    with pytest.raises(InvalidUserCodeError):
+        smachpy.run_durable(machine_of(Ends(OSError("no door")), dock), where, mission="m")
+    works = Ends(None)
+    assert smachpy.run_durable(machine_of(works, dock), where, mission="m") == "done"
+    assert works.runs == 1
+    assert [ending.outcome for ending in dock.endings if ending] == [None, "done"]
+
+
+def test_who_asked_again_is_told_when_it_is_asked_to_stop_after_its_grace():
+    heard: list[PreemptRequested] = []
+    sm = machine_of(Step(60.0), Dock(1000.0, preempt_timeout=5.0))
+    sm.subscribe(lambda e: heard.append(e) if isinstance(e, PreemptRequested) else None)
+    with mission_kit() as mission:
+        mission.preempt(at=1.0)
+        mission.preempt(on="DOCK", after=2.0)
+        mission(sm)
+    (dock,) = [event for event in heard if event.path == "/M/DOCK"]
+    (again,) = [event for event in heard if event.path == "/M"][1:]
+    assert dock.asker == again.asker

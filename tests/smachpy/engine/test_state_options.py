@@ -868,3 +868,23 @@ def test_an_exception_that_becomes_an_outcome_is_logged_with_its_reason(caplog):
     assert record.getMessage() == (
         "/M/HOLD: OSError: no answer from the gripper; on_exception makes it 'failed'"
     )
+
+
+@pytest.mark.parametrize("kind", ["state", "machine"])
+def test_on_exit_is_called_after_sys_exit(kind):
+    """What `on_enter` had switched on stayed on."""
+    heard = []
+    hooks = {
+        "on_enter": lambda ud: heard.append("on"),
+        "on_exit": lambda ud, outcome: heard.append(outcome),
+    }
+
+    def leave(ud):
+        raise SystemExit(3)
+
+    state = smachpy.CBState(leave, outcomes=["ok"], **(hooks if kind == "state" else {}))
+    inner = smachpy.StateMachine(["ok"], **(hooks if kind == "machine" else {}))
+    inner.add("A", state)
+    with pytest.raises(SystemExit):
+        inner.execute()
+    assert heard == ["on", None]
