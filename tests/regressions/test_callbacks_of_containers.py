@@ -19,10 +19,10 @@ LONG_S = 60.0
 
 
 class Work(State):
-    """Works for `seconds`, unless it is asked to stop."""
+    """Works for `seconds`, unless it is asked to stop; a busy computer lets it stop late."""
 
-    def __init__(self, seconds=0.0, **options):
-        super().__init__(["done", "preempted"], **options)
+    def __init__(self, seconds=0.0, *, preempt_timeout=LONG_S):
+        super().__init__(["done", "preempted"], preempt_timeout=preempt_timeout)
         self.seconds = seconds
         self.ran = 0
 
@@ -342,7 +342,7 @@ def test_branches_have_their_own_grace_while_a_callback_blocks(execute):
         inside.set()
         go_on.wait(LONG_S)
 
-    slow = Slow(preempt_timeout=LONG_S)
+    slow = Slow()
     machine = both_of(Work(), slow, child_termination_cb=block)
     asker = threading.Thread(target=lambda: inside.wait(LONG_S) and machine.request_preempt())
     asker.start()
