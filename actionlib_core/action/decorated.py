@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from actionlib_core.action.simple_server import TEXT_ACCEPTED, SimpleActionServer
 from actionlib_core.exceptions import ActionlibError
-from actionlib_core.goal.states import Status
+from actionlib_core.goal.states import TERMINAL, Status
 from actionlib_core.inputs.arguments import check_function, is_async
 
 if TYPE_CHECKING:
@@ -109,21 +109,25 @@ class GoalContext(Generic[F]):
             FieldError: a field of it has a wrong type.
         """
         self.accept()
-        self._runner.publish_feedback(message)
+        self._handle.publish_feedback(message)
 
     @property
     def preempted(self) -> bool:
-        """Whether the goal is asked to stop, by a cancel or a newer goal."""
+        """Whether the goal is asked to stop, by a cancel or a newer goal, or has ended."""
         self.accept()
-        return self._runner.is_preempt_requested()
+        return self._is_over() or self._runner.is_preempt_requested()
 
     def wait_preempt(self, timeout: float | None = None) -> bool:
-        """Wait until the goal is asked to stop; return whether it is.
+        """Wait until the goal is asked to stop; return whether it is, or has ended.
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
         """
         self.accept()
-        return self._runner.wait_preempt(timeout)
+        return self._is_over() or self._runner.wait_preempt(timeout) or self._is_over()
+
+    def _is_over(self) -> bool:
+        """Return whether the function has ended, but not a thread of it: the next goal may run."""
+        return self._handle.record.status in TERMINAL
 
     def sleep(self, seconds: float) -> bool:
         """Sleep, but wake up when the goal is asked to stop.

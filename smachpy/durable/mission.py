@@ -384,12 +384,12 @@ def _renewing(
             try:
                 wanted = store.renew(lease, seconds=lease_s, beat_ns=recorder.time.now_ns())
                 recorder.held.pass_on()
-            except MissionError as error:
+                if wanted and not cancelled:
+                    cancelled = True
+                    preempt()
+            except Exception as error:  # noqa: BLE001  of any kind: without a lease nothing may run
                 recorder.stop(error)
                 return
-            if wanted and not cancelled:
-                cancelled = True
-                preempt()
 
     if asked and not cancelled:  # while no process ran the mission
         cancelled = True

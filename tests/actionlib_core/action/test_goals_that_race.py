@@ -15,7 +15,12 @@ from actionlib_core import (
 )
 from actionlib_core.exceptions import ServerConflictError, TransportError
 from actionlib_core.goal.states import Status
-from actionlib_core.interfaces.actionlib.msg import TestAction, TestGoal, TestResult
+from actionlib_core.interfaces.actionlib.msg import (
+    TestAction,
+    TestFeedback,
+    TestGoal,
+    TestResult,
+)
 from smachpy import ActionServerWrapper, State, StateMachine
 from smachpy.events import PreemptRequested
 from tests.two_nodes import TwoNodes
@@ -231,6 +236,31 @@ def test_a_new_goal_is_accepted_although_the_old_one_ends_at_that_moment(world):
     assert two.get_state() == Status.ACTIVE
     simple.set_succeeded(TestResult(2))
     assert two.wait_for_result(60.0)
+
+
+def test_a_thread_that_outlives_its_goal_is_not_told_of_the_next_one(world):
+    """It was told that nobody had asked it, and drove on; its feedback went to the next goal."""
+    asked, heard, goals = [], [], []
+
+    @server("a", TestAction)
+    def drive(goal, context):
+        goals.append(context)
+        context.wait_preempt()
+        return TestResult(goal.goal)
+
+    with drive.start(node=world.robot):
+        sender = client(world)
+        sender.send_goal(TestGoal(1))
+        world.clock.sleep(1.0)
+        assert not goals[0].preempted
+        sender.send_goal(TestGoal(2), feedback_cb=lambda each: heard.append(each.feedback))
+        world.clock.sleep(1.0)
+        asked += [goals[0].preempted, goals[0].sleep(5.0), goals[1].preempted]
+        goals[0].feedback(TestFeedback(1))
+        goals[1].feedback(TestFeedback(2))
+        world.clock.sleep(1.0)
+    assert asked == [True, True, False]
+    assert heard == [2]
 
 
 def test_a_server_whose_preempt_cannot_be_told_leaves_the_network_all_the_same(world):
