@@ -111,6 +111,15 @@ def test_a_test_is_written_to_be_saved_beside_its_mission(opened, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+def test_what_a_mission_prints_at_the_end_of_its_program_is_no_verdict(opened, incident):
+    _, reproductions, _ = opened
+    incident[0].write_text(f"{MISSION}\nimport atexit\natexit.register(print, 'bye')\n")
+    row = ended(reproductions, reproductions.start({"machine": "night", "what": "run"}))
+    assert (row["problem"], row["found"]["kind"]) == ("", "same")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_recording_cannot_name_code_that_nobody_allowed(incident, tmp_path):
     _, path = incident
     machines = Machines()
@@ -157,6 +166,8 @@ def test_one_that_never_ends_is_stopped_and_nothing_is_left(opened, incident):
         ({"machine": "bare"}, "bare: got a run without a recording"),
         ({"expect": 1}, "expect"),
         ({"expect": "x" * 1000}, "expect"),
+        ({"expect": "done\0"}, "expect"),
+        ({"expect": "\ud800"}, "expect"),
     ],
 )
 def test_what_makes_no_sense_is_refused_and_nothing_begins(opened, wrong, word):

@@ -144,7 +144,11 @@ class Reproductions:
         name, what, expect = asked.get("machine"), asked.get("what"), asked.get("expect", "")
         if what not in ("run", "test"):
             raise ReproductionRequestError(f"what: got {what!r:.80}; expected run or test.")
-        if not isinstance(expect, str) or len(expect) > MAX_OUTCOME_LENGTH:
+        if (
+            not isinstance(expect, str)
+            or len(expect) > MAX_OUTCOME_LENGTH
+            or not expect.isprintable()
+        ):
             raise ReproductionRequestError(f"expect: got {expect!r:.80}; expected an outcome.")
         if not isinstance(name, str) or self._machines.get(name) is None:
             raise ReproductionRequestError(f"machine: got {name!r:.80}; expected one shown here.")
@@ -166,14 +170,13 @@ class Reproductions:
                 self._folder = self._folder or Path(tempfile.mkdtemp(prefix="smachpy-again-"))
                 folder = self._folder / number
                 folder.mkdir(0o700)
-                errors = open_private(folder / "errors.txt", "w")
+                one = _Started(number, what, file.absolute(), folder, None)  # type: ignore[arg-type]
+                with open_private(folder / "errors.txt", "w") as errors:
+                    one.process = start_command(self._words(one, expect), errors)
             except OSError as error:
                 raise ReproductionRequestError(
                     f"reproductions: {error.strerror or error}."
                 ) from error
-            one = _Started(number, what, file.absolute(), folder, None)  # type: ignore[arg-type]
-            with errors:
-                one.process = start_command(self._words(one, expect), errors)
             self._known[number] = one
             while len(self._known) > MAX_KEPT:
                 self._forget(next(iter(self._known)))
@@ -260,7 +263,7 @@ class Reproductions:
             one.found, one.problem = found, problem
 
     def _run_of(self, one: _Started, said: str) -> Found:
-        verdict = json.loads(said.splitlines()[-1] if said else "")
+        verdict = json.loads(said.partition("\n")[0])  # what follows is the mission's, at its end
         found = Found(
             kind=verdict["result"],
             text=[str(line).removeprefix(f"{one.file}: ") for line in verdict["text"]],
