@@ -9,14 +9,18 @@ no evidence. The file is not signed: whoever may write it may say what he likes,
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
 import json
+import marshal
 import platform
+import struct
 import sys
 import sysconfig
 from dataclasses import dataclass
 from importlib.machinery import PathFinder
 from importlib.metadata import version
+from importlib.util import MAGIC_NUMBER, cache_from_source
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypedDict
 
@@ -44,6 +48,8 @@ MAX_FILES: Final = 2_000
 """Largest number of files of a mission: all of them are in its hash."""
 
 LIBRARY: Final = ("actionlib_core", "smachpy")
+
+_CODE: Final = 16  # where code begins in a file of bytecode [bytes]
 
 NOTE: Final = "evidence: "
 """How the notes of a run begin that say what evidence it has."""
@@ -137,14 +143,16 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
 
     `hash` is that of all this. The files are the module in which it is, and those which that
     imports, however deep: not modules of Python, of this library and of other installed packages.
-    Of a mission file or a plan it is the file, with all such files and modules below its folder.
+    Of a mission file or a plan it is the file, with all such files and modules below its folder,
+    and what these import.
 
     Args:
         target: The mission.
         text: As the user named it.
 
     Raises:
-        TargetError: its module has no file, or it has more than `MAX_FILES`.
+        TargetError: its module has no file, or it has more than `MAX_FILES`, or Python takes other
+            bytecode for one of them, which is deleted.
     """
     place = text.partition(":")[0]
     if is_data(place):
@@ -155,18 +163,39 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
             if path.suffix in {*DATA, ".py"} and path.is_file()  # no link to nothing
         ]
         files = {str(path.relative_to(folder)): path for path in found}
+        modules = {
+            ".".join(path.relative_to(folder).with_suffix("").parts).removesuffix(".__init__"): path
+            for path in found
+            if path.suffix == ".py"
+        }
+        imported = _imported(modules, [str(folder), *sys.path]).items()
+        files.update((name, path) for name, path in imported if name not in modules)
     else:
-        module = sys.modules.get(target.source.partition(":")[0])
-        file = getattr(module, "__file__", None)
+        name = target.source.partition(":")[0]
+        file = getattr(sys.modules.get(name), "__file__", None)
         if file is None:
             raise TargetError(text, "its module has no file; expected one that can be hashed.")
-        files = _imported(target.source.partition(":")[0], Path(file).resolve(), names_file(place))
+        path = Path(file).resolve()
+        is_file = names_file(place)
+        files = _imported({name: path}, [str(path.parent), *sys.path] if is_file else sys.path)
+        if is_file:  # the module may have another name: of its package, or with a number
+            files[path.stem] = files.pop(name)
     if len(files) > MAX_FILES:
         raise TargetError(
             text,
             f"got more than {MAX_FILES} files; expected fewer, as all are in its hash. Try the "
             "mission in a folder of its own.",
         )
+    for path in files.values():
+        if path.suffix == ".py" and _has_other_bytecode(path):
+            cached = cache_from_source(str(path))
+            with contextlib.suppress(OSError):
+                Path(cached).unlink()
+            raise TargetError(
+                text,
+                f"{str(path)!r} has the bytecode of another file of the same second and length; "
+                f"expected its own. Try again, without {cached!r}.",
+            )
     hashes = {name: _hash(path) for name, path in sorted(files.items())}
     name = Path(place).name if is_data(place) else target.source.partition(":")[2]
     return {"target": text, "name": name, "hash": _whole({**hashes, ":": name}), "files": hashes}
@@ -262,13 +291,33 @@ def read_evidence(path: Path) -> dict[str, Any]:
 def _files(places: Sequence[str]) -> Iterator[Path]:
     for place in map(Path, places):
         if place.is_dir():
-            yield from sorted(place.glob("*.json"))
+            yield from sorted(path for path in place.glob("*.json") if path.is_file())
         else:
             yield place
 
 
 def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _has_other_bytecode(path: Path) -> bool:
+    """Return whether Python has cached bytecode for a file, and that is of other code.
+
+    It knows the file by its time [s] and length only.
+    """
+    try:
+        cached = Path(cache_from_source(str(path))).read_bytes()
+        header, stat = struct.unpack_from("<4sIII", cached), path.stat()
+        is_known = header[1] or header[2:] == (
+            int(stat.st_mtime) & 0xFFFFFFFF,
+            stat.st_size & 0xFFFFFFFF,
+        )
+        if header[0] != MAGIC_NUMBER or not is_known:
+            return False
+        code = compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
+        return bool(marshal.loads(cached[_CODE:]) != code)  # noqa: S302  as Python does
+    except (OSError, SyntaxError, ValueError, EOFError, TypeError, struct.error):
+        return False  # there is none, or Python does not take it, or cannot import the file
 
 
 def _whole(hashes: dict[str, str]) -> str:
@@ -278,20 +327,24 @@ def _whole(hashes: dict[str, str]) -> str:
 # -- the modules of a program ----------------------------------------------------------------------
 
 
-def _imported(name: str, file: Path, is_file: bool) -> dict[str, Path]:
-    """Return the program's modules that a module imports, and itself: name -> file."""
+def _imported(roots: dict[str, Path], path: Sequence[str]) -> dict[str, Path]:
+    """Return modules, and those of the program that they import: name -> file.
+
+    Args:
+        roots: The modules, name -> file.
+        path: Where others are looked up.
+    """
     apart = [Path(p).resolve() for p in {*sysconfig.get_paths().values(), sys.base_prefix}]
-    top = name.partition(".")[0]
-    path = [str(file.parent), *sys.path] if is_file else sys.path
-    found = {file.stem if is_file else name: file}
-    waiting = [(name, file)]
+    tops = {name.partition(".")[0] for name in roots}
+    found = dict(roots)
+    waiting = list(roots.items())
     while waiting and len(found) <= MAX_FILES:
         module, at = waiting.pop()
         for word in _names_in(module, at) if at.suffix == ".py" else ():  # else it is compiled
             for one, where in _found(word, path):
                 first = one.partition(".")[0]
                 is_apart = any(where.is_relative_to(place) for place in apart)
-                is_own = first == top or (first not in {*LIBRARY, "smachpy_viz"} and not is_apart)
+                is_own = first in tops or (first not in {*LIBRARY, "smachpy_viz"} and not is_apart)
                 if one not in found and is_own:
                     found[one] = where
                     waiting.append((one, where))
@@ -301,7 +354,11 @@ def _imported(name: str, file: Path, is_file: bool) -> dict[str, Path]:
 def _names_in(module: str, file: Path) -> Iterator[str]:
     """Yield the names that the import statements of a file may mean, anywhere in it."""
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError):  # nobody can import it
+        return
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

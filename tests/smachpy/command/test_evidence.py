@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import py_compile
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
@@ -118,6 +120,49 @@ def test_a_linked_mission_file_has_the_hash_of_the_folder_where_it_is_read():
     assert hash_of("linked/one.yaml") == hash_of("files/one.yaml")
     Path("files/.#one.yaml").symlink_to("somebody@nowhere.17:1")  # the lock of an editor
     assert hash_of("linked/one.yaml") == hash_of("files/one.yaml")
+
+
+def test_a_mission_file_has_the_hash_of_what_its_modules_import(folder, monkeypatch):
+    monkeypatch.syspath_prepend(str(folder))
+    Path("files/pkg").mkdir(parents=True)
+    Path("files/one.yaml").write_text("name: M\nstates:\n  WAIT: {wait: 1.0}\n")
+    Path("files/pkg/__init__.py").write_text("from .states import work\n")
+    Path("files/pkg/states.py").write_text("def work():\n    import evidence_late\n")
+    Path("files/old.py").write_text("print 'of Python 2'\n")
+    facts = mission_facts(load_target("files/one.yaml"), "files/one.yaml")
+    names = ["evidence_late", "old.py", "one.yaml", "pkg/__init__.py", "pkg/states.py"]
+    assert sorted(facts["files"]) == names
+    Path("evidence_late.py").write_text("LIMIT = 4\n")
+    assert hash_of("files/one.yaml") != facts["hash"]
+
+
+def test_a_late_import_of_what_cannot_be_read_is_in_the_hash():
+    Path("evidence_late.py").write_text("LIMIT = \n")
+    assert "evidence_late" in mission_facts(load_target("good.py"), "good.py")["files"]
+
+
+def test_a_file_with_the_bytecode_of_another_one_has_no_hash():
+    """Of one of the same second and length: Python would run that."""
+    file = Path("evidence_helper.py")
+    good, time = file.read_text(), file.stat().st_mtime_ns
+    py_compile.compile(str(file))
+    before = hash_of("good.py")
+    file.write_text(good.replace("done", "DONE"))
+    os.utime(file, ns=(time, time))
+    py_compile.compile(str(file))
+    file.write_text(good)
+    os.utime(file, ns=(time, time))
+    with pytest.raises(TargetError, match="has the bytecode of another file of the same second"):
+        hash_of("good.py")
+    assert hash_of("good.py") == before
+
+
+def test_what_is_no_file_among_the_evidence_is_not_opened(capsys):
+    Path("all").mkdir()
+    Path("all/0.json").mkdir()
+    os.mkfifo("all/1.json")
+    Path("all/2.json").write_text(evidence())
+    assert noted(capsys, "--require-evidence", "all")[0].startswith("valid, all/2.json; hash ")
 
 
 def evidence(**facts):
