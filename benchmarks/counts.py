@@ -81,10 +81,12 @@ def ring(rounds: int) -> smachpy.StateMachine:
 
 def of_transitions() -> dict[str, float]:
     found = {}
-    for name in ("alone", "buffered", "listener"):
+    for name in ("alone", "with a clean-up", "buffered", "listener"):
         machine = ring(ROUNDS)
         if name == "buffered":
             machine.event_buffer()
+        elif name == "with a clean-up":  # which costs once a run
+            machine.add_cleanup("TIDY", smachpy.CBState(lambda _ud: "done", outcomes=["done"]))
         elif name == "listener":
             machine.subscribe(lambda _event: None)
         with Calls() as calls:

@@ -110,6 +110,16 @@ def test_a_timeout_ends_the_wait_and_the_others_may_still_meet():
     assert run.visits("LOAD") == 2
 
 
+def test_nobody_waits_where_all_have_left_so_another_number_may_meet_there():
+    machine = StateMachine(ENDS)
+    machine.add("ONE", Barrier("LOADED", 3, timeout=1.0), {"aborted": "WAIT"})
+    machine.add("WAIT", Wait(1.0), {"done": "TWO"})
+    machine.add("TWO", Barrier("LOADED", 2))
+    with mission_kit() as mission:
+        run = mission(together(machine, loader(4.0), branch_of(Wait(9.0))))
+    assert (run.outcome, run.duration) == ("done", 9.0)
+
+
 def test_the_last_one_that_is_interrupted_as_it_comes_lets_the_others_go(monkeypatch):
     """They waited for ever, and no request to stop reached them."""
     real = barrier._Meetings.join

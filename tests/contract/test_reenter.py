@@ -126,6 +126,20 @@ def test_a_state_that_tidies_up_is_not_the_one_that_was_interrupted():
         assert labels(mission(root)) == ["TWO"]
 
 
+def test_a_second_request_while_it_tidies_up_changes_nothing():
+    root = StateMachine(ENDS, name="R", userdata={"count": 0}, reenter="last")
+    root.add("ONE", Work(), {"done": "TWO"})
+    root.add("TWO", Work(), {"preempted": "TIDY"})
+    root.add("TIDY", Finishes(5.0), {"done": "MORE"})
+    root.add("MORE", Work(1.0), {"done": "preempted"})
+    with mission_kit() as mission:
+        mission.preempt(at=15.0)
+        mission.preempt(on="TIDY", after=1.0)
+        assert mission(root).outcome == "preempted"
+    with mission_kit() as mission:
+        assert labels(mission(root))[0] == "TWO"
+
+
 def test_a_second_request_before_the_first_state_changes_nothing():
     root = StateMachine(ENDS, name="R", userdata={"count": 0}, reenter="last")
     root.add("ONE", Work(), {"done": "TWO"})

@@ -264,6 +264,42 @@ def test_one_that_is_stopped_as_it_becomes_free_never_had_it():
     assert all((path, "holds") in told for path, status in told if status == "free")
 
 
+def after(seconds: float, state: State) -> StateMachine:
+    sm = StateMachine(ENDS)
+    sm.add("WAIT", Wait(seconds), {"done": "USE"})
+    sm.add("USE", state)
+    return sm
+
+
+@pytest.mark.parametrize(("policy", "order"), [("wait", "ABD"), ("preempt", "ADB")])
+def test_it_is_given_in_the_order_of_the_claims_but_first_to_one_that_preempts(policy, order):
+    heard: list[Event] = []
+    with mission_kit() as mission:
+        machine = together(
+            A=Step(9.0, resource="base"),
+            B=after(1.0, Step(1.0, resource="base")),
+            D=after(2.0, Step(1.0, resource=("base", policy))),
+        )
+        machine.subscribe(heard.append)
+        mission(machine)
+    held = [path for path, status, *_ in uses(heard) if status == "holds"]
+    assert [path[3] for path in held] == list(order)
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_what_gets_it_while_the_machine_is_paused_does_not_begin(stops):
+    heard: list[Event] = []
+    with mission_kit() as mission:
+        machine = together(A=Step(5.0, resource="base"), B=after(1.0, Step(2.0, resource="base")))
+        machine.subscribe(heard.append)
+        mission.clock.call_later(2.0, machine.control.pause)
+        mission.clock.call_later(20.0, machine.request_preempt if stops else machine.control.resume)
+        run = mission(machine)
+    assert run.duration == (20.0 if stops else 22.0)
+    held = [path for path, status, *_ in uses(heard) if status == "holds"]
+    assert held == ["/C/A", *([] if stops else ["/C/B/USE"])]
+
+
 def _then(state: State) -> StateMachine:
     sm = StateMachine(["done", "preempted"])
     sm.add("FIRST", Wait(1.0), {"done": "NEXT"})
@@ -286,7 +322,8 @@ class Deaf(State):
         return "done"
 
 
-def test_a_thread_that_is_left_behind_keeps_it_and_says_so(caplog: Any):
+@pytest.mark.parametrize("policy", ["wait", "preempt"])
+def test_a_thread_that_is_left_behind_keeps_it_and_says_so(caplog: Any, policy: str):
     heard: list[Event] = []
     clock = VirtualClock()
     with use_clock(clock):
@@ -294,7 +331,7 @@ def test_a_thread_that_is_left_behind_keeps_it_and_says_so(caplog: Any):
         clock.call_later(1.0, deaf.request_preempt)
         clock.spawn(deaf.execute, name="deaf").join()
         left = clock.now()
-        user = inside(Step(2.0, resource="base"), name="M")
+        user = inside(Step(2.0, resource=("base", policy)), name="M")
         user.subscribe(heard.append)
         clock.spawn(user.execute, name="user").join()
     assert left < 5.0

@@ -846,3 +846,63 @@ def test_random_modes_run_one_mission_at_a_time_clean_up_once_and_stop(
 def _cleanups(modes: Modes) -> list[str]:
     paths = [state.path for state in smachpy.describe(modes).walk()]
     return [path for path in paths if path.endswith("/CLEAN")]
+
+
+# -- what the page says, one by one ------------------------------------------------------------
+
+
+def test_an_event_that_leads_to_the_present_mode_begins_its_mission_anew():
+    states = ["idle", {"name": "auto", "mission": mission, "resume": True}]
+    ways = [["start", "idle", "auto"], ["again", "auto", "auto"]]
+    modes = Modes(states, ways, name="ROBOT")
+    run = run_of(modes, (1.0, "start"), (13.0, "again"), end=16.0)
+    assert leaves(run) == ["idle", "auto/A", "auto/B", "auto/DOCK", "auto/A", "auto/DOCK"]
+
+
+@pytest.mark.parametrize("how", ["operator", "itself"])
+def test_the_first_mode_follows_a_mission_that_ends_preempted_alone(how):
+    class Gives(State):
+        def execute(self, userdata: Any) -> str:
+            return "preempted"
+
+    def made() -> StateMachine:
+        sm = StateMachine(["done", "preempted"])
+        sm.add("A", Step(60.0) if how == "operator" else Gives(["preempted"]))
+        return sm
+
+    states = ["idle", {"name": "auto", "mission": made}]
+    modes = Modes(states, [["start", "idle", "auto"]], name="ROBOT")
+    events: list[tuple[float, Any]] = [(1.0, "start")]
+    if how == "operator":
+        events.append((5.0, lambda m: m.control.preempt("/ROBOT/auto")))
+    assert leaves(run_of(modes, *events, end=20.0)) == ["idle", "auto/A", "idle"]
+
+
+def test_callbacks_are_called_as_those_of_any_machine():
+    modes, heard = robot(), list[Any]()
+    modes.register_start_cb(lambda userdata, labels: heard.append(("start", labels)))
+    modes.register_transition_cb(lambda userdata, labels: heard.append("transition"))
+    modes.register_termination_cb(lambda userdata, labels, outcome: heard.append(outcome))
+    run_of(modes, (1.0, "start"), (5.0, "joy"), end=10.0)
+    assert heard == [("start", ["idle"]), "transition", "transition", "preempted"]
+
+
+def test_of_two_events_while_a_mission_cleans_up_the_last_one_is_seen():
+    run = run_of(robot(), (1.0, "start"), (5.0, "joy"), (6.0, "low"), end=8.0)
+    assert leaves(run)[-3:] == ["auto/DOCK", "charging/A", "charging/DOCK"]
+    jumps = [event for event in run.events if type(event).__name__ == "Jumped"]
+    assert [jump.label for jump in jumps] == ["auto", "charging"]
+
+
+def test_what_one_run_has_left_deep_inside_does_not_reach_the_next():
+    def made() -> StateMachine:
+        sm = StateMachine(["done", "preempted"])
+        sm.add("IN", mission())
+        return sm
+
+    states = ["idle", {"name": "auto", "mission": made, "resume": True}, "teleop"]
+    modes = Modes(states, WAYS[:3], name="ROBOT")
+    run = run_of(modes, (1.0, "start"), (13.0, "joy"), end=20.0)
+    assert leaves(run)[-3:] == ["auto/IN/B", "auto/IN/DOCK", "teleop"]
+    run = run_of(modes, (1.0, "start"), end=5.0)
+    assert leaves(run)[:2] == ["idle", "auto/IN/A"]

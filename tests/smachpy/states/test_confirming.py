@@ -8,7 +8,7 @@ import smachpy
 from actionlib_core.interfaces.std_msgs.msg import String
 from smachpy import InvalidStateError, StateMachine, when
 from smachpy.command import main
-from smachpy.events import QuestionAsked
+from smachpy.events import Noted, QuestionAsked
 from smachpy.files import MissionFileError, load
 from smachpy.states import Wait, confirm, confirming, set_autonomy
 from smachpy.testing import explore
@@ -66,13 +66,19 @@ def test_it_is_not_taken_after_a_no_or_without_an_answer(mission, made, answer):
 
 def test_otherwise_says_where_it_leads_then(mission):
     sm = machine(otherwise="done", patience=10.0)
-    assert (mission(sm).outcome, sm.get_children()["PICK"]._preempt_requested) == ("done", False)
+    run = mission(sm)
+    assert (run.outcome, run.duration) == ("done", 12.0)
+    assert not sm.get_children()["PICK"]._preempt_requested
 
 
 @pytest.mark.parametrize(("autonomy", "duration"), [(1, 302.0), (2, 5.0), (3, 5.0)])
 def test_it_is_not_asked_up_to_the_level_of_the_autonomy(mission, made, autonomy, duration):
     set_autonomy(autonomy)
-    assert mission(made, limit=1000.0).duration == duration
+    run = mission(made, limit=1000.0)
+    assert run.duration == duration
+    notes = [event.text for event in run.events if isinstance(event, Noted)]
+    told = [f"not asked: level 2, autonomy {autonomy}"] if autonomy >= 2 else []
+    assert [note for note in notes if note.startswith("not asked")] == told
 
 
 def test_a_preempt_ends_the_question(mission, made):
