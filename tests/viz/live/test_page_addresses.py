@@ -29,7 +29,13 @@ def two(served, tmp_path):
 
 def shows(page, name):
     wait_for(page, f"smachpy.store.view.pageShown.value === '{name}'")
-    places = {"machine": "stage", "runs": "home", "actions": "actions-page", "fleet": "fleet"}
+    places = {
+        "machine": "stage",
+        "runs": "home",
+        "actions": "actions-page",
+        "fleet": "fleet",
+        "simulate": "simulate",
+    }
     page.wait_for_function(f"() => ({VISIBLE})() === '{places[name]}'")
 
 
@@ -39,12 +45,16 @@ def test_each_page_is_reached_from_each_and_back_leads_to_the_one_before(two, lo
     shows(page, "actions")
     page.click("#runs")
     shows(page, "runs")
+    page.click("button:has-text('Simulate')")
+    shows(page, "simulate")
+    page.click(".simulate button:has-text('Close')")
+    shows(page, "runs")
     page.click("button:has-text('Fleet')")
     shows(page, "fleet")
     page.click(".fleet .cards button:has-text('OTHER')")
     shows(page, "machine")
     wait_for(page, "smachpy.store.data.facts.value?.name === 'two'")
-    for name in ("fleet", "runs", "actions", "machine"):
+    for name in ("fleet", "runs", "simulate", "runs", "actions", "machine"):
         page.go_back()
         shows(page, name)
     wait_for(page, "smachpy.store.data.facts.value?.name === 'one'")
@@ -81,12 +91,23 @@ def test_the_keyboard_reaches_nothing_that_is_covered(two, look, key):
         assert page.evaluate(REACHED), page.evaluate("() => document.activeElement.outerHTML")
 
 
-@pytest.mark.parametrize("size", [(1400, 900), (390, 844)])
-@pytest.mark.parametrize("place", ["runs", "actions", "fleet", "machine"])
-def test_a_question_is_above_every_page(served, look, place, size):
+# Whether the questions lie over a part of the page.
+COVERS = """() => {
+    const section = document.querySelector(".home, .fleet, .actions-page, .simulate");
+    if (!section) return false;
+    const [a, b] = [section, document.querySelector(".questions")].map((one) => one.getBoundingClientRect());
+    return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}"""
+
+
+@pytest.mark.parametrize("size", [(1400, 900), (1000, 800), (390, 844)])
+@pytest.mark.parametrize("place", ["runs", "actions", "fleet", "simulate", "machine"])
+def test_a_question_is_on_every_page_and_covers_nothing(served, look, place, size):
     served.add("one", events=[*EVENTS, ("QuestionAsked", "/JOB/A", ASKED)])
     page = look(f"{served.start(token='t')}?{place}=#token=t", drawn=False)
     page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+    page.wait_for_selector(".question .answer")
+    assert not page.evaluate(COVERS)
     with page.expect_response("**/api/control*"):
         page.click(".question .answer:text-is('yes')")  # it is not covered
     assert [one["answer"] for one in served.commands] == ["yes"]

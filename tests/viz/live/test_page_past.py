@@ -434,11 +434,10 @@ def test_a_page_without_the_token_for_reading_shows_nothing_and_one_with_it_comm
 def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
     served.add("one", events=BEGUN)
     page = look(served.start())
-    page.evaluate(
-        "() => { smachpy.store.view.pageShown.value = 'runs'; smachpy.store.view.simulateOpen.value = true; }"
-    )
-    page.wait_for_selector(".simulate")
+    page.keyboard.press("h")
+    page.keyboard.press("?")
+    page.wait_for_selector("dialog[open]")
     page.keyboard.press("h")  # keys are for the dialog
     page.keyboard.press("Escape")
-    wait_for(page, "!document.querySelector('.simulate')")
+    wait_for(page, "!document.querySelector('dialog[open]')")
     assert page.evaluate("() => smachpy.store.view.pageShown.value === 'runs'")

@@ -3361,8 +3361,6 @@ var View = class {
   // progress of a long layout [states]
   dismissed = y3(null);
   // the previous run whose notice was closed
-  simulateOpen = y3(false);
-  // the dialog of simulated runs
   pins = y3(new Set(saved("pins", [])));
   // ids of runs
   chosenAction = y3(null);
@@ -3938,7 +3936,7 @@ async function makeWorker(name) {
 }
 
 // src/core/pages.ts
-var PAGES = ["runs", "fleet", "actions"];
+var PAGES = ["runs", "fleet", "actions", "simulate"];
 function pageOf(search) {
   const asked2 = new URLSearchParams(search);
   return PAGES.find((name) => asked2.has(name)) ?? "machine";
@@ -8937,7 +8935,6 @@ function listenToKeys(page2) {
     Escape: () => {
       if (confirmation.value) confirmation.value = null;
       else if (store.view.help.value) store.view.help.value = false;
-      else if (store.view.simulateOpen.value) store.view.simulateOpen.value = false;
       else if (store.notes.writtenAt.value !== null) store.notes.writtenAt.value = null;
       else if (store.view.tokenAsked.value) store.view.tokenAsked.value = false;
       else if (store.view.pageShown.value !== "machine") togglePage(store.view.pageShown.value);
@@ -10062,9 +10059,6 @@ var MOST_ROWS3 = 40;
 var MOST_NAMES2 = 8;
 var REFRESH_MS3 = 5e3;
 var HomePage = () => store.view.pageShown.value === "runs" ? /* @__PURE__ */ a4(OpenHome, {}) : null;
-var openSimulations = () => {
-  store.view.simulateOpen.value = true;
-};
 var ALL = { show: "all", machine: null, robot: null, text: "" };
 function OpenHome() {
   const [filter, setFilter] = d2(ALL);
@@ -10112,7 +10106,7 @@ function OpenHome() {
           }
         ),
         runs2.filter((row) => row.live).length > 1 && /* @__PURE__ */ a4("button", { onClick: () => showPage("fleet"), children: "Fleet" }),
-        /* @__PURE__ */ a4("button", { onClick: openSimulations, children: "Simulate" }),
+        /* @__PURE__ */ a4("button", { onClick: () => showPage("simulate"), children: "Simulate" }),
         store.data.model.value && /* @__PURE__ */ a4("button", { onClick: () => showPage("machine"), children: "Close" })
       ] }),
       store.data.runsProblem.value && /* @__PURE__ */ a4("p", { class: "error", children: store.data.runsProblem.value }),
@@ -17017,22 +17011,21 @@ var doneOf = ({ outcomes, failed }) => Object.values(outcomes).reduce((sum, coun
 // src/panels/simulate.tsx
 var REFRESH_MS4 = 1e3;
 var FORM = { mission: "", runs: "20", vary: "", seed: "1", limit: "4h", compare: "" };
-var SimulateDialog = () => store.view.simulateOpen.value ? /* @__PURE__ */ a4(OpenDialog, {}) : null;
-function OpenDialog() {
+var SimulatePage = () => store.view.pageShown.value === "simulate" ? /* @__PURE__ */ a4(OpenPage2, {}) : null;
+function OpenPage2() {
   const [form, setForm] = d2(FORM);
   const [problems, setProblems] = d2("");
   const { missions, batches } = store.data.simulations.value;
   const names = Object.keys(missions);
   const known2 = store.data.simulationsKnown.value;
   const mission = form.mission || names[0] || "";
+  const heading = T2(null);
+  A2(() => heading.current?.focus(), []);
   A2(() => {
     refreshSimulations();
     const timer = setInterval(refreshSimulations, REFRESH_MS4);
     return () => clearInterval(timer);
   }, []);
-  const close2 = () => {
-    store.view.simulateOpen.value = false;
-  };
   const onSubmit = async (e4) => {
     e4.preventDefault();
     const { asked: asked2, problem } = startOf({ ...form, mission });
@@ -17043,10 +17036,11 @@ function OpenDialog() {
   };
   const change3 = (name) => (e4) => setForm({ ...form, [name]: fieldValue(e4) });
   const earlier = batches.filter((one) => one.mission === mission && !one.running && one.report);
-  return /* @__PURE__ */ a4(Dialog, { label: "simulated runs", class: "simulate", onClose: close2, children: [
+  return /* @__PURE__ */ a4("section", { class: "simulate", "aria-labelledby": "simulate-title", children: [
     /* @__PURE__ */ a4("header", { children: [
-      /* @__PURE__ */ a4("h2", { children: "Simulated runs" }),
-      /* @__PURE__ */ a4("button", { onClick: close2, "aria-label": "close", children: "Close" })
+      /* @__PURE__ */ a4("h2", { id: "simulate-title", tabindex: -1, ref: heading, children: "Simulated runs" }),
+      /* @__PURE__ */ a4("span", { class: "spread" }),
+      /* @__PURE__ */ a4("button", { onClick: () => showPage("runs"), children: "Close" })
     ] }),
     hasToken() ? /* @__PURE__ */ a4("form", { onSubmit, children: [
       /* @__PURE__ */ a4("label", { children: [
@@ -17825,7 +17819,7 @@ function App() {
     /* @__PURE__ */ a4(Palette, { page }),
     /* @__PURE__ */ a4(TokenDialog, {}),
     /* @__PURE__ */ a4(NoteDialog, {}),
-    /* @__PURE__ */ a4(SimulateDialog, {})
+    /* @__PURE__ */ a4(SimulatePage, {})
   ] });
 }
 applyTheme();

@@ -29,7 +29,7 @@ import { PlayBar } from "#panels/play.tsx";
 import { AddLine, PlotsPanel } from "#panels/plots.tsx";
 import { Questions } from "#panels/questions.tsx";
 import { TwoRunsView } from "#panels/reproduction.tsx";
-import { SimulateDialog } from "#panels/simulate.tsx";
+import { SimulatePage } from "#panels/simulate.tsx";
 import { TopBar } from "#panels/top_bar.tsx";
 import { Tree } from "#panels/tree.tsx";
 
@@ -224,7 +224,7 @@ function App() {
       <Palette page={page} />
       <TokenDialog />
       <NoteDialog />
-      <SimulateDialog />
+      <SimulatePage />
     </div>
   );
 }

@@ -5,7 +5,7 @@ import { addressOf, pageOf } from "#core/pages.ts";
 test("each page has an address, and is found by it", () => {
   const from = "http://x:1/?machine=robot_1%2Fjob#at=5";
   assert.equal(addressOf(from, "machine"), from);
-  for (const name of ["runs", "fleet", "actions", "machine"] as const)
+  for (const name of ["runs", "fleet", "actions", "simulate", "machine"] as const)
     assert.equal(pageOf(new URL(addressOf(from, name)).search), name);
   const runs = addressOf(from, "runs");
   assert.equal(addressOf(runs, "machine"), from);

@@ -13,7 +13,7 @@ import { Inspector } from "#panels/inspector.tsx";
 import { Log } from "#panels/log.tsx";
 import { PlayBar } from "#panels/play.tsx";
 import { Preempts } from "#panels/preempts.tsx";
-import { SimulateDialog } from "#panels/simulate.tsx";
+import { SimulatePage } from "#panels/simulate.tsx";
 import { TopBar } from "#panels/top_bar.tsx";
 import { Tree } from "#panels/tree.tsx";
 import { Userdata } from "#panels/userdata.tsx";
@@ -161,16 +161,16 @@ test("simulated runs start when the missions are known", () => {
   setToken("t");
   const { settings, simulations, simulationsKnown } = store.data;
   settings.value = { ...settings.value, control: true };
-  store.view.simulateOpen.value = true;
-  const starts = () => /<button[^>]*type="submit"[^>]*>/.exec(renderToString(<SimulateDialog />))?.[0] ?? "";
-  assert.match(renderToString(<SimulateDialog />), /<option[^>]*>reading the missions\u2026/);
+  store.view.pageShown.value = "simulate";
+  const starts = () => /<button[^>]*type="submit"[^>]*>/.exec(renderToString(<SimulatePage />))?.[0] ?? "";
+  assert.match(renderToString(<SimulatePage />), /<option[^>]*>reading the missions\u2026/);
   assert.match(starts(), /disabled/);
   simulationsKnown.value = true;
-  assert.match(renderToString(<SimulateDialog />), /<option[^>]*>none installed/);
+  assert.match(renderToString(<SimulatePage />), /<option[^>]*>none installed/);
   assert.match(starts(), /disabled/);
   simulations.value = { missions: { patrol: "" }, batches: [] };
   assert.doesNotMatch(starts(), /disabled/);
-  store.view.simulateOpen.value = false;
+  store.view.pageShown.value = "machine";
 });
 
 test("the bar says what evidence the run has, and whether it did what nobody has tried", () => {

@@ -1,10 +1,11 @@
-// The pages of the viewer and their addresses: a machine, the list of runs, the live runs together, the actions. The
-// browser's Back goes to the one before.
+// The pages of the viewer and their addresses: a machine, the list of runs, the live runs together, the actions,
+// simulated runs. The browser's Back goes to the one before.
 import { store } from "#core/store.ts";
 
-export type PageName = "machine" | "runs" | "fleet" | "actions";
+export type PageName = "machine" | "runs" | "fleet" | "actions" | "simulate";
 
-const PAGES: PageName[] = ["runs", "fleet", "actions"]; // with a word in the address; without one it is the machine
+/** Those with a word in the address; without one it is the machine. */
+const PAGES: PageName[] = ["runs", "fleet", "actions", "simulate"];
 
 /** The page in an address. */
 export function pageOf(search: string): PageName {

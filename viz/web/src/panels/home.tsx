@@ -18,10 +18,6 @@ const REFRESH_MS = 5000; // changes in journals are found only by asking again
 
 export const HomePage = () => (store.view.pageShown.value === "runs" ? <OpenHome /> : null);
 
-const openSimulations = () => {
-  store.view.simulateOpen.value = true;
-};
-
 const ALL: Filter = { show: "all", machine: null, robot: null, text: "" };
 
 function OpenHome() {
@@ -77,7 +73,7 @@ function OpenHome() {
             onInput={(e: Event) => change({ text: fieldValue(e) })}
           />
           {runs.filter((row) => row.live).length > 1 && <button onClick={() => showPage("fleet")}>Fleet</button>}
-          <button onClick={openSimulations}>Simulate</button>
+          <button onClick={() => showPage("simulate")}>Simulate</button>
           {store.data.model.value && <button onClick={() => showPage("machine")}>Close</button>}
         </header>
         {store.data.runsProblem.value && <p class="error">{store.data.runsProblem.value}</p>}

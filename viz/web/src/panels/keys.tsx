@@ -77,7 +77,6 @@ export function listenToKeys(page: Page) {
     Escape: () => {
       if (confirmation.value) confirmation.value = null;
       else if (store.view.help.value) store.view.help.value = false;
-      else if (store.view.simulateOpen.value) store.view.simulateOpen.value = false;
       else if (store.notes.writtenAt.value !== null) store.notes.writtenAt.value = null;
       else if (store.view.tokenAsked.value) store.view.tokenAsked.value = false;
       else if (store.view.pageShown.value !== "machine") togglePage(store.view.pageShown.value);

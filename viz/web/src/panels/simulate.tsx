@@ -1,7 +1,8 @@
-// The dialog for simulated runs: starts batches, shows their progress and reports.
+// Simulated runs: starts batches, shows their progress and reports.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { outcomeClass } from "#core/outcomes.ts";
+import { showPage } from "#core/pages.ts";
 import { encoded, hasToken } from "#core/requests.ts";
 import { beganText } from "#core/run_list.ts";
 import { askSimulation, refreshSimulations } from "#core/run_requests.ts";
@@ -10,28 +11,27 @@ import { doneOf, startOf } from "#core/simulations.ts";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
 import type { Batch } from "#core/types.ts";
-import { Dialog, fieldValue, Pill } from "#panels/components.tsx";
+import { fieldValue, Pill } from "#panels/components.tsx";
 
 const REFRESH_MS = 1000;
 const FORM: Form = { mission: "", runs: "20", vary: "", seed: "1", limit: "4h", compare: "" };
 
-export const SimulateDialog = () => (store.view.simulateOpen.value ? <OpenDialog /> : null);
+export const SimulatePage = () => (store.view.pageShown.value === "simulate" ? <OpenPage /> : null);
 
-function OpenDialog() {
+function OpenPage() {
   const [form, setForm] = useState(FORM);
   const [problems, setProblems] = useState("");
   const { missions, batches } = store.data.simulations.value;
   const names = Object.keys(missions);
   const known = store.data.simulationsKnown.value;
   const mission = form.mission || names[0] || "";
+  const heading = useRef<HTMLHeadingElement | null>(null);
+  useEffect(() => heading.current?.focus(), []);
   useEffect(() => {
     refreshSimulations();
     const timer = setInterval(refreshSimulations, REFRESH_MS);
     return () => clearInterval(timer);
   }, []);
-  const close = () => {
-    store.view.simulateOpen.value = false;
-  };
   const onSubmit = async (e: Event) => {
     e.preventDefault();
     const { asked, problem } = startOf({ ...form, mission });
@@ -44,12 +44,13 @@ function OpenDialog() {
     setForm({ ...form, [name]: fieldValue(e) });
   const earlier = batches.filter((one) => one.mission === mission && !one.running && one.report);
   return (
-    <Dialog label="simulated runs" class="simulate" onClose={close}>
+    <section class="simulate" aria-labelledby="simulate-title">
       <header>
-        <h2>Simulated runs</h2>
-        <button onClick={close} aria-label="close">
-          Close
-        </button>
+        <h2 id="simulate-title" tabindex={-1} ref={heading}>
+          Simulated runs
+        </h2>
+        <span class="spread" />
+        <button onClick={() => showPage("runs")}>Close</button>
       </header>
       {hasToken() ? (
         <form onSubmit={onSubmit}>
@@ -108,7 +109,7 @@ function OpenDialog() {
           <BatchRow key={one.id} batch={one} />
         ))}
       </ul>
-    </Dialog>
+    </section>
   );
 }
 

@@ -35,7 +35,6 @@ export class View {
   readonly overview = signal(false); // whether states are tiles without arrows, because many are open
   readonly laidOut: Signal<{ done: number; all: number } | null> = signal(null); // progress of a long layout [states]
   readonly dismissed: Signal<string | null> = signal(null); // the previous run whose notice was closed
-  readonly simulateOpen = signal(false); // the dialog of simulated runs
   readonly pins: Signal<Set<string>> = signal(new Set(saved<string[]>("pins", []))); // ids of runs
   readonly chosenAction: Signal<string | null> = signal(null);
   readonly logFilter = signal("all");
