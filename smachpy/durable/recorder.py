@@ -603,7 +603,8 @@ class Recorder(RunJournal):
         if policy != ASK:
             assert callable(policy)
             return self._call(frame, policy, userdata)
-        return self._ask_operator(frame)
+        # One that had been asked to stop does not go on, whatever anybody would answer.
+        return "preempted" if frame.step.state._preempt_requested else self._ask_operator(frame)
 
     def _ask_operator(self, frame: Frame) -> str | None:
         """Hold the state until an operator decides how it continues."""

@@ -290,6 +290,35 @@ def test_a_pause_begins_nothing_again_that_a_sibling_has_stopped_after_a_kill_ei
         assert "DRIVE done" not in ends, place
 
 
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("ask", [of_the_run, of_a_container, of_a_leaf, forced, jumped])
+def test_nobody_is_asked_whether_a_state_goes_on_that_was_asked_to_stop(shape, ask, caplog):
+    """An operator was asked to decide about a state that an operator had left."""
+
+    class Asks(Work):
+        def __init__(self, ends, name):
+            super().__init__(ends, name)
+            smachpy.set_options(self, resume="ask")
+
+    make, path = SHAPES[shape]
+    calm, store = [], KillingStore()
+    expected = live(lambda ends: make(ends, Asks), path, ask, calm, store)
+    requests = 0
+    for kill_at in range(1, store.writes):
+        ends, killed = [], KillingStore()
+        killed.arm(kill_at, written=True)
+        assert live(lambda ends: make(ends, Asks), path, ask, ends, killed) is None
+        if b'"PreemptRequested"' not in killed.entries["m"][-1]:
+            continue
+        requests += 1
+        ends.clear()  # the state has not learnt that its process is dead
+        killed.arm(0, written=False)
+        assert live(lambda ends: make(ends, Asks), path, ask, ends, killed) == expected
+        assert "an operator decides" not in caplog.text
+        assert ends == [end for end in calm if not end.startswith("DRIVE")]
+    assert requests
+
+
 def test_a_request_before_the_first_state_reaches_the_resumed_run():
     """It waited until the states that were active had been entered again: there was none."""
     ends, store = [], KillingStore()
