@@ -127,6 +127,7 @@ class GoalKeeper:
         self._drained: Event | None = None  # set when all clients have answered; made by `stop`
         self._durable = durable
         self._file: GoalFile | None = None
+        self._waiting: list[ServerGoalHandle] = []  # goals to resume when their clients are found
         self._looking: Timer | None = None  # it looks for the clients of restored goals
         self._tidying = threading.Lock()  # held while a thread tidies the file
         self._resumes = resumes
@@ -167,22 +168,19 @@ class GoalKeeper:
         """Run or end the goals that an earlier server did not end.
 
         A goal that was never accepted is treated as new. One that was asked to stop is not run
-        again. Clients that have died meanwhile are noticed `CLIENTS_S` later.
+        again. Clients that have died meanwhile are noticed `CLIENTS_S` later; a goal that ends with
+        its client waits until that is found.
         """
-        for handle in handles:
-            record = handle.record
-            with self.lock:
-                status = record.status
-                asked = status is Status.PREEMPTING or record.superseded
-                ends = asked or (handle.resumed and not self._resumes)
-                if status is not Status.RECALLING and not ends:
-                    record.status = Status.PENDING  # so that the server's code can accept it again
-            if status is Status.RECALLING:
-                self.step(handle, "cancel", "the restart of its server", None, TEXT_RESTARTED)
-            elif ends:
-                self.give_up(handle, TEXT_RESTARTED)
-            else:
-                self._deliver_goal(handle)
+        with self.lock:
+            self._waiting = [
+                handle
+                for handle in handles
+                if (self._cancels_lost or handle.record.cancel_if_lost) and not self._ends(handle)
+            ]
+            others = [handle for handle in handles if handle not in self._waiting]
+        for handle in others:
+            self._settle(handle)
+        self._settle_waiting()
         if handles:
             self.status.on_change()
             clients = {handle.record.client for handle in handles}
@@ -192,6 +190,42 @@ class GoalKeeper:
                     self._looking = self._clock.call_later(CLIENTS_S, look)
         elif self._file is not None:
             self.status.expire_later()  # results that were kept once more
+
+    def _ends(self, handle: ServerGoalHandle) -> bool:
+        """Return whether a goal of an earlier server is not run again."""
+        record = handle.record
+        asked = record.status in {Status.PREEMPTING, Status.RECALLING} or record.superseded
+        return asked or (handle.resumed and not self._resumes)
+
+    def _settle(self, handle: ServerGoalHandle) -> None:
+        record = handle.record
+        with self.lock:
+            status, ends = record.status, self._ends(handle)
+            if not ends:
+                record.status = Status.PENDING  # so that the server's code can accept it again
+        if status is Status.RECALLING:
+            self.step(handle, "cancel", "the restart of its server", None, TEXT_RESTARTED)
+        elif ends:
+            self.give_up(handle, TEXT_RESTARTED)
+        else:
+            self._deliver_goal(handle)
+
+    def _settle_waiting(self) -> None:
+        """Go on with those goals that wait for their clients and need not wait any more."""
+        if not self._waiting:
+            return
+        with self.lock:
+            there, waiting = self.port.clients(), self._waiting
+            self._waiting = [
+                handle
+                for handle in waiting
+                if not (handle.record.client in there or self._ends(handle))
+            ]
+            ready = [handle for handle in waiting if handle not in self._waiting]
+            if self.goals.closed:  # `stop` ends them
+                return
+        for handle in ready:
+            self._settle(handle)
 
     def _look_for_clients(self, clients: set[str]) -> None:
         """Treat clients of restored goals that are not there as dead."""
@@ -516,6 +550,10 @@ class GoalKeeper:
             ahead_ns / 1e9,
         )
 
+    def on_client(self) -> None:
+        """Handle the appearance of a client."""
+        self._settle_waiting()
+
     def on_client_lost(self, client: str) -> None:
         """Handle the death of a client."""
         with self.lock:
@@ -530,6 +568,7 @@ class GoalKeeper:
             self._keep(goal)
             if isinstance(goal.tag, ServerGoalHandle):
                 self._deliver_cancel(goal.tag)
+        self._settle_waiting()
         self.status.on_change()
 
     def on_acknowledged(self, goal_ids: list[str]) -> None:

@@ -263,6 +263,9 @@ class ServerListener(Protocol):
     def on_acknowledged(self, goal_ids: list[str]) -> None:
         """Handle acknowledged results; the answer of `is_farewell_heard` may change too."""
 
+    def on_client(self) -> None:
+        """Handle the appearance of a client, which `clients` has already."""
+
     def on_client_lost(self, client: str) -> None:
         """Handle the death of a client, or of its session."""
 

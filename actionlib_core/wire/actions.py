@@ -761,6 +761,7 @@ class ActionServerPort:
             error = find_mismatch([client], self.endpoint)
             if error is not None:
                 self._readable.report(f"{client.session} {client.type} {client.md5}", error)
+            self._listener.on_client()
         elif self._clients.pop(presence.key, None) is not None:
             if presence.key in self._unaware:  # it is gone and will not answer the farewell
                 self._unaware.discard(presence.key)

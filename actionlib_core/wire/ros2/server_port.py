@@ -518,6 +518,7 @@ class RosServerPort:
             who = f"a client in node {token.full_node!r}"
             error = TypeMismatchError(self._name, own, (token.type, token.type_hash), by=who)
             self._readable.report(f"{token.session} {token.type} {token.type_hash}", error)
+        self._listener.on_client()
 
     def _conflict(self, other: Token, *, stays: bool = False) -> ServerConflictError:
         own = self._ros.full_name, self._ros.token.session
