@@ -15,15 +15,17 @@ from action_msgs.msg import GoalStatusArray
 from action_msgs.srv import CancelGoal
 from goal_conversations import CONVERSATIONS, NONE, A
 from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
-from rclpy.lifecycle import LifecycleNode
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser.definition import AbstractNestedType, Array, BasicType, NamespacedType
+from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
 LONG_S = 60.0
@@ -279,28 +281,95 @@ def refuse_a_cancel():
 # -- parameters and life cycles --------------------------------------------------------------------
 
 
-def ask_a_node(parameters, asked):
-    """Return what a managed node of rclpy answers, in order; see `test_nodes`."""
-    context = rclpy.Context()
-    rclpy.init(context=context)
-    node = LifecycleNode("robot", context=context)
-    for name, value in parameters.items():
-        node.declare_parameter(name, value)
-    asker = rclpy.create_node("asker", context=context)
-    executor = MultiThreadedExecutor(4, context=context)
-    for each in (node, asker):
-        executor.add_node(each)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
+class Managed(LifecycleNode):
+    """A managed node.
 
-    def call(kind, name, request):
-        client = asker.create_client(kind, f"/robot/{name}")
+    Args:
+        context: Its context.
+        parameters: Its parameters.
+        refused: Transitions and parameters that fail.
+        broken: Transitions that raise.
+    """
+
+    def __init__(self, context, parameters, refused=(), broken=()):
+        super().__init__("robot", context=context)
+        self.refused, self.broken = refused, broken
+        for name, value in parameters.items():
+            self.declare_parameter(name, value)
+        self.add_on_set_parameters_callback(self._judge)
+
+    def _judge(self, parameters):
+        wrong = [one.name for one in parameters if one.name in self.refused]
+        return SetParametersResult(successful=not wrong, reason=" ".join(wrong) and "too fast")
+
+    def _move(self, label):
+        if label in self.broken:
+            raise RuntimeError(label)
+        is_refused = label in self.refused
+        return TransitionCallbackReturn.FAILURE if is_refused else TransitionCallbackReturn.SUCCESS
+
+    def on_configure(self, _state):
+        return self._move("configure")
+
+    def on_activate(self, _state):
+        return self._move("activate")
+
+    def on_deactivate(self, _state):
+        return self._move("deactivate")
+
+    def on_cleanup(self, _state):
+        return self._move("cleanup")
+
+
+class Robot:
+    """A managed node, and a lifecycle manager as Nav2's: it is active from the third question on.
+
+    The arguments are those of `Managed`.
+    """
+
+    def __init__(self, *arguments):
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = Managed(self.context, *arguments)
+        self.manager = rclpy.create_node("manager", context=self.context)
+        self.manager.create_service(Trigger, "/manager/is_active", self._is_active)
+        self.asker = rclpy.create_node("asker", context=self.context)
+        self.executor = MultiThreadedExecutor(4, context=self.context)
+        for each in (self.node, self.manager, self.asker):
+            self.executor.add_node(each)
+        self.questions = 0
+        self.thread = threading.Thread(target=self.executor.spin)
+        self.thread.start()
+
+    def _is_active(self, _request, response):
+        self.questions += 1
+        response.success = self.questions >= 3
+        return response
+
+    def call(self, kind, name, request):
+        client = self.asker.create_client(kind, name)
         assert client.wait_for_service(LONG_S)
         done = threading.Event()
         future = client.call_async(request)
         future.add_done_callback(lambda _: done.set())
         assert done.wait(LONG_S)
+        self.asker.destroy_client(client)
         return future.result()
+
+    def close(self):
+        self.executor.shutdown()
+        self.thread.join()
+        for each in (self.node, self.manager, self.asker):
+            each.destroy_node()
+        self.context.shutdown()
+
+
+def ask_a_node(parameters, asked):
+    """Return what a managed node of rclpy answers, in order; see `test_nodes`."""
+    robot = Robot(parameters)
+
+    def call(kind, name, request):
+        return robot.call(kind, f"/robot/{name}", request)
 
     def set_parameters(values):
         made = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
@@ -321,14 +390,43 @@ def ask_a_node(parameters, asked):
     try:
         return [known[name](argument) for name, argument in asked]
     finally:
-        executor.shutdown()
-        thread.join()
-        node.destroy_node()
-        asker.destroy_node()
-        context.shutdown()
+        robot.close()
 
 
-COMMANDS = {f.__name__: f for f in (exchange, converse, refuse_a_cancel, ask_a_node)}
+ROBOTS = []
+
+
+def open_robot(*arguments):
+    """Begin a robot that `ask_robot` asks; see `Robot`."""
+    ROBOTS.append(Robot(*arguments))
+
+
+def ask_robot(service, full, payload):
+    """Return the bytes with which a service of the robot answers these."""
+    kind = find(full)
+    request = deserialize_message(bytes.fromhex(payload), kind.Request)
+    return serialize_message(ROBOTS[-1].call(kind, service, request)).hex()
+
+
+def look_at_robot(names):
+    """Return the values of parameters, the state, and how often the manager was asked."""
+    node = ROBOTS[-1].node
+    state = node._state_machine.current_state[1]
+    return [[node.get_parameter(name).value for name in names], state, ROBOTS[-1].questions]
+
+
+def close_robot():
+    """End it."""
+    ROBOTS.pop().close()
+
+
+COMMANDS = {
+    f.__name__: f
+    for f in (
+        *(exchange, converse, refuse_a_cancel, ask_a_node),
+        *(open_robot, ask_robot, look_at_robot, close_robot),
+    )
+}
 
 for line in sys.stdin:
     command, *arguments = json.loads(line)
