@@ -178,7 +178,7 @@ def mission_facts(target: Target, text: str) -> dict[str, Any]:
         path = Path(file).resolve()
         is_file = names_file(place)
         files = _imported({name: path}, [str(path.parent), *sys.path] if is_file else sys.path)
-        if is_file:  # the module may have another name: of its package, or with a number
+        if is_file and "." not in name:  # it may have a number, as others have its name, too
             files[path.stem] = files.pop(name)
     if len(files) > MAX_FILES:
         raise TargetError(

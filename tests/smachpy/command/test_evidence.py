@@ -86,6 +86,15 @@ def test_the_hash_is_of_all_that_the_mission_imports():
     assert hash_of("good.py") != facts["hash"]
 
 
+def test_a_mission_of_a_package_has_one_hash_by_its_file_and_by_its_module(folder, monkeypatch):
+    monkeypatch.syspath_prepend(str(folder))
+    Path("evidence_own").mkdir()
+    Path("evidence_own/__init__.py").write_text("")
+    Path("evidence_own/look.py").write_text(MISSION)
+    by_file = hash_of("evidence_own/look.py")
+    assert by_file == hash_of("evidence_own.look") == hash_of("evidence_own.look:mission")
+
+
 def test_a_shipped_mission_and_a_mission_file_have_a_hash_of_their_own_files():
     shipped = mission_facts(load_target("countdown"), "countdown")
     assert "smachpy_missions.course.countdown" in shipped["files"]
