@@ -57,6 +57,7 @@ BENCHMARKS = (
     Benchmark("ros2_actions", short=("--quick",)),
     Benchmark("simulation", short=None),
     Benchmark("virtual_time", ("--rounds", "2"), short=None),
+    Benchmark("reproduction", short=None),
     Benchmark("ros1_bridge", short=None, needs="/usr/bin/rosmaster"),
     Benchmark("viewer", short=None, needs="/usr/bin/chromium"),
 )

@@ -55,8 +55,7 @@ def load_json(
         )
     try:
         # A whole number that is too large for a float raises in any computation with floats.
-        whole = _whole if _HUGE.search(text) else None
-        data = json.loads(text, parse_constant=str, parse_float=_finite, parse_int=whole)
+        data = (_HUGE_DECODER if _HUGE.search(text) else _DECODER).decode(text)
     except RecursionError as error:
         raise JsonTextError(f"it is nested deeper than {deepest} levels") from error
     except ValueError as error:  # also for a number with thousands of digits
@@ -73,6 +72,11 @@ def _finite(text: str) -> float | str:
 
 def _whole(text: str) -> int | str:
     return text if len(text) > _MAX_DIGITS else int(text)
+
+
+# `json.loads` makes one for each text, which takes as long as a short text.
+_DECODER: Final = json.JSONDecoder(parse_constant=str, parse_float=_finite)
+_HUGE_DECODER: Final = json.JSONDecoder(parse_constant=str, parse_float=_finite, parse_int=_whole)
 
 
 def check_depth(data: Any, deepest: int = MAX_JSON_NESTING) -> None:

@@ -606,18 +606,25 @@ def each_event(path: str | Path) -> Iterator[dict[str, Any]]:
         raise _unreadable(path, error) from error
 
 
-def _records(path: Path, file: TextIO) -> Iterator[tuple[int, dict[str, Any] | None]]:
-    """Yield the lines after the header: number and record; None for a last one that is cut off."""
+def _records(
+    path: Path, file: TextIO, topics: bool = True
+) -> Iterator[tuple[int, dict[str, Any] | None]]:
+    """Yield the lines after the header: number and record; None for a last one that is cut off.
+
+    Without `topics`, the lines with data of robots' topics are passed over.
+    """
     number = 1
     while line := file.readline(MAX_LINE_LENGTH + 1):
         number += 1
         if not line.endswith("\n") and len(line) <= MAX_LINE_LENGTH:
             yield number, None
             return
-        yield number, _read_line(path, number, line)
+        if topics or not line.startswith(_TOPICS):
+            yield number, _read_line(path, number, line)
 
 
 _NO_EVENTS = frozenset({OBSERVED, TYPES, END, CROSSED})
+_TOPICS = f'{{"kind": "{OBSERVED}",'
 _BLOCK = 65_536  # [bytes] read from the end of a file at once
 
 
@@ -713,7 +720,7 @@ def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def read_recording(
-    path: str | Path, *, stream: bool = False, newest: int | None = None
+    path: str | Path, *, stream: bool = False, newest: int | None = None, topics: bool = True
 ) -> Recording:
     """Read a file.
 
@@ -726,6 +733,7 @@ def read_recording(
             iterate them; topics and definitions are left out then.
         newest: The most events that are kept, and the most records of topics besides maps; those
             before them are folded into `base`, and inputs are left out. None: all.
+        topics: Whether data of robots' topics is read.
 
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event; with the line.
@@ -740,20 +748,22 @@ def read_recording(
                 return replace(header, events=cast("list[dict[str, Any]]", Streamed(path)))
             if size > LARGEST:
                 raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
-            return _read(path, file, newest)
+            return _read(path, file, newest, topics)
     except OSError as error:
         raise _unreadable(path, error) from error
 
 
-def _read(path: Path, file: TextIO, newest: int | None) -> Recording:
+def _read(path: Path, file: TextIO, newest: int | None, topics: bool) -> Recording:
     recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
     wrong = recording.wrong
 
     def events() -> Iterator[dict[str, Any]]:
-        for number, record in _records(path, file):
+        for number, record in _records(path, file, topics):
             if record is None:
                 recording.cut = True
             elif record["kind"] in {OBSERVED, CROSSED}:
+                if record["kind"] == OBSERVED and not topics:
+                    continue
                 try:
                     _add_data(recording, record, newest)
                 except DataError as error:

@@ -88,7 +88,7 @@ def run_file(path: str, options: Options) -> Reproduction:
     """
     with quiet():
         return reproduce(
-            read_recording(path),
+            read_recording(path, topics=False),
             mission=options.mission,
             allow=options.allow,
             seed=options.seed,

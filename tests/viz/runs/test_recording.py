@@ -224,6 +224,8 @@ def test_data_of_topics_in_another_shape_is_left_out_with_a_warning(record, capl
     path = with_line(path, kind="Observed", **fields)
     recording = read_recording(path)
     assert [one["at"] for one in recording.observed] == [[1.0, 2.0, 0.0]]
+    without = read_recording(path, topics=False)
+    assert (without.events, without.observed) == (recording.events, [])
     assert "1 record(s) of topics or inputs are left out; the first: line 9" in caplog.text
 
 
