@@ -67,6 +67,22 @@ def decode_permissions(payload: bytes) -> Permissions:
     return Permissions(who, tuple(allow), tuple(deny))
 
 
+def decode_question(payload: bytes) -> tuple[str, str]:
+    """Return the session and the user that a program names as it asks for its permissions.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    try:
+        fields = json.loads(payload)
+        session, user = fields["session"], fields["user"]
+    except (LookupError, TypeError, RecursionError) as error:
+        raise ValueError(f"got {payload[:80]!r}; expected session and user") from error
+    if not all(isinstance(word, str) for word in (session, user)):
+        raise ValueError(f"got {payload[:80]!r}; expected two texts")
+    return session, user
+
+
 def find_permissions(rules: Iterable[AccessRule], user: str, certificate: str) -> Permissions:
     """Return the permissions of the program that has logged in as `user` or with `certificate`.
 

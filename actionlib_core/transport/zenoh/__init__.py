@@ -35,6 +35,7 @@ from actionlib_core.transport._access import (
     ACCESS_KEY,
     Permissions,
     decode_permissions,
+    decode_question,
     find_permissions,
 )
 from actionlib_core.transport._inlet import CallbackGate, inside
@@ -342,11 +343,14 @@ class ZenohTransport:
             return self._declared.pop(entry, False) is None
 
     def _send_permissions(self, query: Query) -> None:
-        asked = json.loads(query.payload)
-        links = {str(link.zid): link.auth_identifier for link in self.session.info.links()}
-        certificate = links.get(asked["session"]) or ""
-        permissions = find_permissions(self.config.access, asked["user"], certificate)
-        query.reply(permissions.encode())
+        try:
+            session, user = decode_question(query.payload)
+        except ValueError as error:  # anybody may ask
+            query.reply_error(f"access rules: {error}")
+        else:
+            links = {str(link.zid): link.auth_identifier for link in self.session.info.links()}
+            permissions = find_permissions(self.config.access, user, links.get(session) or "")
+            query.reply(permissions.encode())
         query.finish()
 
     def _ask_permissions(self) -> Permissions | None:
@@ -366,8 +370,10 @@ class ZenohTransport:
         )
         done.wait(ACCESS_S)
         asking.close()
+        with inside:
+            others = {str(link.zid) for link in self.session.info.links()}
         for reply in answers:
-            if not reply.error:
+            if not reply.error and reply.source in others:  # what others say holds for their links
                 try:
                     return decode_permissions(reply.payload)
                 except ValueError as error:  # anybody may answer

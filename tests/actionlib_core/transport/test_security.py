@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import socket
 import ssl
+import threading
 
 import pytest
 from cryptography import x509
@@ -15,6 +16,7 @@ from actionlib_core.clock import RealClock
 from actionlib_core.config import AccessRule, Config, Tls
 from actionlib_core.exceptions import AccessDeniedError, TransportError
 from actionlib_core.transport import Quality, _refusal
+from actionlib_core.transport._access import ACCESS_KEY, Permissions
 from actionlib_core.transport._refusal import explain_refusal
 from actionlib_core.transport.zenoh import ZenohTransport
 from tests.free_port import free_port
@@ -94,6 +96,43 @@ def test_allowed_names_work(join):
     assert second.list_alive("@smachpy/*/*/*/*/*/*/**", WAIT_S) == [
         "@smachpy/service/s/1/n/t/m/robot_1/grip"
     ]
+
+
+def test_what_a_stranger_says_of_rules_does_not_count():
+    """Where the router has none, anybody could refuse all names to all programs."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    client = Config(mode="client", connect=(endpoint,), discovery="off", connect_timeout=WAIT_S)
+
+    def answer(query):
+        query.reply(Permissions("anybody", (), ("**",)).encode())
+        query.finish()
+
+    router = ZenohTransport(Config(mode="router", listen=(endpoint,), discovery="off"))
+    mallory = ZenohTransport(client)
+    mallory.queryable(ACCESS_KEY, answer)
+    alice = ZenohTransport(client)
+    try:
+        alice.publisher("robot_1/map")
+    finally:
+        for transport in (alice, mallory, router):
+            transport.close()
+
+
+@pytest.mark.parametrize(
+    "question", [b"", b"junk", b"[]", b'{"session": "s"}', b'{"session": [], "user": {}}']
+)
+def test_a_question_about_the_rules_that_is_none_is_answered_with_an_error(
+    join, question, monkeypatch
+):
+    raised, answers, done = [], [], CLOCK.event()
+    monkeypatch.setattr(threading, "excepthook", raised.append)
+    asker = join("bob", "hunter2")
+    asker._permissions = None
+    asker.query(ACCESS_KEY, question, timeout=WAIT_S, on_reply=answers.append, on_done=done.set)
+    assert done.wait(WAIT_S)
+    assert [reply.error for reply in answers] == [True]
+    assert answers[0].payload.startswith(b"access rules: ")
+    assert raised == []
 
 
 @pytest.mark.parametrize("key", ["robot_2/goal", "robot_1/secret", "other"])
