@@ -75,7 +75,7 @@ def _echo_ros2(node: Node, server: Endpoint, args: argparse.Namespace) -> int:
     def subscribe(part: str) -> Closable:
         message_class = getattr(action.parts, part).message
         return action.subscribe(
-            part, lambda sample: feed.put((part, message_class, sample.payload))
+            part, lambda sample: feed.put((part, message_class, sample.payload), _size)
         )
 
     subscriptions = [subscribe(part) for part in ("feedback", "status")[: 1 + args.status]]
@@ -106,7 +106,11 @@ def _too_few(args: argparse.Namespace) -> int:
 
 def _put(feed: Feed, readable: Readable, message_class: Any, sample: Sample) -> None:
     if readable.check(sample, message_class):
-        feed.put((sample.key.rpartition("/")[2], message_class, sample.payload))
+        feed.put((sample.key.rpartition("/")[2], message_class, sample.payload), _size)
+
+
+def _size(item: tuple[str, Any, bytes]) -> int:
+    return len(item[2])
 
 
 def _show_next(feed: Feed, deadline: float | None, unreadable: set[str], *, as_json: bool) -> None:

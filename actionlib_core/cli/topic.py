@@ -179,13 +179,14 @@ def _echo(args: argparse.Namespace) -> int:
         if args.raw:
             show: Callable[[Any], str] = "{0!r}\n---".format
             stack.enter_context(
-                _topic_rates.listening(node, args.name, lambda sample: feed.put(sample.payload))
+                _topic_rates.listening(
+                    node, args.name, lambda sample: feed.put(sample.payload, len)
+                )
             )
         else:
             show = MessageText(args).format
-            stack.enter_context(
-                Subscriber(args.name, _message_class(node, args), feed.put, node=node)
-            )
+            kind = _message_class(node, args)
+            stack.enter_context(Subscriber(args.name, kind, feed.put, _size, node=node))
         shown = 0
         while limit is None or shown < limit:
             deadline = None if args.timeout is None else node.clock.now() + args.timeout
@@ -198,6 +199,10 @@ def _echo(args: argparse.Namespace) -> int:
             print(show(item), flush=True)
             shown += 1
     return 0
+
+
+def _size(message: Any) -> int:
+    return len(message.to_cdr() if message._wire == "ros2" else message.to_bytes())
 
 
 class _Filter:

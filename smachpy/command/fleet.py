@@ -19,7 +19,7 @@ from actionlib_core.names import check_name, resolve_name
 from actionlib_core.process.output import printable, tell
 from smachpy.command import EXIT_ERROR
 from smachpy.command.durable import JOURNAL, LEASE_S, robot_name, whole_target, words_of
-from smachpy.command.pruning import add_keep, age, is_kept
+from smachpy.command.pruning import add_keep, age, deleted, is_kept
 from smachpy.command.queued import Allowed, add_allow, add_allow_packages, run_words
 from smachpy.command.run import add_input, add_require_evidence, read_inputs
 from smachpy.command.warm import Starter
@@ -415,7 +415,7 @@ class Runner:
             tell("smachpy runner", f"old missions are not deleted: {error}")
             return
         if gone:
-            print(f"{gone:d} missions deleted", flush=True)
+            print(deleted(gone), flush=True)
 
     def _begin_next(self, schedule: MissionRow, now: float) -> None:
         """Put the next mission of a schedule into the queue; one that cannot be read is told."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from actionlib_core.process.output import printable
 from smachpy.command.durable import JOURNAL
-from smachpy.command.pruning import add_age, add_page, is_kept, size_text
+from smachpy.command.pruning import add_age, add_page, deleted, is_kept, size_text
 from smachpy.command.queued import add_allow, run_words
 from smachpy.durable.store import store_name
 from smachpy.userdata.secret import masked, masked_words
@@ -286,8 +286,8 @@ def _prune(args: argparse.Namespace) -> int:
         )
         total, size = store.size()
     freed = size_text(max(0, before - size))
-    left = f"{total} missions are left, {size_text(size)}"
-    print(printable(f"{gone} missions deleted, {freed} freed; {left}"))
+    left = f"{total} {'mission is' if total == 1 else 'missions are'} left, {size_text(size)}"
+    print(printable(f"{deleted(gone)}, {freed} freed; {left}"))
     return 0
 
 

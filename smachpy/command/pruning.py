@@ -62,6 +62,11 @@ def age(text: str) -> float:
     return float(found[1]) * _UNITS[found[2]]
 
 
+def deleted(count: int) -> str:
+    """Return how many missions were deleted, for people."""
+    return f"{count} {'mission' if count == 1 else 'missions'} deleted"
+
+
 def is_kept(
     keep: str, outcome: str | None, status: str = "", success: tuple[str, ...] | None = None
 ) -> bool:

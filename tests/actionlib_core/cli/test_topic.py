@@ -11,8 +11,8 @@ from functools import partial
 import pytest
 from ruamel.yaml import YAML
 
-from actionlib_core.cli import main
-from actionlib_core.cli._message_text import flatten, shorten, split_path, to_yaml
+from actionlib_core.cli import main, topic
+from actionlib_core.cli._message_text import MessageText, flatten, shorten, split_path, to_yaml
 from actionlib_core.interfaces.geometry_msgs.msg import Point, PoseStamped
 from actionlib_core.interfaces.sensor_msgs.msg import LaserScan
 from actionlib_core.interfaces.std_msgs.msg import Float64MultiArray, Int32, String
@@ -143,6 +143,29 @@ def test_echo_counts_and_times_out(cli, robot, capsys, clock):
     captured = capsys.readouterr()
     assert captured.out == "2\n"
     assert "/count: no message in 5 s" in captured.err
+
+
+def test_echo_drops_the_oldest_messages_when_its_output_is_read_slowly(
+    cli, robot, capsys, clock, monkeypatch
+):
+    """`actionlib topic echo images | less` kept all of them in memory."""
+    publisher = Publisher("text", String, node=robot)
+    clock.call_later(1.0, lambda: publisher.publish("0"))
+
+    def publish_many(text, *_arguments, **_options):
+        shown.append(text[:1])
+        for number in range(1, 6 if len(shown) == 1 else 1):
+            publisher.publish(str(number) * 10 * 2**20)  # 10 MiB; 32 MiB wait at most
+            clock.sleep(0.1)
+        clock.sleep(1.0)
+
+    shown = []
+    monkeypatch.setattr(MessageText, "format", lambda _self, message: message.data)
+    monkeypatch.setattr(topic, "print", publish_many, raising=False)
+    assert cli("echo", "text", "std_msgs/String", "-n", "4") == 0
+    assert shown == ["0", "3", "4", "5"]
+    dropped = "actionlib: 2 messages were dropped: they came faster than they were read\n"
+    assert capsys.readouterr().err == dropped
 
 
 def test_echo_of_a_field_that_is_not_there(cli, robot, capsys):

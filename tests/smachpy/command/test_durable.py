@@ -353,7 +353,7 @@ def test_old_missions_are_pruned_except_failures(capsys: pytest.CaptureFixture[s
     assert main([*prune, "--older-than", "1d"]) == 0
     assert capsys.readouterr().out.startswith("0 missions deleted")
     assert main([*prune, "--older-than", "0s", "--keep", "failed"]) == 0
-    assert capsys.readouterr().out.startswith("1 missions deleted")
+    assert capsys.readouterr().out.startswith("1 mission deleted")
     assert [row.id for row in store.missions()] == ["bad", "asked", "waits"]
     runner = Runner(store, "q.db", robots=["nobody"], at_once=1, lease_s=15.0, prune=(0.0, "none"))
     runner.look()
