@@ -49,9 +49,11 @@ if TYPE_CHECKING:
 KINDS: Final = ("state", "machine", "sequence", "concurrence", "iterator", "mission", "plan")
 OPTIONS: Final = (
     *("timeout", "timeout_outcome", "preempt_timeout", "retry", "resume"),
-    *("idempotent", "transient", "resource"),
+    *("idempotent", "transient", "success", "resource"),
 )
 KEYS: Final = ("outcomes", "input_keys", "output_keys")
+OF_LOAD: Final = frozenset({"path", "allow", "to_run"})
+"""What `load` takes besides the parameters of a file."""
 TYPES: Final[dict[str, tuple[type, ...]]] = {
     "whole": (int,),
     "number": (int, float),
@@ -277,6 +279,10 @@ class _Reader:
         found = Parameter(name, kind, given, unit, text)
         if not name.isidentifier():
             parameters.report(name, f"got {name!r}; expected a name of letters, digits and '_'.")
+        if name in OF_LOAD:
+            parameters.report(
+                name, f"got {name!r}, an argument of smachpy.load; expected another name."
+            )
         if given is not REQUIRED and not found.fits(given):
             section.problem("default", WORDS[kind])
         return found

@@ -35,6 +35,7 @@ def schema() -> dict[str, Any]:
         "resume": {"type": "string", "description": "skip:OUTCOME or ask"},
         "idempotent": {"type": "boolean"},
         "transient": TEXTS,
+        "success": TEXTS,
         "resource": {
             "anyOf": [
                 {"type": "string"},

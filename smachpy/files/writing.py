@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.inputs.yaml_text import MAX_YAML_LENGTH, load_yaml
+from smachpy.engine.options import NO_OPTIONS
 from smachpy.exceptions import MissionError
-from smachpy.files.reading import ItemsOf, StopOthers
+from smachpy.files.reading import KEYS, ItemsOf, StopOthers
 from smachpy.files.reference import Origin
 from smachpy.machines.concurrence import Concurrence
 from smachpy.machines.container import Container
 from smachpy.machines.iterator import Iterator
 from smachpy.machines.state import FunctionState, State
 from smachpy.machines.state_machine import Sequence, StateMachine
-from smachpy.userdata.user_data import ConstantKey, data_of
+from smachpy.userdata.user_data import CheckedDict, ConstantKey, data_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -275,14 +276,7 @@ class _Writer:
         for key in ("input_keys", "output_keys"):
             if getattr(data, key):
                 found[key] = list(getattr(data, key))
-        values = {
-            k: v for k, v in data_of(container.userdata).items() if type(k) is not ConstantKey
-        }
-        values |= data.begins_with
-        if values:
-            found["userdata"] = {
-                k: self._plain(v, f"{path}: userdata {k}") for k, v in values.items()
-            }
+        found |= self._userdata(container, path)
         found |= self._options(data.options, path)
         if isinstance(container, Iterator):
             return found | self._iterator(container, path) | self._cleanup(container, path)
@@ -293,6 +287,17 @@ class _Writer:
         if data.reenter != "first":
             found["reenter"] = data.reenter
         return found | self._children(container, path)
+
+    def _userdata(self, container: Container, path: str) -> dict[str, Any]:
+        """Return the values with which a container begins."""
+        if isinstance(data_of(container.userdata), CheckedDict):
+            self._refuse(path, "userdata_type: got types; expected none.")
+        values = {
+            k: v for k, v in data_of(container.userdata).items() if type(k) is not ConstantKey
+        }
+        values |= container._smachpy.begins_with
+        plain = {k: self._plain(v, f"{path}: userdata {k}") for k, v in values.items()}
+        return {"userdata": plain} if plain else {}
 
     def _children(self, container: Container, path: str) -> dict[str, Any]:
         """Return the states and the clean-up."""
@@ -376,7 +381,8 @@ class _Writer:
             found: dict[str, Any] = {origin.kind: origin.name}
             if origin.arguments:
                 found["with"] = dict(origin.arguments)
-            return {**found, **origin.keys, **self._changed(state, origin, path)}
+            options = self._changed(state, path, origin.name, origin.options, origin.loaded)
+            return {**found, **origin.keys, **options}
         if isinstance(state, Container):
             kinds = {
                 StateMachine: "machine",
@@ -385,8 +391,8 @@ class _Writer:
                 Iterator: "iterator",
             }
             return {kinds.get(type(state), "machine"): self.container(state, path)}
-        name = self._name(state)
-        if name is None:
+        name, fresh = self._name(state)
+        if fresh is None:
             self._refuse(
                 path,
                 f"got a {type(state).__name__} made by code; expected a state of a module, made "
@@ -394,35 +400,56 @@ class _Writer:
                 "it.",
             )
             return {}
+        # A function's own state may have been changed: another process has what its module says.
+        loaded = NO_OPTIONS if fresh is state else fresh._smachpy.options
         return {
             "state": name,
             "outcomes": list(state._smachpy.outcomes),
-            **self._options(state._smachpy.options, path),
+            **self._changed(state, path, name, {}, loaded),
         }
 
-    def _name(self, state: State) -> str | None:
-        """Return `module:Name` of a state, if importing that gives an equal one."""
+    def _name(self, state: State) -> tuple[str, State | None]:
+        """Return `module:Name` of a state, and what importing that gives, if it is an equal one."""
         if isinstance(state, FunctionState):
             function: Any = state.__wrapped__
             module, name = function.__module__, function.__qualname__
-            there = _attribute(module, name)
-            same = isinstance(there, FunctionState) and there.__wrapped__ is function
-            return f"{module}:{name}" if same else None
-        kind = type(state)
-        if _attribute(kind.__module__, kind.__qualname__) is not kind:
-            return None
-        try:
-            fresh = kind()
-        except Exception:  # noqa: BLE001  it needs arguments: told by the caller
-            return None
-        own = {k: v for k, v in vars(state).items() if not k.startswith("_smachpy")}
-        plain = {k: v for k, v in vars(fresh).items() if not k.startswith("_smachpy")}
-        same = own == plain and state._smachpy.outcomes == fresh._smachpy.outcomes
-        return f"{kind.__module__}:{kind.__qualname__}" if same else None
+            fresh: Any = _attribute(module, name)
+            same = isinstance(fresh, FunctionState) and fresh.__wrapped__ is function
+        else:
+            kind = type(state)
+            module, name = kind.__module__, kind.__qualname__
+            if _attribute(module, name) is not kind:
+                return "", None
+            try:
+                fresh = kind()
+            except Exception:  # noqa: BLE001  it needs arguments: told by the caller
+                return "", None
+            own = {k: v for k, v in vars(state).items() if not k.startswith("_smachpy")}
+            plain = {k: v for k, v in vars(fresh).items() if not k.startswith("_smachpy")}
+            same = own == plain
+        same = same and all(
+            getattr(state._smachpy, key) == getattr(fresh._smachpy, key) for key in KEYS
+        )
+        return f"{module}:{name}", fresh if same else None
 
-    def _changed(self, state: State, origin: Origin, path: str) -> dict[str, Any]:
-        """Return the options as in the file, and those that the program has set since."""
-        found, loaded = dict(origin.options), origin.loaded
+    def _changed(
+        self,
+        state: State,
+        path: str,
+        name: str,
+        in_file: Mapping[str, Any],
+        loaded: Options | None,
+    ) -> dict[str, Any]:
+        """Return the options as in the file, and those that the program has set since.
+
+        Args:
+            state: The state.
+            path: Its path.
+            name: Its name in the file.
+            in_file: The options as in the file.
+            loaded: All options that it has by its name and those; None if it has no others.
+        """
+        found = dict(in_file)
         if loaded is None or loaded == state._smachpy.options:
             return found
         now = self._options(state._smachpy.options, path, loaded)
@@ -430,8 +457,10 @@ class _Writer:
         for key in {**then, **now}:
             if key in now and now[key] != then.get(key):
                 found[key] = now[key]
+                if key == "timeout":  # until its code is imported, a state has only those of a file
+                    found["timeout_outcome"] = now["timeout_outcome"]
             elif key not in now and found.pop(key, None) is None:
-                self._refuse(path, f"{key}: got none; expected that of {origin.name}.")
+                self._refuse(path, f"{key}: got none; expected that of {name}.")
         return found
 
     def _options(self, options: Options, path: str, known: Options | None = None) -> dict[str, Any]:
@@ -453,10 +482,10 @@ class _Writer:
                 self._refuse(path, f"{name}: got code; expected none.")
         if options.resume is not None:
             found["resume"] = self._plain(options.resume, f"{path}: resume")
-        if options.idempotent:
-            found["idempotent"] = True
-        if options.transient:
-            found["transient"] = list(options.transient)
+        for name, none in (("idempotent", False), ("transient", ()), ("success", None)):
+            value = getattr(options, name)
+            if value != none:
+                found[name] = list(value) if isinstance(value, tuple) else value
         if options.resource is not None:
             found["resource"] = {
                 "name": options.resource.name,
@@ -467,6 +496,8 @@ class _Writer:
     def _policy(self, container: Concurrence, path: str) -> dict[str, Any]:
         data = container._smachpy
         found: dict[str, Any] = {"default_outcome": data.default_outcome}
+        if not data.default_outcome:
+            self._refuse(path, "default_outcome: got none; expected one.")
         if data.outcome_cb is not None:
             self._refuse(path, "outcome_cb: got a function; expected rules.")
         stop = data.child_termination_cb
@@ -507,6 +538,8 @@ class _Writer:
             return [self._plain(one, where) for one in value]
         if isinstance(value, dict) and all(isinstance(key, str) for key in value):
             return {key: self._plain(one, where) for key, one in value.items()}
+        if isinstance(value, str) and "${" in value:
+            self._refuse(where, f"got {value!r}; expected no '${{', which names a parameter.")
         if not isinstance(value, PLAIN):
             self._refuse(where, f"got a {type(value).__name__}; expected plain data.")
             return None

@@ -187,6 +187,10 @@ class Table:
                 f"transitions: got {row!r}; expected trigger, source, dest and maybe when."
             )
             return None
+        if row["trigger"] == "preempted":
+            self.problems.append(
+                "transition 'preempted': got what a request to stop gives; expected another event."
+            )
         sources = (row["source"],) if isinstance(row["source"], str) else row["source"]
         if not isinstance(sources, Sequence) or not all(isinstance(one, str) for one in sources):
             self.problems.append(

@@ -31,6 +31,14 @@ class Up(State):
         return "a" if userdata.count % 2 else "b"
 
 
+class Limited(Up):
+    """The same, with a time limit."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        smachpy.set_options(self, timeout=5.0, timeout_outcome="b")
+
+
 @smachpy.state(["a", "b"], io_keys=["count"])
 def down(userdata: Any) -> str:
     """The same, as a function."""

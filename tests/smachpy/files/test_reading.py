@@ -120,6 +120,17 @@ def test_a_required_parameter_is_asked_for(file):
     ]
 
 
+@pytest.mark.parametrize("name", ["path", "allow", "to_run"])
+def test_a_parameter_is_not_named_as_an_argument_of_load(file, name):
+    """Its value was a TypeError."""
+    states = "states:\n  A: {state: wait, with: {seconds: 1}}\n"
+    path = file(f"outcomes: [done, preempted]\nparameters: {{{name}: {{type: any}}}}\n{states}")
+    expected = f"2:14: parameters.{name}: got {name!r}, an argument of smachpy.load; expected"
+    with pytest.raises(MissionFileError, match=re.escape(expected)):
+        smachpy.files.read(path)
+    assert problems_of(path)[0].startswith(expected)
+
+
 def test_every_mistake_has_its_place_and_a_suggestion(file):
     path = file(
         """\

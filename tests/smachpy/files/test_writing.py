@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import pytest
 from hypothesis import given, settings
@@ -15,7 +16,7 @@ from smachpy import Concurrence, Iterator, Sequence, State, StateMachine, any_of
 from smachpy.files import NotWrittenError, load, schema, write
 from smachpy.states import Wait
 from tests.smachpy.files import own_states
-from tests.smachpy.files.own_states import Up
+from tests.smachpy.files.own_states import Limited, Up
 from tests.smachpy.files.test_reading import GOOD
 
 LEAVES = st.sampled_from(["up", "down", "wait"])
@@ -282,6 +283,84 @@ def test_options_that_were_set_after_loading_are_written(tmp_path):
     smachpy.set_options(machine["A"], on_exit=print)
     with pytest.raises(NotWrittenError, match="on_exit: got code"):
         write(machine)
+
+
+def with_state(state: State, **options: Any) -> StateMachine:
+    sm = StateMachine(["a", "b"], name="M", **options)
+    sm.add("A", state)
+    return sm
+
+
+@pytest.mark.parametrize("where", ["machine", "state"])
+def test_which_outcomes_are_good_is_written(tmp_path, where):
+    """It was left out, and a mission that had failed counted as done."""
+    sm, path = with_state(Up()), tmp_path / "m.yaml"
+    smachpy.set_options(sm if where == "machine" else sm["A"], success=["b"])
+    write(sm, path)
+    again = smachpy.files.resolve(load(path, allow=["tests"]))
+    for one, other in ((sm, again), (sm["A"], again["A"])):
+        assert smachpy.get_options(other).success == smachpy.get_options(one).success
+
+
+def test_options_of_a_class_are_written_where_the_program_has_set_others(tmp_path):
+    path = tmp_path / "m.yaml"
+    for timeout in (5.0, 7.0):
+        sm = with_state(Limited())
+        smachpy.set_options(sm["A"], timeout=timeout)
+        assert ("timeout: 7.0" in write(sm, path)) is (timeout == 7.0)
+        again = smachpy.files.resolve(load(path, allow=["tests"]))
+        assert smachpy.get_options(again["A"]) == smachpy.get_options(sm["A"])
+
+
+def test_options_that_are_set_for_a_function_itself_are_written():
+    sm, before = with_state(own_states.down), smachpy.get_options(own_states.down)
+    assert sm["A"] is own_states.down
+    try:
+        smachpy.set_options(sm["A"], timeout=7.0, timeout_outcome="b")
+        assert "timeout: 7.0" in write(sm)
+    finally:
+        smachpy.set_options(own_states.down, timeout=None, timeout_outcome=before.timeout_outcome)
+
+
+class Fields(TypedDict):
+    count: int
+
+
+def limited_no_more() -> State:
+    state = Limited()
+    smachpy.set_options(state, timeout=None)
+    return state
+
+
+def with_another_key() -> State:
+    state = Up()
+    state.register_input_keys(["more"])
+    return state
+
+
+def without_default() -> Concurrence:
+    concurrence = Concurrence(["a", "b"], "", outcome_map={"a": {"S": "a"}})
+    concurrence.add("S", Up())
+    return concurrence
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: with_state(limited_no_more()), "/M/A: timeout: got none; expected that of tests"),
+        (lambda: with_state(with_another_key()), "/M/A: got a Up made by code"),
+        (lambda: with_state(without_default()), "/M/A: default_outcome: got none; expected one"),
+        (lambda: with_state(Up(), userdata_type=Fields), "/M: userdata_type: got types"),
+        (
+            lambda: with_state(Up(), userdata={"t": ["${x}"]}),
+            "/M: userdata t: got '${x}'; expected",
+        ),
+    ],
+)
+def test_what_a_file_would_lose_is_told(make, problem):
+    """It was left out, or the file could not be loaded."""
+    with pytest.raises(NotWrittenError, match=re.escape(problem)):
+        write(make())
 
 
 def test_what_cannot_be_written_is_told_all_at_once(tmp_path):

@@ -629,6 +629,7 @@ def test_a_way_is_not_for_a_mode_whose_name_only_begins_with_that_of_its_source(
         ("idle", [], "states: got 'idle'; expected a list"),
         (None, 5, "states: got None; expected a list. transitions: got 5"),
         (["a"], [["", "a", "a"]], "transitions: got {'trigger': ''"),
+        (["a"], [["preempted", "a", "a"]], "got what a request to stop gives; expected another"),
         (["a"], [["x", "a", "a", 5]], "transition 'x': when: got 5; expected an expression"),
         ([{"name": "a", "resume": "yes"}], [], "a: resume: got 'yes'; expected True or False"),
         ([{"name": "a", "mission": lambda: 1 // 0}], [], "a: mission: got .* which raised"),
