@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import contextlib
 import heapq
+import itertools
 import json
 import os
 import threading
@@ -26,7 +27,7 @@ from collections import deque
 from dataclasses import asdict, dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NotRequired, Protocol, TypedDict, cast
+from typing import TYPE_CHECKING, Any, Literal, NotRequired, Protocol, TypedDict
 
 from actionlib_core.clock import RealClock, SerialExecutor, current_clock
 from actionlib_core.exceptions import ActionlibError
@@ -595,23 +596,30 @@ def each_event(path: str | Path) -> Iterator[dict[str, Any]]:
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event.
     """
-    path = Path(path)
+    return (record for _, record in _each(Path(path), "") if record["kind"] not in _NO_EVENTS)
+
+
+def _each(path: Path, word: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield number and record of each whole line after the header that has `word` in it."""
     try:
         with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
             _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
-            for _, record in _records(path, file):
-                if record is not None and record["kind"] not in _NO_EVENTS:
-                    yield record
+            for number, record in _records(path, file, lambda line: word in line):
+                if record is not None:
+                    yield number, record
     except OSError as error:
         raise _unreadable(path, error) from error
 
 
 def _records(
-    path: Path, file: TextIO, topics: bool = True
+    path: Path, file: TextIO, wanted: Callable[[str], bool] = bool
 ) -> Iterator[tuple[int, dict[str, Any] | None]]:
     """Yield the lines after the header: number and record; None for a last one that is cut off.
 
-    Without `topics`, the lines with data of robots' topics are passed over.
+    Args:
+        path: The file's path, for errors.
+        file: The file, after the header.
+        wanted: Whether a line is read; the others are passed over.
     """
     number = 1
     while line := file.readline(MAX_LINE_LENGTH + 1):
@@ -619,7 +627,7 @@ def _records(
         if not line.endswith("\n") and len(line) <= MAX_LINE_LENGTH:
             yield number, None
             return
-        if topics or not line.startswith(_TOPICS):
+        if wanted(line):
             yield number, _read_line(path, number, line)
 
 
@@ -729,8 +737,8 @@ def read_recording(
 
     Args:
         path: The file.
-        stream: Whether the `events` of a large file may be `Streamed`, for readers that only
-            iterate them; topics and definitions are left out then.
+        stream: Whether `events` and `observed` of a large file may be `Streamed`, for readers that
+            only iterate them; inputs are left out then.
         newest: The most events that are kept, and the most records of topics besides maps; those
             before them are folded into `base`, and inputs are left out. None: all.
         topics: Whether data of robots' topics is read.
@@ -745,7 +753,11 @@ def read_recording(
             size = os.fstat(file.fileno()).st_size
             if stream and size > STREAMED:
                 header = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
-                return replace(header, events=cast("list[dict[str, Any]]", Streamed(path)))
+                for _, record in _each(path, TYPES):
+                    if record["kind"] == TYPES:
+                        header.definitions.update(_texts(record.get("definitions")))
+                events, observed = Streamed(path), Streamed(path, observed=True)
+                return replace(header, events=events, observed=observed)  # type: ignore[arg-type]
             if size > LARGEST:
                 raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
             return _read(path, file, newest, topics)
@@ -757,8 +769,11 @@ def _read(path: Path, file: TextIO, newest: int | None, topics: bool) -> Recordi
     recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
     wrong = recording.wrong
 
+    def wanted(line: str) -> bool:
+        return topics or not line.startswith(_TOPICS)
+
     def events() -> Iterator[dict[str, Any]]:
-        for number, record in _records(path, file, topics):
+        for number, record in _records(path, file, wanted):
             if record is None:
                 recording.cut = True
             elif record["kind"] in {OBSERVED, CROSSED}:
@@ -775,12 +790,16 @@ def _read(path: Path, file: TextIO, newest: int | None, topics: bool) -> Recordi
 
     numbered = _numbered(map(SteadyStamps().fix, events()))
     recording.events = list(numbered if newest is None else _newest(recording, numbered, newest))
+    _tell_wrong(path, wrong)
+    return recording
+
+
+def _tell_wrong(path: Path, wrong: Sequence[str]) -> None:
     if wrong:
         log.logwarn(
             f"recording {str(path)!r}: {len(wrong)} record(s) of topics or inputs are left out; "
             f"the first: {wrong[0]}"
         )
-    return recording
 
 
 def _newest(
@@ -924,18 +943,37 @@ def delete_recording(recording: Path) -> None:
 
 
 class Streamed:
-    """The events of a recording, read from the file each time they are iterated.
+    """Records of a recording, read from the file each time they are iterated.
+
+    Args:
+        path: The file.
+        observed: Whether they are those of the robot's topics; else they are the events.
 
     Raises:
-        RecordingError: while they are iterated: a line is not an event; with the line.
+        RecordingError: while they are iterated: a line is not a record; with the line.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, observed: bool = False) -> None:
         self._path = path
+        self._observed = observed
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        """Yield the events, as `read_recording` returns them."""
+        """Yield the records, as `read_recording` returns them."""
+        if self._observed:
+            return self._each_observed()
         return _numbered(map(SteadyStamps().fix, each_event(self._path)))
+
+    def _each_observed(self) -> Iterator[dict[str, Any]]:
+        wrong: list[str] = []
+        numbers = itertools.count(1)
+        for line, record in _each(self._path, OBSERVED):
+            if record["kind"] != OBSERVED:
+                continue
+            try:
+                yield {**read_observed(record), "n": next(numbers)}
+            except DataError as error:
+                wrong.append(f"line {line}: {error}")
+        _tell_wrong(self._path, wrong)
 
 
 def each_recording(places: Iterable[str | Path], *, stream: bool = False) -> Iterator[Recording]:

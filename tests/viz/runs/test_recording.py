@@ -461,6 +461,20 @@ def test_a_large_recording_is_drawn_event_by_event(record, monkeypatch, tmp_path
     assert streamed.read_text() == whole.read_text()
 
 
+def test_a_recording_with_a_wrong_line_leaves_no_half_mcap_file(
+    record, monkeypatch, capsys, tmp_path
+):
+    from smachpy.command import main
+
+    monkeypatch.setattr(recording_module, "STREAMED", 10)
+    path, output = record("run.jsonl"), tmp_path / "run.mcap"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:3], "nonsense\n", *lines[3:]]))
+    assert main(["runs", "export", str(path), "-o", str(output)]) == 2
+    assert "line 4" in capsys.readouterr().err
+    assert not output.exists()
+
+
 def test_a_large_recording_is_explained_event_by_event(record, monkeypatch, capsys):
     from smachpy.command import main
 

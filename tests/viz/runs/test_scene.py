@@ -12,6 +12,8 @@ import pytest
 from mcap.reader import make_reader
 
 from actionlib_core.interfaces import define_action, get_message
+from smachpy.command import main
+from smachpy.events import recording
 from smachpy.events.introspection import StateRecord, TransitionRecord
 from smachpy.events.recording import interface_texts, read_recording
 from smachpy_viz.runs.mcap import write_mcap
@@ -81,6 +83,16 @@ def exported(tmp_path: Path, observed):
             (schema, channel.topic, get_message(schema.name).from_bytes(message.data))
             for schema, channel, message in make_reader(stream).iter_messages()
         ]
+
+
+def test_a_large_recording_is_exported_record_by_record(tmp_path, monkeypatch):
+    whole = exported(tmp_path, [*SEEN, {"what": "pose", "x": 2.0}])  # the last one has a wrong form
+    monkeypatch.setattr(recording, "STREAMED", 10)
+    monkeypatch.setattr(recording, "_read", None)  # nothing is read whole
+    file = tmp_path / "streamed.mcap"
+    assert main(["runs", "export", str(tmp_path / "run.jsonl"), "-o", str(file)]) == 0
+    assert file.read_bytes() == (tmp_path / "run.mcap").read_bytes()
+    assert "/pose" in {topic for _, topic, _ in whole}
 
 
 def test_a_robot_stands_on_its_map_with_scan_and_plan(tmp_path):

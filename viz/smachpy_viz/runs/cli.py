@@ -357,10 +357,9 @@ def _export(args: argparse.Namespace) -> int:
     if Path(args.file).is_dir():
         return _export_all(args.file, Path(args.output))
     output = Path(args.output)
-    # A picture needs the events one after the other, the others at once.
-    is_picture = output.suffix not in {".html", ".mcap"}
+    # A page needs the events at once, the others one after the other.
     newest = html.MOST_EVENTS if output.suffix == ".html" else None
-    recording = read_recording(args.file, stream=is_picture, newest=newest)
+    recording = read_recording(args.file, stream=newest is None, newest=newest)
     try:
         _write(recording, output, args.runs, args.map)
     except OSError as error:

@@ -37,6 +37,7 @@ from actionlib_core.time import Time
 from smachpy.base import log
 from smachpy.events.introspection import StateRecord
 from smachpy.events.reading import OBSERVED
+from smachpy.events.recording import RecordingError
 from smachpy.events.run_state import RunState
 from smachpy.userdata.json_text import from_shown
 from smachpy.userdata.shown import literal, shortened_part
@@ -57,18 +58,27 @@ _MALFORMED = (ArithmeticError, AttributeError, LookupError, TypeError, ValueErro
 def write_mcap(recording: Recording, path: Path) -> None:
     """Write the file; log how many messages are left out.
 
+    Args:
+        recording: The run; one whose records are `Streamed` is read while the file is written.
+        path: The file. None is left behind an error.
+
     Raises:
         ModuleNotFoundError: the package `mcap` is not installed.
         OSError: the file cannot be written.
+        RecordingError: a line of a streamed recording is not a record.
     """
     from mcap.writer import Writer
 
-    with open_private(path, "wb") as file:
-        writer = Writer(file)
-        writer.start(profile="ros1", library="smachpy")
-        export = _Export(recording, writer)
-        export.run()
-        writer.finish()  # type: ignore[no-untyped-call]
+    try:
+        with open_private(path, "wb") as file:
+            writer = Writer(file)
+            writer.start(profile="ros1", library="smachpy")
+            export = _Export(recording, writer)
+            export.run()
+            writer.finish()  # type: ignore[no-untyped-call]
+    except RecordingError:
+        path.unlink()
+        raise
     for (topic, why), number in export.left_out.items():
         log.logwarn(f"{str(path)!r}: {number} message(s) of {topic} are left out: {why}.")
 
