@@ -38,6 +38,7 @@ class Claim:
         who: Returns who makes it, for people.
         stop: Asks who makes it to stop, for the claim that is given; it must not block.
         wake: Set when it holds the resource.
+        has_asked: With "preempt", it has asked the holder to stop.
         give: Gives the resource back to other processes, from which the claim has it; or None.
     """
 
@@ -56,6 +57,7 @@ class Claim:
         self.who = who
         self.stop = stop
         self.wake = wake
+        self.has_asked = False
         self.give: Callable[[], object] | None = None
 
     def is_inside(self, other: Claim) -> bool:
@@ -131,7 +133,8 @@ class Resources:
     def _circle(self, claim: Claim, holder: Claim) -> list[Claim]:
         """Return the claims that wait for each other if `claim` waits for `holder`; [] for none.
 
-        One that preempts is in no circle: it has asked the holder to stop.
+        One that preempts is in none before the holder has heard of it. What the holder does after
+        that, such as to brake, is not asked again.
         """
         waiting = [one for all_of in self._waiting.values() for one in all_of]
         ways = [[one] for one in self._inside(holder, waiting)]
@@ -149,7 +152,8 @@ class Resources:
 
     @staticmethod
     def _inside(holder: Claim, waiting: list[Claim]) -> Iterator[Claim]:
-        return (one for one in waiting if one.policy == "wait" and one.is_inside(holder))
+        blocked = (one for one in waiting if one.policy == "wait" or one.has_asked)
+        return (one for one in blocked if one.is_inside(holder))
 
 
 class CircleError(Exception):

@@ -94,7 +94,7 @@ def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | 
     try:
         waited = _wait_for_former(frame, claim, asked)
         if waited is not None:
-            waited = _wait_here(frame, all_of, claim, waited=waited)
+            waited = _wait_here(frame, all_of, claim, asked, waited=waited)
         # The missions of this process come first: others see one holder in all of it.
         if waited is not None and not asked.is_set() and frame.run.journal.is_durable:
             waited = _wait_outside(frame, all_of, claim, asked, waited=waited)
@@ -129,7 +129,9 @@ def _wait_for_former(frame: Frame, claim: Claim, asked: Event) -> bool | None:
     return True
 
 
-def _wait_here(frame: Frame, all_of: Resources, claim: Claim, *, waited: bool) -> bool | None:
+def _wait_here(
+    frame: Frame, all_of: Resources, claim: Claim, asked: Event, *, waited: bool
+) -> bool | None:
     """Wait for the states of this process; return whether it did, None if the claim refuses to.
 
     `waited`: it did before.
@@ -137,6 +139,8 @@ def _wait_here(frame: Frame, all_of: Resources, claim: Claim, *, waited: bool) -
     try:
         holder = all_of.claim(claim)
     except CircleError as error:
+        if asked.is_set():  # by who waits for what is around it: it ends, and so does the circle
+            return True
         raise InvalidStateError(f"{frame.here()}: resource: {error}") from error
     if holder is None:
         return waited
@@ -144,6 +148,7 @@ def _wait_here(frame: Frame, all_of: Resources, claim: Claim, *, waited: bool) -
         return None
     if claim.policy == "preempt":
         holder.stop(claim)
+        claim.has_asked = True
     claim.wake.wait()
     return True
 

@@ -241,6 +241,26 @@ def test_a_circle_through_the_machine_around_a_holder_is_found():
         mission(together(A=one, B=late))
 
 
+def test_what_the_holder_does_after_it_was_asked_to_stop_may_close_a_circle():
+    """The one that had asked it and the holder waited for each other for ever."""
+    other = StateMachine(ENDS, resource="arm")
+    other.add("REACH", Step(60.0), {"preempted": "BRAKE"})
+    other.add("BRAKE", Step(1.0, resource="base"))
+    taking = inside(_then(Step(2.0, resource=("arm", "preempt"))), resource="base")
+    with mission_kit() as mission, pytest.raises(smachpy.InvalidUserCodeError, match="circle"):
+        mission(together(A=taking, B=other))
+
+
+def test_a_wait_of_the_holder_that_is_asked_to_stop_is_no_circle():
+    other = StateMachine(ENDS, resource="arm")
+    other.add("WAIT", Wait(0.5), {"done": "MORE"})
+    other.add("MORE", Step(1.0, resource="base"))
+    taking = inside(_then(Step(2.0, resource=("arm", "preempt"))), resource="base")
+    with mission_kit() as mission:
+        run = mission(together(A=taking, B=other))
+    assert (found, run.duration) == ({"A": "done", "B": "preempted"}, 3.0)
+
+
 def test_one_that_preempts_stops_the_outermost_holder():
     late = StateMachine(["done", "preempted"])
     late.add("WAIT", Wait(1.0), {"done": "USE"})
