@@ -709,10 +709,14 @@ def recording_lines(
     events: list[dict[str, Any]],
     base: dict[str, Any] | None,
     observed: Iterable[dict[str, Any]] = (),
+    made_ns: int | None = None,
 ) -> Iterator[str]:
-    """Yield the lines of a file with these events and records of the robot's topics."""
+    """Yield the lines of a file with these events and records of the robot's topics.
+
+    `made_ns` is the real date if time was virtual.
+    """
     stamp_ns = events[0]["stamp_ns"] if events else 0
-    yield header_line(record, stamp_ns, base)
+    yield header_line(record, stamp_ns, base, made_ns=made_ns)
     by_time = heapq.merge(_numbered(events), observed, key=itemgetter("stamp_ns"))
     yield from map(event_line, by_time)
 

@@ -180,7 +180,7 @@ def reproduce(
             outcome = kit(machine, limit=world.ended - world.began + LONGER_S).outcome
         except (Deadlock, TimeLimitError, AssertionError, SmachError) as error:
             if not isinstance(error, SmachError) or isinstance(error, TimeLimitError):
-                ends.append(first_line(error))
+                ends.append(first_line(error).partition(" Try mission(")[0])
         finally:
             end()
             buffer.close()

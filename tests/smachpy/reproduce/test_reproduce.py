@@ -29,6 +29,7 @@ from smachpy.reproduce.compare import compare, steps_of
 from smachpy.reproduce.report import lines_of
 from smachpy.reproduce.run import ReproductionError, reproduce
 from smachpy.reproduce.world import world_of
+from smachpy.states import Wait
 from smachpy.testing import mission_kit
 from tests.smachpy.reproduce.random_missions import Plan, plans
 
@@ -805,6 +806,21 @@ def test_what_cannot_be_written_is_told_before_the_work(night, tmp_path, capsys,
     assert f"{option} {nowhere!r}: cannot write: no such folder" in err
 
 
+def test_a_run_that_does_not_end_any_more_says_where_it_was(tmp_path):
+    plan = Plan((("wait", -1, -1),), (), (), (), None)
+    recording = recorded(plan, tmp_path)
+
+    def waiting():
+        sm = StateMachine(["good", "bad", "preempted"], name="RANDOM", userdata={"found": 0})
+        sm.add("S0", Wait(1000.0), {"done": "good"})
+        return sm
+
+    found = reproduce(recording, make=waiting)
+    assert [note for note in found.notes if "still ran after" in note] == [
+        "/RANDOM: it still ran after 60.25 s, in /RANDOM/S0; expected an end."
+    ]
+
+
 def test_expect_needs_a_file_to_write(night, capsys):
     _, path = night
     assert (
@@ -933,6 +949,7 @@ def test_the_new_run_is_recorded_and_programs_learn_where_the_two_part(night, tm
     assert any("0.25" in text for text in told["changed"])
     new, old = read_recording(today), read_recording(path)
     assert new.record.label == "ROUND"
+    assert new.made_ns > old.made_ns  # by a real clock
     assert [event["kind"] for event in new.events[:5]] == [e["kind"] for e in old.events[:5]]
     assert new.events != old.events
     assert main(words) == 2  # a recording is never overwritten

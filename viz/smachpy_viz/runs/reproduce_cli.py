@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actionlib_core.clock import RealClock
 from actionlib_core.process.output import printable
 from smachpy.command import UsageError
 from smachpy.command.durable import whole_target
@@ -212,7 +213,8 @@ def _record(path: Path | None, found: Reproduction) -> None:
     assert found.record is not None
     try:
         with open_private(path, "x") as file:
-            file.writelines(recording_lines(found.record, found.events, None))
+            now = RealClock().time_ns()
+            file.writelines(recording_lines(found.record, found.events, None, made_ns=now))
     except OSError as error:
         raise UsageError(
             f"smachpy runs reproduce: --record {str(path)!r}: cannot write: "
