@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from smachpy.engine.options import Options
 
 PLAIN = (str, int, float, bool, type(None))
+MOST_ITEMS: Final = 10_000
+"""Items of a range, which is written as a list."""
 _PARAMETER: Final = re.compile(r"\${(\w+)}")
 # Mappings whose order means something: which state is first, which rule counts, what is computed.
 _IN_ORDER: Final = ("states", "outcome_map", "with")
@@ -511,7 +513,8 @@ class _Writer:
                 self._refuse(path, f"got two rules for {outcome!r}; expected one.")
             of = {k: list(w) if len(w) > 1 else w[0] for k, w in rule.conditions}
             is_all = rule.need == len(rule.conditions)
-            rules[outcome] = of if is_all else {"need": rule.need, "of": of}
+            has_words = {*of} in ({"any"}, {"need", "of"})  # which mean other rules
+            rules[outcome] = of if is_all and not has_words else {"need": rule.need, "of": of}
         if rules:
             found["outcome_map"] = rules
         return found
@@ -521,6 +524,8 @@ class _Writer:
         found: dict[str, Any] = {"item_key": data.items_label, "exhausted": data.exhausted_outcome}
         if isinstance(data.items, ItemsOf):
             found["items_from"] = data.items.key
+        elif isinstance(data.items, range) and data.items[MOST_ITEMS:]:
+            self._refuse(path, f"items: got {data.items}; expected at most {MOST_ITEMS} items.")
         elif isinstance(data.items, (list, tuple, range)):
             found["items"] = [self._plain(one, f"{path}: items") for one in data.items]
         else:

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 from actionlib_core.clock import RealClock
-from actionlib_core.inputs.expression import WHOLE, Expression
+from actionlib_core.inputs.expression import WHOLE, Expression, ExpressionError
 from smachpy.base import log
 from smachpy.base.problems import unknown_name
 from smachpy.modes.table import ModesError
@@ -35,11 +35,21 @@ class _Topic:
     def open(self, trigger: Callable[[str], bool]) -> Callable[[], object]:
         from actionlib_core.pubsub.topic import Subscriber
 
-        before = False
+        before = told = False
+
+        def is_met(message: Any) -> bool:
+            nonlocal told
+            try:
+                return self.when is None or bool(self.when(message))
+            except ExpressionError as error:
+                if not told:
+                    log.logwarn(f"Modes: the condition of topic {self.topic!r}: {error}")
+                told = True
+                return False
 
         def take(message: Any) -> None:
             nonlocal before
-            holds = self.when is None or bool(self.when(message))
+            holds = is_met(message)
             # A condition triggers once while it holds: a joystick sends 50 times a second. Where
             # the event means nothing yet, a later message triggers.
             before = holds and (before or trigger(self.event)) and self.when is not None
@@ -92,7 +102,8 @@ def on_topic(topic: str, msg_type: Any, event: str, when: str = "") -> Source:
         msg_type: Its class.
         event: The event.
         when: An expression over the message, such as "percentage < 0.2": triggers once while it
-            holds, in a mode where the event means something. "" triggers with every message.
+            holds, in a mode where the event means something. "" triggers with every message. If it
+            cannot be evaluated, it does not hold; the first time is logged.
 
     Raises:
         ExpressionError: `when` cannot be parsed.

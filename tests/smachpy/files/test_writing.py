@@ -312,6 +312,19 @@ def test_options_of_a_class_are_written_where_the_program_has_set_others(tmp_pat
         assert smachpy.get_options(again["A"]) == smachpy.get_options(sm["A"])
 
 
+@pytest.mark.parametrize("labels", [["any"], ["need", "of"]])
+def test_a_rule_about_states_with_the_words_of_rules_is_written(tmp_path, labels):
+    """The file meant another rule, and could not be loaded."""
+    rule = dict.fromkeys(labels, "a")
+    concurrence = Concurrence(["a", "b"], "b", outcome_map={"a": rule})
+    for label in labels:
+        concurrence.add(label, Up())
+    path = tmp_path / "m.yaml"
+    write(with_state(concurrence), path)
+    ((_, rule),) = load(path, allow=["tests"])["A"]._smachpy.rules
+    assert rule == concurrence._smachpy.rules[0][1]
+
+
 def test_options_that_are_set_for_a_function_itself_are_written():
     sm, before = with_state(own_states.down), smachpy.get_options(own_states.down)
     assert sm["A"] is own_states.down
@@ -338,6 +351,12 @@ def with_another_key() -> State:
     return state
 
 
+def for_ever() -> Iterator:
+    iterator = Iterator(["a", "b"], it=range(10**20), exhausted_outcome="a", **KEYS)
+    iterator.set_contained_state("S", Up())
+    return iterator
+
+
 def without_default() -> Concurrence:
     concurrence = Concurrence(["a", "b"], "", outcome_map={"a": {"S": "a"}})
     concurrence.add("S", Up())
@@ -350,6 +369,10 @@ def without_default() -> Concurrence:
         (lambda: with_state(limited_no_more()), "/M/A: timeout: got none; expected that of tests"),
         (lambda: with_state(with_another_key()), "/M/A: got a Up made by code"),
         (lambda: with_state(without_default()), "/M/A: default_outcome: got none; expected one"),
+        (
+            lambda: with_state(for_ever()),
+            "/M/A: items: got range(0, 100000000000000000000); expected at",
+        ),
         (lambda: with_state(Up(), userdata_type=Fields), "/M: userdata_type: got types"),
         (
             lambda: with_state(Up(), userdata={"t": ["${x}"]}),

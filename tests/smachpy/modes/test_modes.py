@@ -401,6 +401,20 @@ def test_a_condition_triggers_once_where_its_event_means_something(begins):
     assert leaves(run) == ["idle", "manual", "idle", "charging", "idle"]
 
 
+def test_a_condition_of_a_topic_that_cannot_be_evaluated_is_told_once(caplog):
+    """Each message wrote an error with its whole stack."""
+    listen = [on_topic("battery", BatteryState, "low", "percentage < location")]
+    with mission_kit() as kit:
+        battery = kit.topic("battery", BatteryState)
+        for at in range(1, 9):
+            battery.publish_at(at, BatteryState(percentage=0.1, location="hall"))
+        kit.preempt(at=9.0)
+        run = kit(robot(listen=listen))
+    assert leaves(run) == ["idle"]
+    (text,) = [text for text in caplog.messages if "the condition of topic 'battery'" in text]
+    assert "not supported between instances of 'float' and 'str'" in text
+
+
 def test_a_service_triggers_and_says_whether_it_meant_something():
     modes = robot(listen=[on_service("start", "start"), on_service("joy", "joy")])
     answers = []
