@@ -181,7 +181,7 @@ def test_what_a_dead_computer_ran_goes_on_at_another(errand, tmp_path, store_pla
 @pytest.mark.postgres
 def test_a_computer_that_comes_back_is_refused(errand, tmp_path, postgres_url):
     submit(errand, postgres_url, "a")
-    suspended = runner(postgres_url, "--lease", "2")
+    suspended = runner(postgres_url, "--lease", "6")
     child = pid_that(errand, "wait", "a")
     for pid in (suspended.pid, child):
         os.kill(pid, signal.SIGSTOP)
