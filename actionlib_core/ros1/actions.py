@@ -354,7 +354,7 @@ class ServerInRos:
 class _ServerTopic:
     """A server's connection for one of the three topics that it publishes."""
 
-    def __init__(self, server: ServerInRos, word: str, header: Header) -> None:
+    def __init__(self, server: ServerInRos, word: str, header: Header, _was_there: bool) -> None:
         typed = type_of(header, word)
         # A server in ROS 1 sends a status list right before each result. Reading long lists is
         # slow, so the list waits here and the result is passed on first.
@@ -821,7 +821,7 @@ class _Client:
 
     coalesce_s = 0.0
 
-    def __init__(self, server: ServerHere, word: str, header: Header) -> None:
+    def __init__(self, server: ServerHere, word: str, header: Header, _was_there: bool) -> None:
         self._typed = type_of(header, word)
         self._server = server
         self._word = word

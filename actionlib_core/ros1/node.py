@@ -81,12 +81,13 @@ class Subscription:
     Args:
         node: The node.
         topic: Its name, with a slash in front.
-        accept: Gets the connection header of each publisher and returns the receiver of its
-            messages; may refuse with a `Ros1Error`. It runs in the connection's thread.
+        accept: Gets the connection header of each publisher, and whether that was there before
+            this subscription or connection, and returns the receiver of its messages; may refuse
+            with a `Ros1Error`. It runs in the connection's thread.
     """
 
     def __init__(
-        self, node: Ros1Node, topic: str, accept: Callable[[Header], TopicReceiver]
+        self, node: Ros1Node, topic: str, accept: Callable[[Header, bool], TopicReceiver]
     ) -> None:
         self.topic = topic
         self.accept = accept
@@ -95,6 +96,7 @@ class Subscription:
         self._node = node
         self._lock = threading.Lock()
         self._links: dict[str, _Link] = {}
+        self._has_begun = False  # the first list of publishers was applied
         self._closed = False
 
     def apply(self, change: Change) -> None:
@@ -107,6 +109,7 @@ class Subscription:
                 self._links[uri].wake.set()
             if self._closed:
                 return
+            was_there, self._has_begun = not self._has_begun, True
             # With those for which there was no room or thread when they came.
             for uri in change.connect | (self.publishers.there - self._links.keys()):
                 if uri in self._links:
@@ -114,7 +117,7 @@ class Subscription:
                 elif not self._node.has_room():
                     break
                 else:
-                    link = _Link(self._node, self, uri)
+                    link = _Link(self._node, self, uri, was_there=was_there)
                     try:
                         link.start()
                     except RuntimeError as error:  # no thread can be started, the system's limit
@@ -165,8 +168,11 @@ class Subscription:
 class _Link:
     """A subscription's link to one publisher: a thread that connects, reads, and tries again."""
 
-    def __init__(self, node: Ros1Node, subscription: Subscription, uri: str) -> None:
+    def __init__(
+        self, node: Ros1Node, subscription: Subscription, uri: str, *, was_there: bool
+    ) -> None:
         self.uri = uri
+        self._was_there = was_there
         self.wake = node.clock.event(f"publisher {uri} of {subscription.topic}")
         self._node = node
         self._subscription = subscription
@@ -221,7 +227,8 @@ class _Link:
             connection.send_header({"callerid": node.name, **fields, "tcp_nodelay": "1"})
             header = connection.read_header()
             self._wait_until_accepted(where, header)
-            receiver = subscription.accept(header)
+            receiver = subscription.accept(header, self._was_there)
+            self._was_there = True  # when it is connected again
             node.forget_report(about)
             read = connection.read_frame
             if receiver.coalesce_s:
@@ -458,7 +465,9 @@ class Ros1Node:
 
     # -- its topics and services ---------------------------------------------------------------
 
-    def subscribe(self, topic: str, accept: Callable[[Header], TopicReceiver]) -> Subscription:
+    def subscribe(
+        self, topic: str, accept: Callable[[Header, bool], TopicReceiver]
+    ) -> Subscription:
         """Subscribe to a topic of any type; see `Subscription`."""
         made = Subscription(self, topic, accept)
         with self._lock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from functools import partial
 from typing import TYPE_CHECKING
 
 from actionlib_core.ros1.sides import Typed, type_of
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from actionlib_core.transport.tokens import Endpoint
 
 LATCHED = "1"
+LATCHED_S = 1.0  # a publisher sends what it has latched within this time
 MAX_SENDERS = 64  # their last messages are kept, as it is not known at once who of them latches
 
 
@@ -71,10 +73,10 @@ class TopicBridge:
             if each is not None:
                 each.close()
 
-    def _accept(self, header: Header) -> _FromRos:
+    def _accept(self, header: Header, was_there: bool) -> _FromRos:
         typed = type_of(header, self._topic)
         self._definitions.learn(typed, header.get("message_definition", ""))
-        return _FromRos(self._sides, self._key, typed, header)
+        return _FromRos(self._sides, self._key, typed, header, was_there=was_there)
 
 
 class _FromRos:
@@ -82,20 +84,32 @@ class _FromRos:
 
     coalesce_s = 0.0
 
-    def __init__(self, sides: Sides, key: str, typed: Typed, header: Header) -> None:
+    def __init__(
+        self, sides: Sides, key: str, typed: Typed, header: Header, *, was_there: bool
+    ) -> None:
         latch = header.get("latching") == LATCHED
         quality = Quality(express=True, block=True, latch=latch)
-        self._port = sides.node.transport.publisher(key, typed.encoding, quality)
+        self._make = partial(sides.node.transport.publisher, key, typed.encoding, quality)
+        # What it has latched before comes at once. Here it is kept, and is no news for those who
+        # want no latched message, such as somebody who waits for an answer to a new question.
+        self._port = None if latch and was_there else self._make()
+        self._now, self._old_until = sides.ros.clock.now, sides.ros.clock.now() + LATCHED_S
         self._token = sides.show(Kind.PUBLISHER, key, typed, header.get("callerid", ""))
 
     def take(self, payload: bytes) -> None:
         """Pass a message on; blocks while a link is full: ROS 1 then buffers or drops messages."""
+        if self._port is None:
+            is_old = self._now() < self._old_until
+            self._port = self._make(kept=payload if is_old else None)
+            if is_old:
+                return
         self._port.put(payload)
 
     def gone(self) -> None:
         """Withdraw the publisher."""
         self._token.close()
-        self._port.close()
+        if self._port is not None:
+            self._port.close()
 
 
 class _ToRos:

@@ -184,8 +184,14 @@ class Transport(Protocol):
         """Whether all programs of the network run on this computer and share its clocks."""
         ...
 
-    def publisher(self, key: str, encoding: str = "", quality: Quality = ...) -> PublisherPort:
-        """Declare a publisher of `key`."""
+    def publisher(
+        self, key: str, encoding: str = "", quality: Quality = ..., *, kept: bytes | None = None
+    ) -> PublisherPort:
+        """Declare a publisher of `key`.
+
+        `kept` is the message that one that latches has already: it is not sent, but all who
+        subscribe with history get it.
+        """
         ...
 
     def subscribe(

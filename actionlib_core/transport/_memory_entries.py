@@ -148,9 +148,13 @@ class Subscriber(Listener[Sample]):
 
     def link_back_locked(self) -> None:
         for publisher in self.network.latches.get(self._key, ()):
-            wanted = self._cached if publisher.has_cache else int(self._history)
-            for sample in list(publisher.kept)[-wanted:] if wanted else ():
-                self.inbox.post(self, sample)
+            self.take_kept_locked(publisher)
+
+    def take_kept_locked(self, publisher: Publisher) -> None:
+        """Take the last messages of a publisher."""
+        wanted = self._cached if publisher.has_cache else int(self._history)
+        for sample in list(publisher.kept)[-wanted:] if wanted else ():
+            self.inbox.post(self, sample)
 
     def deliver(self, item: Sample) -> None:
         # A message that was on its way when the link was cut is lost too.
@@ -274,7 +278,14 @@ class Publisher(Entry):
 
     __slots__ = ("_encoding", "_key", "_latch", "_source", "has_cache", "kept")
 
-    def __init__(self, session: MemoryTransport, key: str, encoding: str, quality: Quality) -> None:
+    def __init__(
+        self,
+        session: MemoryTransport,
+        key: str,
+        encoding: str,
+        quality: Quality,
+        kept: bytes | None = None,
+    ) -> None:
         super().__init__(session)
         self._key = key
         self._encoding = encoding
@@ -284,6 +295,10 @@ class Publisher(Entry):
         self.kept: deque[Sample] = deque(maxlen=quality.cache or 1)
         if self._latch:
             _add(self.network.latches, key, self)
+        if kept is not None:
+            self.kept.append(Sample(key, kept, encoding, self._source))
+            for subscriber in self.network.subscribers.get(key, ()):
+                subscriber.take_kept_locked(self)
 
     def put(self, payload: bytes, attachment: bytes | None = None) -> None:
         link = self.session.link

@@ -129,10 +129,15 @@ class MemoryTransport:
         return True
 
     def publisher(
-        self, key: str, encoding: str = "", quality: Quality = DEFAULT_QUALITY
+        self,
+        key: str,
+        encoding: str = "",
+        quality: Quality = DEFAULT_QUALITY,
+        *,
+        kept: bytes | None = None,
     ) -> Publisher:
         check_key(key)
-        return self._declare(lambda: Publisher(self, key, encoding, quality), key)
+        return self._declare(lambda: Publisher(self, key, encoding, quality, kept), key)
 
     def subscribe(
         self,

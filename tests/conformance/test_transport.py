@@ -278,6 +278,21 @@ def test_without_history_the_latched_message_does_not_come(network):
     assert payloads(without.wait_for(1)) == [b"2"]
 
 
+def test_what_a_publisher_has_kept_already_comes_only_to_those_who_ask_for_it(network):
+    a, b = network.session(), network.session()
+    without, early, late = (network.inbox() for _ in range(3))
+    b.subscribe(GOAL, without, history=False)
+    b.subscribe(GOAL, early)
+    network.meet(a, b)
+    publisher = a.publisher(GOAL, "enc", LATCH, kept=b"1")
+    assert early.wait_for(1) == [Sample(GOAL, b"1", "enc", a.session_id)]
+    b.subscribe(GOAL, late)
+    assert payloads(late.wait_for(1)) == [b"1"]
+    publisher.put(b"2")
+    for inbox, expected in ((early, [b"1", b"2"]), (late, [b"1", b"2"]), (without, [b"2"])):
+        assert payloads(inbox.wait_for(len(expected))) == expected
+
+
 # -- caches, in the way of zenoh's advanced publishers ---------------------------------------------
 
 

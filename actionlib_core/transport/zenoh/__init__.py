@@ -167,10 +167,17 @@ class ZenohTransport:
         """Whether access rules limit which names this session may watch."""
         return self._permissions is not None
 
-    def publisher(self, key: str, encoding: str = "", quality: Quality = DEFAULT) -> Publisher:
-        kind = Publisher
+    def publisher(
+        self,
+        key: str,
+        encoding: str = "",
+        quality: Quality = DEFAULT,
+        *,
+        kept: bytes | None = None,
+    ) -> Publisher:
+        kind: Callable[..., Publisher] = Publisher
         if quality.latch or quality.cache:
-            kind = CachingPublisher if quality.cache else LatchedPublisher
+            kind = CachingPublisher if quality.cache else partial(LatchedPublisher, kept=kept)
         return self._declare(lambda: kind(self, check_key(key), encoding, quality), key)
 
     def subscribe(

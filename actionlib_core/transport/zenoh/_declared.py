@@ -239,7 +239,13 @@ class LatchedPublisher(Publisher):
     """
 
     def __init__(
-        self, transport: ZenohTransport, key: str, encoding: str, quality: Quality
+        self,
+        transport: ZenohTransport,
+        key: str,
+        encoding: str,
+        quality: Quality,
+        *,
+        kept: bytes | None = None,
     ) -> None:
         super().__init__(transport, key, encoding, quality)
         self._number = next(transport.numbers)
@@ -247,8 +253,8 @@ class LatchedPublisher(Publisher):
         # Held while it sends: the last message that others hear is the one that is kept. Reentrant,
         # as a signal's handler may publish while this thread does.
         self._lock = threading.RLock()
-        self._count = 0
-        self._last: tuple[bytes, bytes] = b"", _pack_numbers(self._number, 0)
+        self._count = int(kept is not None)
+        self._last: tuple[bytes, bytes] = kept or b"", _pack_numbers(self._number, self._count)
         self._own_key = f"{key}/@latch/{transport.session_id}/{self._number}"
         session = transport.session
         self._keep(session.declare_queryable(self._own_key, direct(self._on_query)))

@@ -10,6 +10,8 @@ from actionlib_core.exceptions import InterfaceError, ServiceUnavailableError
 from actionlib_core.interfaces import get_message
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
+from actionlib_core.pubsub.topic import FreshSubscriber
+from actionlib_core.ros1 import topics as bridged_topics
 from actionlib_core.transport.tokens import Kind
 from actionlib_core.wire.definitions import ask_definition, define, split_definition
 from actionlib_core.wire.presence import list_endpoints
@@ -63,6 +65,28 @@ def test_latched_messages_arrive_late_both_ways(ros, bridge, node):
         plan.publish("there")
         topics.ask("subscribe /plan")
         assert topics.ask("heard /plan 1") == "there"
+
+
+def test_what_was_latched_in_ros_is_no_news(ros, bridge, node, monkeypatch):
+    """An answer of yesterday on a latched topic answered the next question of `AskOperator`."""
+    monkeypatch.setattr(bridged_topics, "LATCHED_S", WAIT_S)  # also on a busy computer
+    old, new = (ros.start("topics", name) for name in ("old", "new"))
+    old.ask("advertise /answer latch")
+    old.ask("publish /answer yesterday")
+    bridge(topics=["/answer"])
+    texts, came = [], node.clock.event()
+
+    def hear(message):
+        texts.append(message.data)
+        came.set()
+
+    with FreshSubscriber("answer", String, hear) as fresh:
+        assert fresh.wait_for_connections(1, WAIT_S)
+        assert Heard("answer", node, 1).wait() == ["yesterday"]  # kept for everybody else
+        new.ask("advertise /answer latch")
+        new.ask("publish /answer now")  # `rostopic pub` latches
+        assert came.wait(WAIT_S)
+        assert texts == ["now"]
 
 
 def test_each_of_several_latched_publishers_is_heard_late(ros, bridge, node):
