@@ -309,6 +309,31 @@ def test_what_is_drawn_stays_when_nothing_can_be_laid_out(served, look):
     page.wait_for_selector(".notice.error:has-text('could not be laid out')")
 
 
+HELD_ELK = """{
+  const Real = Worker, held = [];
+  window.release = () => { for (const go of held.splice(0)) go(); window.release = null; };
+  window.Worker = class extends Real {
+    postMessage(...told) { window.release ? held.push(() => super.postMessage(...told)) : super.postMessage(...told); }
+  };
+}"""
+
+
+def test_the_states_are_there_before_the_arrows_are_laid_out(served, look):
+    """The layout's worker takes seconds to start on a busy computer: the diagram was empty."""
+    served.add("one", labels="AB", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
+    page = look("about:blank", drawn=False)
+    page.add_init_script(HELD_ELK)
+    page.goto(served.start())
+    page.wait_for_selector("g.active[data-path='/JOB/A']")
+    page.click("g[data-path='/JOB/B']")
+    assert page.locator("path.edge").count() == 0
+    assert page.query_selector("html[data-drawn]") is None
+    page.evaluate("() => release()")
+    page.wait_for_selector("html[data-drawn]")
+    assert page.locator("path.edge").count() > 0
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/JOB/B"
+
+
 def test_while_the_page_opens_the_layout_follows_the_shape_that_is_left(served, look):
     served.add("one", labels="ABCD", events=[("Started", "/JOB"), ("Entered", "/JOB/A")])
     page = look(served.start())

@@ -332,13 +332,15 @@ def test_a_structure_that_could_not_be_fetched_is_asked_for_again(served, look):
     page.wait_for_selector('g[data-path="/ONE/A"]')
 
 
-def test_a_page_without_its_layout_worker_says_so(served, look):
-    served.add("one")
+def test_a_page_without_its_layout_worker_says_so_and_has_the_states_without_arrows(served, look):
+    served.add("one", labels="AB")
     address = served.start()
     page = look("about:blank", drawn=False)
     page.route("**/elk-worker.js", lambda route: route.abort())
     page.goto(address)
     page.wait_for_selector("text=could not be laid out")
+    page.click("g[data-path='/JOB/B']")
+    assert page.evaluate("() => smachpy.store.view.selected.value") == "/JOB/B"
 
 
 def test_what_the_server_answers_is_told_as_it_is(served, look):

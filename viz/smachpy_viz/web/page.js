@@ -5829,6 +5829,7 @@ function keyOf2(node, open, keys2, inner) {
 // src/drawing/layout_controller.ts
 var OPENING_MS = 15e3;
 var READABLE3 = 0.75;
+var TILES_MS = 100;
 var SLOW_MS = 300;
 var LARGEST = 1.5;
 var LayoutController = class {
@@ -5845,6 +5846,9 @@ var LayoutController = class {
   fitted = null;
   // the view that showed everything
   #again = false;
+  #isNew = true;
+  // whether ELK has laid out nothing of the machine yet
+  #tiles;
   /** What to show after it. */
   #after = { frame: false, focus: null };
   #toggled = null;
@@ -5863,6 +5867,7 @@ var LayoutController = class {
   /** Another machine has come. */
   restart() {
     this.openedAt = performance.now();
+    this.#isNew = true;
     this.#follow.restart();
     this.layout?.clear();
   }
@@ -5887,9 +5892,11 @@ var LayoutController = class {
       store.data.failure.value = null;
     } catch (error) {
       const text2 = `This machine could not be laid out: ${messageOf(error)}`;
-      if (this.diagram.size)
-        store.view.notify(text2, "error");
-      else store.data.failure.value = text2;
+      if (this.#isNew) {
+        clearTimeout(this.#tiles);
+        this.#drawTiles();
+        store.data.failure.value = `${text2}. You see its states without their arrows.`;
+      } else store.view.notify(text2, "error");
       console.error(error);
     } finally {
       this.running = null;
@@ -5904,6 +5911,7 @@ var LayoutController = class {
       if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
     let open = new Set(store.view.opened.value).add(model.root.path);
+    if (this.#isNew) this.#tiles = setTimeout(() => this.#drawTiles(), TILES_MS);
     let result = await this.layout.run(model.root, open, progress, store.view.outline.value);
     if (this.#after.frame === "follow")
       while (result && !isLegible(boxesOf(result), this.view)) {
@@ -5917,6 +5925,8 @@ var LayoutController = class {
     store.view.overview.value = Boolean(result?.isOverview);
     this.ms = performance.now() - begun;
     if (!result || model !== store.data.model.value) return;
+    clearTimeout(this.#tiles);
+    this.#isNew = false;
     const anchor = this.#anchor();
     this.diagram.draw(result, model, store.data.problems.value);
     this.minimap.draw(this.diagram.picture);
@@ -5925,6 +5935,16 @@ var LayoutController = class {
     const size = this.diagram.size;
     const tooSmall = size !== null && this.view.scaleFor(size) < READABLE3;
     if (this.#after.frame === true && tooSmall && store.view.openOneLevelLess()) this.#again = true;
+  }
+  /** Show the states as tiles without arrows, for which no ELK is needed: it takes seconds to begin. */
+  #drawTiles() {
+    const model = store.data.model.value;
+    if (!model || !this.#isNew) return;
+    const open = new Set(store.view.opened.value).add(model.root.path);
+    this.diagram.draw(overview(model.root, open, this.view.aspect), model, store.data.problems.value);
+    this.minimap.draw(this.diagram.picture);
+    this.painter.paintAll();
+    this.fit({ animate: false });
   }
   /** Bring into view what was asked for. */
   #show() {
@@ -11677,6 +11697,8 @@ var KEYS2 = [
 ];
 function Overlay({ page: page2 }) {
   const stale = store.data.facts.value?.stale;
+  if (store.data.failure.value && store.data.model.value)
+    return /* @__PURE__ */ a4("div", { class: "banner waiting", children: store.data.failure.value });
   if (store.data.failure.value)
     return /* @__PURE__ */ a4("div", { class: "empty", children: /* @__PURE__ */ a4("p", { class: "error", children: store.data.failure.value }) });
   if (!store.data.model.value) return /* @__PURE__ */ a4(Empty, {});

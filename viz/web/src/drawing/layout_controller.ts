@@ -7,12 +7,14 @@ import type { Diagram } from "#drawing/diagram.ts";
 import { boxToFrame, Follow, isLegible, oneLevelLess } from "#drawing/follow.ts";
 import { Layout } from "#drawing/layout.ts";
 import type { Minimap } from "#drawing/minimap.ts";
+import { overview } from "#drawing/overview.ts";
 import type { Painter } from "#drawing/painter.ts";
 import { boxesOf } from "#drawing/placed.ts";
 import type { View, Viewport } from "#drawing/viewport.ts";
 
 const OPENING_MS = 15_000; // time after the arrival of a machine in which panels may still appear
 const READABLE = 0.75; // scale below which fewer levels are opened at first: names have 8 px there
+const TILES_MS = 100; // a machine whose first layout takes longer is shown as tiles meanwhile
 const SLOW_MS = 300; // a layout that takes longer shows its progress
 const LARGEST = 1.5; // scale to which a small machine is enlarged
 
@@ -27,6 +29,8 @@ export class LayoutController {
   openedAt = 0; // time of the machine's arrival [ms]
   fitted: View | null = null; // the view that showed everything
   #again = false;
+  #isNew = true; // whether ELK has laid out nothing of the machine yet
+  #tiles: ReturnType<typeof setTimeout> | undefined;
   /** What to show after it. */
   #after: { frame: boolean | "follow"; focus: string | null } = { frame: false, focus: null };
   #toggled: string | null = null; // path of the container that is being opened or closed
@@ -47,6 +51,7 @@ export class LayoutController {
   /** Another machine has come. */
   restart() {
     this.openedAt = performance.now();
+    this.#isNew = true;
     this.#follow.restart();
     this.layout?.clear();
   }
@@ -73,9 +78,11 @@ export class LayoutController {
       store.data.failure.value = null;
     } catch (error) {
       const text = `This machine could not be laid out: ${messageOf(error)}`;
-      if (this.diagram.size)
-        store.view.notify(text, "error"); // the old drawing stays
-      else store.data.failure.value = text;
+      if (this.#isNew) {
+        clearTimeout(this.#tiles);
+        this.#drawTiles();
+        store.data.failure.value = `${text}. You see its states without their arrows.`;
+      } else store.view.notify(text, "error"); // the old drawing stays
       console.error(error);
     } finally {
       this.running = null;
@@ -91,6 +98,7 @@ export class LayoutController {
       if (performance.now() - begun > SLOW_MS) store.view.laidOut.value = { done, all };
     };
     let open = new Set(store.view.opened.value).add(model.root.path);
+    if (this.#isNew) this.#tiles = setTimeout(() => this.#drawTiles(), TILES_MS);
     let result = await this.layout.run(model.root, open, progress, store.view.outline.value);
     if (this.#after.frame === "follow")
       while (result && !isLegible(boxesOf(result), this.view)) {
@@ -104,6 +112,8 @@ export class LayoutController {
     store.view.overview.value = Boolean(result?.isOverview);
     this.ms = performance.now() - begun;
     if (!result || model !== store.data.model.value) return;
+    clearTimeout(this.#tiles);
+    this.#isNew = false;
     const anchor = this.#anchor();
     this.diagram.draw(result, model, store.data.problems.value);
     this.minimap.draw(this.diagram.picture);
@@ -112,6 +122,17 @@ export class LayoutController {
     const size = this.diagram.size;
     const tooSmall = size !== null && this.view.scaleFor(size) < READABLE;
     if (this.#after.frame === true && tooSmall && store.view.openOneLevelLess()) this.#again = true;
+  }
+
+  /** Show the states as tiles without arrows, for which no ELK is needed: it takes seconds to begin. */
+  #drawTiles() {
+    const model = store.data.model.value;
+    if (!model || !this.#isNew) return;
+    const open = new Set(store.view.opened.value).add(model.root.path);
+    this.diagram.draw(overview(model.root, open, this.view.aspect), model, store.data.problems.value);
+    this.minimap.draw(this.diagram.picture);
+    this.painter.paintAll();
+    this.fit({ animate: false });
   }
 
   /** Bring into view what was asked for. */

@@ -50,6 +50,8 @@ const KEYS: [string, string][] = [
 
 export function Overlay({ page }: { page: Page }) {
   const stale = store.data.facts.value?.stale;
+  if (store.data.failure.value && store.data.model.value)
+    return <div class="banner waiting">{store.data.failure.value}</div>;
   if (store.data.failure.value)
     return (
       <div class="empty">
