@@ -127,16 +127,19 @@ class Step:
 
     def words(self, after: str = "") -> str:
         """Return the step in words for people, `after` which time."""
-        facts = {
-            key: literal(value) if not isinstance(value, str) else value
-            for key, value in self.facts
-        }
+        facts = defaultdict(  # `_apart` leaves out what is the same
+            lambda: "the same",
+            {
+                key: literal(value) if not isinstance(value, str) else value
+                for key, value in self.facts
+            },
+        )
         where = place(self.path)
         said = _SAID.get(self.kind, self.kind)
         try:
-            return f"{where}  {said.format(**facts)}{after}"
-        except (KeyError, ValueError):
-            return f"{where}  {self.kind} {facts}"
+            return f"{where}  {said.format_map(facts)}{after}"
+        except ValueError:
+            return f"{where}  {self.kind} {dict(facts)}"
 
 
 _SAID: Final = {

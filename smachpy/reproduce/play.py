@@ -15,7 +15,7 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher
 from smachpy.engine.control import ControlError
 from smachpy.engine.preempt import asking
-from smachpy.events import Entered, Left, PreemptRequested, QuestionAsked, Started
+from smachpy.events import Entered, GoalSent, Left, PreemptRequested, QuestionAsked, Started
 from smachpy.events.inputs import message_value
 from smachpy.events.introspection import describe
 from smachpy.reproduce.compare import Odd, Said, place
@@ -64,7 +64,7 @@ class Aligned:
         self._clock = kit.clock
         self._times: defaultdict[tuple[str, str], list[float]] = defaultdict(list)
         for event in events:
-            if event["kind"] in {"Started", "Entered", "Left"}:
+            if event["kind"] in {"Started", "Entered", "GoalSent", "Left"}:
                 self._times[event["kind"], event["path"]].append(event["t"])
         self._seen: Counter[tuple[str, str]] = Counter()
         self._left = sorted(  # what has not happened yet, the next one last
@@ -72,11 +72,12 @@ class Aligned:
             reverse=True,
         )
         self._offset: float | None = None
+        self._newest = 0.0  # the latest recorded event that has come
         self.moved = self._clock.event("the run to come to the next recorded event")
 
     def on_event(self, event: Event) -> None:
         """Note an event of the run."""
-        if not isinstance(event, Started | Entered | Left):
+        if not isinstance(event, Started | Entered | GoalSent | Left):
             return
         key = (type(event).__name__, event.path)
         number, self._seen[key] = self._seen[key], self._seen[key] + 1
@@ -84,13 +85,15 @@ class Aligned:
         if number >= len(times):
             return
         offset = event.t - times[number]
+        is_newest, self._newest = times[number] >= self._newest, max(self._newest, times[number])
         while self._left and self._left[-1][2] < self._seen[self._left[-1][1]]:
             self._left.pop()
         # Code that computed then takes no time now. But a run that has taken another way, and left
         # something out or does something else, keeps its time.
         is_on_the_way = not self._left or self._left[-1][0] > times[number] - STEP_S
         later = 0.0 if self._offset is None else offset - self._offset
-        if abs(later) < STEP_S or (later < 0.0 and is_on_the_way):
+        # An event that came before others is of another branch.
+        if is_newest and (abs(later) < STEP_S or (later < 0.0 and is_on_the_way)):
             is_earlier = self._offset is None or offset < self._offset - 1e-6
             self._offset = offset
             if is_earlier:

@@ -17,6 +17,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 import smachpy
+from actionlib_core.clock import current_clock
 from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.sensor_msgs.msg import BatteryState
 from actionlib_core.interfaces.std_msgs.msg import Bool
@@ -1069,6 +1070,17 @@ def test_what_is_shown_of_the_progress_is_not_compared():
     assert compare(numbered([text, text], 0.0), numbered([text], 0.0)).difference is None
 
 
+def test_a_result_that_is_the_same_is_not_shown_where_the_status_differs():
+    done = {"kind": "GoalDone", "path": "/M/GO", "action": "move_base", "result": "x" * 80}
+    record = describe(smachpy.StateMachine(["done"], name="M"))
+    one, other = (
+        steps_of([{**done, "status": status}], record, ()) for status in ("ABORTED", "PREEMPTED")
+    )
+    found = compare(one, other).difference
+    assert found.recorded == "GO  move_base is ABORTED, result the same, cancelled: False"
+    assert found.now == "GO  move_base is PREEMPTED, result the same, cancelled: False"
+
+
 class Computes(smachpy.State):
     """Takes ten seconds that it neither sleeps nor waits."""
 
@@ -1106,6 +1118,38 @@ def test_code_that_computed_for_long_takes_no_time_and_what_follows_comes_earlie
     found = reproduce(read_recording(path), make=computing)
     assert found.is_same, lines_of(found)
     assert found.events[-1]["t"] - found.events[0]["t"] < 4.0
+
+
+def thinking():
+    def think(_userdata, _goal):
+        if ENVIRONMENT.environ.get("SLOW_COMPUTER"):
+            current_clock().sleep(0.5)
+
+    both = smachpy.Concurrence(
+        ["there", "low"],
+        default_outcome="there",
+        outcome_map={"low": {"WATCH": "invalid"}},
+        child_termination_cb=lambda ended: ended.get("DRIVE") is not None,
+        name="THINKING",
+    )
+    with both:
+        both.add("DRIVE", smachpy.SimpleActionState("move_base", MoveBaseAction, goal_cb=think))
+        both.add("WATCH", smachpy.MonitorState("battery", BatteryState, lambda *_: False))
+    return both
+
+
+def test_a_message_comes_as_long_after_a_goal_as_it_did(tmp_path, monkeypatch):
+    """The goal's answers do, too: they came before it if the goal was sent late."""
+    monkeypatch.setenv("SLOW_COMPUTER", "1")
+    with mission_kit() as kit:
+        kit.action_server("move_base", MoveBaseAction).reply(duration=2.0)
+        kit.topic("battery", BatteryState).publish_at(2.4, percentage=0.1)
+        machine = thinking()
+        with Recorder(tmp_path / "run.jsonl", machine):
+            assert kit(machine).outcome == "low"
+    monkeypatch.delenv("SLOW_COMPUTER")
+    found = reproduce(read_recording(tmp_path / "run.jsonl"), make=thinking)
+    assert found.is_same, lines_of(found)
 
 
 def test_a_world_of_too_many_lines_stays_in_the_recording(tmp_path, monkeypatch, capsys):
