@@ -844,6 +844,8 @@ class GoalManager:
         with self.lock:
             if now > self._due + LATE_S:
                 self._servers.wait_longer(now + UNREAD_S)
+                for handle in self._goals.values():
+                    handle.goal.wait_longer(now + UNREAD_S)
             self._timer, self._due = None, math.inf
             if self._closed:
                 return

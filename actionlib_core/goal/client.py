@@ -139,6 +139,11 @@ class ClientGoal:
         if ack_timeout is not None and not self.acknowledged:
             self._ack_by = now + ack_timeout
 
+    def wait_longer(self, until: float) -> None:
+        """Give the acknowledgement time until then [s, clock]: it may not be read yet."""
+        if self._ack_by is not None and self.offered:
+            self._ack_by = max(until, self._ack_by)
+
     def on_offered(self, server: str, address: Server | None = None) -> None:
         """Note that the goal is being sent to a server, which may take it."""
         self.offered = True

@@ -262,6 +262,32 @@ def test_process_that_stood_still_loses_a_server_only_if_it_is_not_heard_afterwa
         node.transport.close()
 
 
+@pytest.mark.parametrize("heard", [True, False])
+def test_process_that_stood_still_takes_an_acknowledgement_that_was_not_read_yet(world, heard):
+    """The goal was LOST and cancelled, though a server had taken it in time."""
+    clock = Stopped(world.clock)
+    with Node("stopped", transport=world.network.session(), clock=clock) as node:
+        client = ActionClient("do", Action, node=node)
+        bridge = Bridge(world)
+        assert client.wait_for_server(LONG_S)
+        bridge.alive = False  # what it sends is not read meanwhile
+        handle = client.send_goal(Goal(1), ack_timeout=2.0)
+        clock.until = world.clock.now() + LONG_S
+        world.clock.sleep(LONG_S + 0.5)
+        assert handle.get_goal_status() == GoalStatus.PENDING
+        if heard:
+            stamp_ns = handle.goal.stamp_ns
+            taken = StatusEntry(handle.get_goal_id(), stamp_ns, int(Status.ACTIVE), "")
+            bridge.goals.append(taken)
+            bridge.alive = True
+            bridge.beat()
+        world.clock.sleep(10.0)
+        assert handle.get_goal_status() == (GoalStatus.ACTIVE if heard else GoalStatus.LOST)
+        bridge.alive = False
+        assert handle.wait(LONG_S)
+        node.transport.close()
+
+
 def test_goal_of_a_bridge_does_not_run_at_a_server_that_appears(world):
     client = world.client()
     bridge = Bridge(world)
