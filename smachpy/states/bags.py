@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -104,11 +105,10 @@ class RecordBag(State):
             clock, inlet = wake.clock, _Inlet(wake.clock, wake.set)
             until = None if self.__seconds is None else clock.now() + self.__seconds
             node = get_node()
-            subscribers = [
-                NotingSubscriber(topic, kind, inlet.taker(topic, kind), node=node)
-                for topic, kind in self.__topics.items()
-            ]
-            try:
+            with contextlib.ExitStack() as listening:
+                for topic, kind in self.__topics.items():
+                    take = inlet.taker(topic, kind)
+                    listening.enter_context(NotingSubscriber(topic, kind, take, node=node))
                 while True:
                     wake.clear()
                     over = until is not None and clock.now() >= until
@@ -117,9 +117,6 @@ class RecordBag(State):
                         break
                     inlet.write_to(writer)
                     wake.wait_until(until)
-            finally:
-                for subscriber in subscribers:
-                    subscriber.unregister()
             inlet.write_to(writer)
             if inlet.dropped:
                 log.logwarn(

@@ -69,8 +69,7 @@ class AwaitMessage(State):
         """
         from actionlib_core.pubsub.topic import Subscriber
 
-        came: list[Any] = []
-        errors: list[BaseException] = []
+        ends: list[Any] = []  # messages that are wanted, and errors; the first one counts
         count = 0
         clock = clock_of_run()
         wake = clock.event(f"a message on {self.__topic}")
@@ -83,10 +82,10 @@ class AwaitMessage(State):
                 is_wanted = self.__wanted is None or bool(self.__wanted(message))
                 verdicts.note(message, is_wanted)
                 if is_wanted:
-                    came.append(message)
+                    ends.append(message)
             except BaseException as error:  # noqa: BLE001  raised in the state's thread
-                errors.append(error)
-            if came or errors:
+                ends.append(error)
+            if ends:
                 wake.set()
 
         forget = on_preempt(self, wake.set)
@@ -97,11 +96,11 @@ class AwaitMessage(State):
                 publishers, others = subscriber.get_num_connections(), subscriber.mismatches
         finally:
             forget()
-        if errors:
-            raise errors[0]
-        if came:
+        if ends:
+            if isinstance(ends[0], BaseException):
+                raise ends[0]
             if self.__key is not None:
-                userdata[self.__key] = came[0]
+                userdata[self.__key] = ends[0]
             return "came"
         if self.preempt_requested():
             return "preempted"

@@ -260,6 +260,15 @@ def test_it_waits_for_a_message_that_is_accepted(mission, values, outcome, secon
     assert run.duration == seconds
 
 
+def test_the_message_that_was_waited_for_counts_whatever_comes_right_after_it(mission):
+    """The machine raised what the condition raised for the next message."""
+    topic = mission.topic("button", Bool)
+    topic.publish_at(1.0, Bool(data=True))
+    topic.publish_at(1.0, Bool(data=False))
+    run = mission(alone(AwaitMessage("button", Bool, lambda m: 1 // m.data, timeout=10.0)))
+    run.assert_outcome("came")
+
+
 def test_a_preempt_ends_waits_at_once(mission):
     for state in (Wait(100.0), AwaitMessage("button", Bool, bool, timeout=100.0), Serve()):
         mission.preempt(on="STATE", after=1.0)
