@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 import smachpy
-from actionlib_core.clock import VirtualClock, use_clock
+from actionlib_core.clock import VirtualClock, current_clock, use_clock
+from actionlib_core.resources import Resources
 from smachpy import Concurrence, InvalidStateError, Resource, State, StateMachine
 from smachpy.durable.store import Lease
 from smachpy.durable.store import ResourceUse as ResourceRow
@@ -318,6 +319,24 @@ def test_what_gets_it_while_the_machine_is_paused_does_not_begin(stops):
     assert run.duration == (20.0 if stops else 22.0)
     held = [path for path, status, *_ in uses(heard) if status == "holds"]
     assert held == ["/C/A", *([] if stops else ["/C/B/USE"])]
+
+
+def test_a_request_that_comes_after_the_holder_has_ended_stops_nothing(monkeypatch: Any):
+    real = Resources.claim
+
+    def slow(self: Resources, claim: Any) -> Any:
+        holder = real(self, claim)
+        if claim.policy == "preempt":
+            current_clock().sleep(3.0)
+        return holder
+
+    monkeypatch.setattr(Resources, "claim", slow)
+    early = StateMachine(ENDS)
+    early.add("USE", Step(2.0, resource="base"), {"done": "ELSE"})
+    early.add("ELSE", Step(9.0))
+    with mission_kit() as mission:
+        run = mission(together(A=early, B=after(1.0, Step(1.0, resource=("base", "preempt")))))
+    assert (found, run.duration) == ({"A": "done", "B": "done"}, 11.0)
 
 
 def _then(state: State) -> StateMachine:
