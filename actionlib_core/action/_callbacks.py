@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import contextvars
 import threading
 from collections import deque
@@ -10,7 +11,7 @@ from threading import get_ident
 from typing import TYPE_CHECKING
 
 from actionlib_core.clock import SerialExecutor, use_clock
-from actionlib_core.clock._serial import report_thread_exception
+from actionlib_core.clock._serial import LATE_S, report_thread_exception
 from actionlib_core.node import use_node
 
 if TYPE_CHECKING:
@@ -56,21 +57,28 @@ class CallbackQueue:
         """Call a callback in its turn; if others delay it, beside them in another thread."""
         once = _Once(partial(function, *args))
         # Both the timer and the queue get it; the first of them runs it.
-        once.timer = self._clock.call_later(PATIENCE_S, partial(self._overtake, once))
+        with contextlib.suppress(RuntimeError):  # no thread for timers is left: it waits
+            once.timer = self._clock.call_later(PATIENCE_S, partial(self._overtake, once))
         self._executor.submit(once)
 
     def _overtake(self, once: _Once) -> None:
         with self._lock:
             self._urgent.append(once)
-            if self._helpers >= HELPERS:
+        self._start_helper()
+
+    def _start_helper(self) -> None:
+        with self._lock:
+            if not self._urgent or self._helpers >= HELPERS:
                 return
             self._helpers += 1
         try:
             self.spawn(self._help, self._name)
-        except BaseException:  # no thread is left: the next one may find one
+        except BaseException as error:
             with self._lock:
                 self._helpers -= 1
-            raise
+            if not isinstance(error, RuntimeError):
+                raise
+            self._clock.call_later(LATE_S, self._start_helper)  # the system has no thread left
 
     def _help(self) -> None:
         while True:
