@@ -175,7 +175,9 @@ class GoalKeeper:
             self._waiting = [
                 handle
                 for handle in handles
-                if (self._cancels_lost or handle.record.cancel_if_lost) and not self._ends(handle)
+                if (self._cancels_lost or handle.record.cancel_if_lost)
+                and handle.record.client  # else nobody knows who has sent it
+                and not self._ends(handle)
             ]
             others = [handle for handle in handles if handle not in self._waiting]
         for handle in others:

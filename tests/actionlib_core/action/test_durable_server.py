@@ -292,6 +292,19 @@ def test_server_that_cancels_goals_of_lost_clients_looks_for_those_of_its_former
     server.stop()
 
 
+def test_goal_of_which_nobody_knows_the_client_waits_for_none_after_a_restart(world):
+    options = {"on_restart": "resume", "on_client_lost": "cancel"}
+    server = world.serve(lambda handle: handle.set_accepted(), **options)
+    server.keeper.on_goal("by_hand", 1, Goal(1), "")
+    world.clock.sleep(0.5)
+    world.kill(server)
+    begun = []
+    server = world.serve(begun.append, **options)
+    world.clock.sleep(CLIENTS_S + 1.0)
+    assert [handle.get_goal_id().id for handle in begun] == ["by_hand"]
+    server.stop()
+
+
 def test_goal_of_a_lost_client_that_another_life_was_to_stop_is_not_begun_again(world):
     """The server dies again between the request and the end."""
     server = world.serve(lambda handle: handle.set_accepted())
