@@ -97,14 +97,14 @@ class LinkProbe:
         elif left > 0:
             self._later(left, self._look)
         else:
-            self._asked_at = self._clock.now()
-            self._later(min(self._every, WAIT_S), self._judge)
             # Not in the timers' thread: a query waits while a link is full.
             self._sender.submit(self._send)
 
     def _send(self) -> None:
+        self._asked_at = self._clock.now()
         with contextlib.suppress(TransportError):  # the session is closed
             self._keep(self._ask())
+        self._later(min(self._every, WAIT_S), self._judge)  # once it is sent
 
     def _judge(self) -> None:
         self._timer = None

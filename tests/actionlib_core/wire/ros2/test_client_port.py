@@ -588,6 +588,24 @@ class StoppedOnce:
         return self._clock.call_later(max(delay, next(self._delays, 0.0)), step)
 
 
+def test_probe_that_waited_for_a_full_link_is_judged_after_it_was_sent(clock):
+    """Nobody could answer it before: a server was lost that was there."""
+    silent, sent = [], []
+
+    def ask():
+        clock.sleep(5.0)
+        sent.append(clock.now())
+        clock.call_later(0.5, probe.note_received)
+        return contextlib.ExitStack()
+
+    probe = LinkProbe(clock, 5.0, ask, lambda: True, silent.append)
+    probe.watch()
+    clock.sleep(30.0)
+    probe.close()
+    assert len(sent) > 1
+    assert silent == []
+
+
 @pytest.mark.parametrize("answered", [{1}, {2}, set()])
 def test_process_that_stood_still_after_a_probe_judges_by_the_next_one(clock, answered):
     asked, silent = [], []
