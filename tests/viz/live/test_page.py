@@ -208,6 +208,19 @@ def test_a_robot_that_dies_is_stale_and_one_that_comes_back_is_not(delivery, sta
     wait_for(page, "smachpy.store.status.activeLeaves.value.length")  # a state is entered soon
 
 
+def test_a_suspended_robot_is_stale_refuses_commands_in_time_and_goes_on(delivery, start, look):
+    """A debugger, a laptop's lid, SIGSTOP: its token stays until the link is given up."""
+    robot = start.robot("--name", "asleep", "--rate", 4, "--control")
+    page = look(delivery.address.replace("/#", "/?machine=asleep#"))
+    page.wait_for_selector("#pause:enabled")
+    os.kill(robot.pid, signal.SIGSTOP)
+    page.click("#pause")
+    page.wait_for_selector(".notice.error")  # it did not answer
+    wait_for(page, "smachpy.store.status.runStatus.value.word === 'stale'")
+    os.kill(robot.pid, signal.SIGCONT)
+    wait_for(page, "['running', 'paused'].includes(smachpy.store.status.runStatus.value.word)")
+
+
 def test_a_viewer_that_is_restarted_is_found_again_with_the_whole_history(start, look):
     start.robot("--name", "steady", "--rate", 8)
     view = start.view()
