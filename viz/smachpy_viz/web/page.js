@@ -2472,6 +2472,15 @@ function scanPoints({ at: [x3, y5, yaw], first, step, ranges }) {
   });
   return points2;
 }
+function sceneText(scene, now) {
+  const parts = [...scene.robots].flatMap(([name, robot]) => {
+    const pose = scene.poseAt(robot, now);
+    const goal = robot.goals.findLast((one) => one.t <= now && (one.to === null || one.to > now));
+    const to = goal ? `, on its way to ${scene.placeName(goal) || placeText(goal)}` : "";
+    return pose ? [`${name || "the robot"} at ${placeText(pose)}${to}`] : [];
+  });
+  return `map: ${parts.join("; ") || "no robot yet"}`;
+}
 
 // src/core/why.ts
 function wayOf(why) {
@@ -6480,7 +6489,7 @@ var MapView = class {
     this.#goals(scene, until);
     for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
     this.#scaleBar(width, height);
-    canvas2.setAttribute("aria-label", describe(scene, now));
+    canvas2.setAttribute("aria-label", sceneText(scene, now));
   }
   /** The scan and the plan of a robot. */
   #seen(scene, robot, now, until) {
@@ -6688,15 +6697,6 @@ var MapView = class {
     e4.stopPropagation();
   }
 };
-function describe(scene, now) {
-  const parts = [...scene.robots].flatMap(([name, robot]) => {
-    const pose = scene.poseAt(robot, now);
-    const goal = robot.goals.findLast((one) => one.t <= now && (one.to === null || one.to > now));
-    const to = goal ? `, on its way to ${scene.placeName(goal) || placeText(goal)}` : "";
-    return pose ? [`${name || "the robot"} at ${placeText(pose)}${to}`] : [];
-  });
-  return `map: ${parts.join("; ") || "no robot yet"}`;
-}
 
 // src/drawing/minimap.ts
 var SHOWN_BELOW = 0.6;
@@ -7658,6 +7658,94 @@ var TimeWindow = class {
   }
 };
 
+// src/drawing/timeline_marks.ts
+var NOTE = 130;
+function drawOutages(g5, colours, axis, height) {
+  const gaps2 = [];
+  for (const [begin, end] of store.data.run.now.outages ?? []) {
+    if (end / 1e6 < axis.from || begin / 1e6 > axis.to) continue;
+    const left = Math.max(axis.left, axis.x(begin / 1e6));
+    const right = Math.min(axis.right, Math.max(axis.x(end / 1e6), left + 3));
+    if (right <= left) continue;
+    gaps2.push([left, right]);
+    g5.fillStyle = colours.of("background");
+    g5.fillRect(left, 0, right - left, height);
+    g5.strokeStyle = colours.of("waiting");
+    g5.lineWidth = 1.5;
+    g5.setLineDash([2, 3]);
+    for (const px of [left, right]) {
+      g5.beginPath();
+      g5.moveTo(px, 0);
+      g5.lineTo(px, height);
+      g5.stroke();
+    }
+    g5.setLineDash([]);
+    const text2 = duration((end - begin) / 1e9);
+    if (g5.measureText(text2).width + 8 > right - left || axis.foldAt((left + right) / 2)) continue;
+    g5.fillStyle = colours.of("waiting-text");
+    g5.textAlign = "center";
+    g5.fillText(text2, (left + right) / 2, 10);
+  }
+  return gaps2;
+}
+function drawFold(g5, colours, { from, to }, axis, height) {
+  const left = Math.max(axis.left, axis.x(from));
+  const right = Math.min(axis.right, axis.x(to));
+  const middle = (left + right) / 2;
+  g5.fillStyle = colours.of("depth2");
+  g5.fillRect(left, 0, right - left, height);
+  g5.strokeStyle = colours.of("muted");
+  g5.lineWidth = 1.2;
+  g5.beginPath();
+  for (let y5 = 0, side = -1; y5 <= height; y5 += 5, side = -side) g5.lineTo(middle + 3 * side, y5);
+  g5.stroke();
+  const text2 = duration((to - from) / 1e3);
+  const half = g5.measureText(text2).width / 2 + 5;
+  const at = Math.max(axis.left + half, Math.min(axis.right - half, middle));
+  g5.beginPath();
+  g5.roundRect(at - half, height / 2 - 9, 2 * half, 18, 9);
+  g5.fillStyle = colours.of("background");
+  g5.fill();
+  g5.stroke();
+  g5.fillStyle = colours.of("ink");
+  g5.textAlign = "center";
+  g5.fillText(text2, at, height / 2 + 0.5);
+}
+function drawNotes(g5, colours, axis, height) {
+  const { left: first, right: last } = axis;
+  for (const { at, text: text2 } of pins()) {
+    const px = axis.x(at);
+    if (px < first || px > last) continue;
+    g5.fillStyle = colours.of("ink");
+    g5.fillRect(px - 0.5, 0, 1, height);
+    const wide = Math.min(NOTE, g5.measureText(text2).width + 10);
+    const left = px + wide > last ? px - wide : px;
+    const top = height - 16;
+    g5.beginPath();
+    g5.roundRect(left, top, wide, 15, 3);
+    g5.fill();
+    g5.fillStyle = colours.of("background");
+    g5.textAlign = "left";
+    clipped(g5, left, top, wide - 4, 15, () => g5.fillText(text2, left + 5, top + 8));
+  }
+}
+function describe(span) {
+  const { from, to, preempt, serviced, abandoned } = span;
+  const purpose = purposeOfVisit(span);
+  const seconds = (some) => `${(some / 1e3).toFixed(3)} s`;
+  const lines = [
+    purpose ? `${span.path} → ${purpose}` : span.path,
+    to === null ? "runs" : `${seconds(to - from)}, ${span.outcome ?? "its end is unknown"}`
+  ];
+  if (span.attempt) lines.push(`attempt ${span.attempt}`);
+  if (preempt !== null) {
+    lines.push(`asked to stop after ${seconds(preempt - from)} by ${askerText(span.asked) ?? "?"}`);
+    if (serviced !== null) lines.push(`preempt serviced ${seconds(serviced - preempt)} later`);
+    if (abandoned !== null) lines.push(`abandoned ${seconds(abandoned - preempt)} later`);
+  }
+  return lines.join("\n");
+}
+
 // src/drawing/timeline.ts
 var NAMES2 = 168;
 var NAMES_NARROW = 84;
@@ -7665,7 +7753,6 @@ var TOOLS_NARROW = 176;
 var RIGHT2 = 14;
 var TOP = 3;
 var FOOT = 26;
-var NOTE = 130;
 var STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400];
 var Timeline = class {
   canvas;
@@ -7697,7 +7784,7 @@ var Timeline = class {
     canvas2.addEventListener("pointermove", (e4) => {
       const span = this.#spanAt(e4);
       const fold = this.#foldAt(e4);
-      canvas2.title = fold ? `nothing happened for ${duration((fold.to - fold.from) / 1e3)}: click to unfold it` : span ? describe2(span) : "";
+      canvas2.title = fold ? `nothing happened for ${duration((fold.to - fold.from) / 1e3)}: click to unfold it` : span ? describe(span) : "";
       store.pointer.hover(span ? { path: span.path, from: span.from } : null);
       this.#hover(e4.offsetX);
     });
@@ -7766,10 +7853,10 @@ var Timeline = class {
         y5 += tall;
       }
     });
-    this.#outages(scale, room);
-    for (const fold of scale.folds) this.#fold(fold, scale, room);
+    this.gaps = drawOutages(g5, this.#colours, scale, room);
+    for (const fold of scale.folds) drawFold(g5, this.#colours, fold, scale, room);
     this.#stretch(scale, height);
-    this.#notes(scale, height);
+    drawNotes(g5, this.#colours, scale, room);
     this.#cursor(scale, height);
     this.onDraw({ from, to });
   }
@@ -7820,80 +7907,6 @@ var Timeline = class {
     g5.globalAlpha = 1;
     for (const px of [left, right]) g5.fillRect(px - 0.75, 0, 1.5, height - FOOT);
     g5.fillRect(left, height - FOOT, right - left, store.playback.looping.value ? 4 : 2);
-  }
-  /** Draw the outages. */
-  #outages(axis, height) {
-    const g5 = this.context;
-    this.gaps = [];
-    for (const [begin, end] of store.data.run.now.outages ?? []) {
-      if (end / 1e6 < axis.from || begin / 1e6 > axis.to) continue;
-      const left = Math.max(axis.left, axis.x(begin / 1e6));
-      const right = Math.min(axis.right, Math.max(axis.x(end / 1e6), left + 3));
-      if (right <= left) continue;
-      this.gaps.push([left, right]);
-      g5.fillStyle = this.#colours.of("background");
-      g5.fillRect(left, 0, right - left, height);
-      g5.strokeStyle = this.#colours.of("waiting");
-      g5.lineWidth = 1.5;
-      g5.setLineDash([2, 3]);
-      for (const px of [left, right]) {
-        g5.beginPath();
-        g5.moveTo(px, 0);
-        g5.lineTo(px, height);
-        g5.stroke();
-      }
-      g5.setLineDash([]);
-      const text2 = duration((end - begin) / 1e9);
-      if (g5.measureText(text2).width + 8 > right - left || axis.foldAt((left + right) / 2)) continue;
-      g5.fillStyle = this.#colours.of("waiting-text");
-      g5.textAlign = "center";
-      g5.fillText(text2, (left + right) / 2, 10);
-    }
-  }
-  /** Draw a folded idle time: a zigzag with its length, which a click unfolds. */
-  #fold({ from, to }, axis, height) {
-    const g5 = this.context;
-    const left = Math.max(axis.left, axis.x(from));
-    const right = Math.min(axis.right, axis.x(to));
-    const middle = (left + right) / 2;
-    g5.fillStyle = this.#colours.of("depth2");
-    g5.fillRect(left, 0, right - left, height);
-    g5.strokeStyle = this.#colours.of("muted");
-    g5.lineWidth = 1.2;
-    g5.beginPath();
-    for (let y5 = 0, side = -1; y5 <= height; y5 += 5, side = -side) g5.lineTo(middle + 3 * side, y5);
-    g5.stroke();
-    const text2 = duration((to - from) / 1e3);
-    const half = g5.measureText(text2).width / 2 + 5;
-    const at = Math.max(axis.left + half, Math.min(axis.right - half, middle));
-    g5.beginPath();
-    g5.roundRect(at - half, height / 2 - 9, 2 * half, 18, 9);
-    g5.fillStyle = this.#colours.of("background");
-    g5.fill();
-    g5.stroke();
-    g5.fillStyle = this.#colours.of("ink");
-    g5.textAlign = "center";
-    g5.fillText(text2, at, height / 2 + 0.5);
-  }
-  /** Draw a pin at each note, with its text. */
-  #notes(axis, height) {
-    const { left: first, right: last } = axis;
-    const g5 = this.context;
-    for (const { at, text: text2 } of pins()) {
-      const px = axis.x(at);
-      if (px < first || px > last) continue;
-      g5.fillStyle = this.#colours.of("ink");
-      g5.fillRect(px - 0.5, 0, 1, height - FOOT);
-      const wide = Math.min(NOTE, g5.measureText(text2).width + 10);
-      const left = px + wide > last ? px - wide : px;
-      const top = height - FOOT - 16;
-      g5.beginPath();
-      g5.roundRect(left, top, wide, 15, 3);
-      g5.fill();
-      g5.fillStyle = this.#colours.of("background");
-      g5.textAlign = "left";
-      clipped(g5, left, top, wide - 4, 15, () => g5.fillText(text2, left + 5, top + 8));
-    }
   }
   /** Draw the instants at the pointer and shown. */
   #cursor(axis, height) {
@@ -7987,22 +8000,6 @@ var Timeline = class {
     e4.preventDefault();
   }
 };
-function describe2(span) {
-  const { from, to, preempt, serviced, abandoned } = span;
-  const purpose = purposeOfVisit(span);
-  const seconds = (some) => `${(some / 1e3).toFixed(3)} s`;
-  const lines = [
-    purpose ? `${span.path} → ${purpose}` : span.path,
-    to === null ? "runs" : `${seconds(to - from)}, ${span.outcome ?? "its end is unknown"}`
-  ];
-  if (span.attempt) lines.push(`attempt ${span.attempt}`);
-  if (preempt !== null) {
-    lines.push(`asked to stop after ${seconds(preempt - from)} by ${askerText(span.asked) ?? "?"}`);
-    if (serviced !== null) lines.push(`preempt serviced ${seconds(serviced - preempt)} later`);
-    if (abandoned !== null) lines.push(`abandoned ${seconds(abandoned - preempt)} later`);
-  }
-  return lines.join("\n");
-}
 
 // src/drawing/page.ts
 var Page = class {

@@ -4,7 +4,7 @@
 
 import { own } from "#core/fold.ts";
 import { countWhile } from "#core/lists.ts";
-import { namedPlaces, placeIn } from "#core/places.ts";
+import { namedPlaces, placeIn, placeText } from "#core/places.ts";
 import type {
   Box,
   DrivenGoal,
@@ -333,4 +333,15 @@ export function scanPoints({ at: [x, y, yaw], first, step, ranges }: Scan): Poin
     if (cm >= 0) points.push({ x: x + (cm / 100) * Math.cos(turn), y: y + (cm / 100) * Math.sin(turn) });
   });
   return points;
+}
+
+/** The map as text, for screen readers. */
+export function sceneText(scene: Scene, now: number) {
+  const parts = [...scene.robots].flatMap(([name, robot]) => {
+    const pose = scene.poseAt(robot, now);
+    const goal = robot.goals.findLast((one) => one.t <= now && (one.to === null || one.to > now));
+    const to = goal ? `, on its way to ${scene.placeName(goal) || placeText(goal)}` : "";
+    return pose ? [`${name || "the robot"} at ${placeText(pose)}${to}`] : [];
+  });
+  return `map: ${parts.join("; ") || "no robot yet"}`;
 }

@@ -2,9 +2,8 @@
 // A click on a track goes to the instant at which the robot was there.
 
 import { outcomeClass } from "#core/outcomes.ts";
-import { placeText } from "#core/places.ts";
 import type { Scene } from "#core/scene.ts";
-import { COLOURS, countUntil, scanPoints } from "#core/scene.ts";
+import { COLOURS, countUntil, scanPoints, sceneText } from "#core/scene.ts";
 import { store } from "#core/store.ts";
 import type { DrivenGoal, Piece, Point, Robot } from "#core/types.ts";
 import { Floor, type MapScale, pixelOf, placeAt } from "#drawing/floor.ts";
@@ -114,7 +113,7 @@ export class MapView {
     this.#goals(scene, until);
     for (const [name, robot] of scene.robots) this.#robot(scene, name, robot, now);
     this.#scaleBar(width, height);
-    canvas.setAttribute("aria-label", describe(scene, now));
+    canvas.setAttribute("aria-label", sceneText(scene, now));
   }
 
   /** The scan and the plan of a robot. */
@@ -337,15 +336,4 @@ export class MapView {
     e.preventDefault();
     e.stopPropagation();
   }
-}
-
-/** The map as text, for screen readers. */
-function describe(scene: Scene, now: number) {
-  const parts = [...scene.robots].flatMap(([name, robot]) => {
-    const pose = scene.poseAt(robot, now);
-    const goal = robot.goals.findLast((one) => one.t <= now && (one.to === null || one.to > now));
-    const to = goal ? `, on its way to ${scene.placeName(goal) || placeText(goal)}` : "";
-    return pose ? [`${name || "the robot"} at ${placeText(pose)}${to}`] : [];
-  });
-  return `map: ${parts.join("; ") || "no robot yet"}`;
 }

@@ -69,3 +69,14 @@ export function boxesOf(layout: ContainerLayout, x: number = 0, y: number = 0, f
 
 /** Whether a container is drawn with its states. */
 export const isOpen = (node: StateNode, open: Set<string>) => node.children.length > 0 && open.has(node.path);
+
+/** What an id in a graph stands for. */
+export type Meaning =
+  | { kind: "entry" | "port" | "hidden" }
+  | { kind: "open"; child: StateNode; inner: ContainerLayout }
+  | { kind: "leaf"; child: StateNode; hasRows: boolean; nameWidth: number }
+  | { kind: "dot"; outcome: string }
+  | { kind: "pill"; outcome: string; from?: number }
+  | { kind: "join"; join: Join }
+  | EdgeMeaning;
+export type EdgeMeaning = Pick<PlacedEdge, "kind" | "link" | "join" | "source" | "outcomes">;

@@ -7,10 +7,11 @@ import type { Direction, Join, Link, StateNode } from "#core/types.ts";
 import { measure } from "#drawing/measure.ts";
 import {
   type ContainerLayout,
+  type EdgeMeaning,
   type Ends,
   LEAF_H,
   leafWidth,
-  type PlacedEdge,
+  type Meaning,
   pillWidth,
   type Shape,
 } from "#drawing/placed.ts";
@@ -19,17 +20,6 @@ import { bundlesOf, hasOver } from "#drawing/shapes.ts";
 /** A container as ELK's JSON, with all its lists. */
 export type Graph = ElkNode &
   Required<Pick<ElkNode, "children" | "ports" | "layoutOptions">> & { edges: ElkExtendedEdge[] };
-
-/** What an id in a graph stands for. */
-export type Meaning =
-  | { kind: "entry" | "port" | "hidden" }
-  | { kind: "open"; child: StateNode; inner: ContainerLayout }
-  | { kind: "leaf"; child: StateNode; hasRows: boolean; nameWidth: number }
-  | { kind: "dot"; outcome: string }
-  | { kind: "pill"; outcome: string; from?: number }
-  | { kind: "join"; join: Join }
-  | EdgeMeaning;
-export type EdgeMeaning = Pick<PlacedEdge, "kind" | "link" | "join" | "source" | "outcomes">;
 
 const ROW_H = 14;
 const PILL_H = 15;

@@ -2,8 +2,8 @@
 
 import type { ElkNode, ElkPort } from "elkjs/lib/elk-api.d.ts";
 import type { Box } from "#core/types.ts";
-import type { ContainerLayout } from "#drawing/placed.ts";
-import type { EdgeMeaning, Graph, Plan } from "#drawing/plan.ts";
+import type { ContainerLayout, EdgeMeaning } from "#drawing/placed.ts";
+import type { Graph, Plan } from "#drawing/plan.ts";
 
 /** ELK's result in the page's types. */
 export function placed(plan: Plan, found: Graph): ContainerLayout {

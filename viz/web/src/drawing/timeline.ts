@@ -2,16 +2,14 @@
 // selected, outages, notes, and the instants at the pointer and shown.
 
 import { ms } from "#core/fold.ts";
-import type { Axis, Idle } from "#core/idle.ts";
-import { purposeOfVisit } from "#core/purposes.ts";
-import { pins } from "#core/reproduction.ts";
+import type { Axis } from "#core/idle.ts";
 import { store } from "#core/store.ts";
-import { askerText, duration } from "#core/text.ts";
-import type { Span } from "#core/types.ts";
+import { duration } from "#core/text.ts";
 import { Bars, clipped } from "#drawing/bars.ts";
 import { Lanes } from "#drawing/lanes.ts";
 import { Colours, FONT, fitted } from "#drawing/theme.ts";
 import { TimeWindow } from "#drawing/time_window.ts";
+import { describe, drawFold, drawNotes, drawOutages } from "#drawing/timeline_marks.ts";
 import { drag } from "#drawing/viewport.ts";
 
 // Sizes in CSS pixels
@@ -21,7 +19,6 @@ const TOOLS_NARROW = 176; // width of the buttons at the axis there
 const RIGHT = 14;
 const TOP = 3;
 const FOOT = 26; // height of the axis and its buttons
-const NOTE = 130; // width of a note's text
 const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14_400];
 
 export class Timeline {
@@ -132,10 +129,10 @@ export class Timeline {
         y += tall;
       }
     });
-    this.#outages(scale, room);
-    for (const fold of scale.folds) this.#fold(fold, scale, room);
+    this.gaps = drawOutages(g, this.#colours, scale, room);
+    for (const fold of scale.folds) drawFold(g, this.#colours, fold, scale, room);
     this.#stretch(scale, height);
-    this.#notes(scale, height);
+    drawNotes(g, this.#colours, scale, room);
     this.#cursor(scale, height);
     this.onDraw({ from, to });
   }
@@ -190,83 +187,6 @@ export class Timeline {
     g.globalAlpha = 1;
     for (const px of [left, right]) g.fillRect(px - 0.75, 0, 1.5, height - FOOT);
     g.fillRect(left, height - FOOT, right - left, store.playback.looping.value ? 4 : 2);
-  }
-
-  /** Draw the outages. */
-  #outages(axis: Axis, height: number) {
-    const g = this.context;
-    this.gaps = [];
-    for (const [begin, end] of store.data.run.now.outages ?? []) {
-      if (end / 1e6 < axis.from || begin / 1e6 > axis.to) continue;
-      const left = Math.max(axis.left, axis.x(begin / 1e6));
-      const right = Math.min(axis.right, Math.max(axis.x(end / 1e6), left + 3));
-      if (right <= left) continue;
-      this.gaps.push([left, right]);
-      g.fillStyle = this.#colours.of("background");
-      g.fillRect(left, 0, right - left, height);
-      g.strokeStyle = this.#colours.of("waiting");
-      g.lineWidth = 1.5;
-      g.setLineDash([2, 3]);
-      for (const px of [left, right]) {
-        g.beginPath();
-        g.moveTo(px, 0);
-        g.lineTo(px, height);
-        g.stroke();
-      }
-      g.setLineDash([]);
-      const text = duration((end - begin) / 1e9);
-      if (g.measureText(text).width + 8 > right - left || axis.foldAt((left + right) / 2)) continue;
-      g.fillStyle = this.#colours.of("waiting-text");
-      g.textAlign = "center";
-      g.fillText(text, (left + right) / 2, 10);
-    }
-  }
-
-  /** Draw a folded idle time: a zigzag with its length, which a click unfolds. */
-  #fold({ from, to }: Idle, axis: Axis, height: number) {
-    const g = this.context;
-    const left = Math.max(axis.left, axis.x(from));
-    const right = Math.min(axis.right, axis.x(to));
-    const middle = (left + right) / 2;
-    g.fillStyle = this.#colours.of("depth2");
-    g.fillRect(left, 0, right - left, height);
-    g.strokeStyle = this.#colours.of("muted");
-    g.lineWidth = 1.2;
-    g.beginPath();
-    for (let y = 0, side = -1; y <= height; y += 5, side = -side) g.lineTo(middle + 3 * side, y);
-    g.stroke();
-    const text = duration((to - from) / 1000);
-    const half = g.measureText(text).width / 2 + 5;
-    const at = Math.max(axis.left + half, Math.min(axis.right - half, middle));
-    g.beginPath();
-    g.roundRect(at - half, height / 2 - 9, 2 * half, 18, 9);
-    g.fillStyle = this.#colours.of("background");
-    g.fill();
-    g.stroke();
-    g.fillStyle = this.#colours.of("ink");
-    g.textAlign = "center";
-    g.fillText(text, at, height / 2 + 0.5);
-  }
-
-  /** Draw a pin at each note, with its text. */
-  #notes(axis: Axis, height: number) {
-    const { left: first, right: last } = axis;
-    const g = this.context;
-    for (const { at, text } of pins()) {
-      const px = axis.x(at);
-      if (px < first || px > last) continue;
-      g.fillStyle = this.#colours.of("ink");
-      g.fillRect(px - 0.5, 0, 1, height - FOOT);
-      const wide = Math.min(NOTE, g.measureText(text).width + 10);
-      const left = px + wide > last ? px - wide : px;
-      const top = height - FOOT - 16;
-      g.beginPath();
-      g.roundRect(left, top, wide, 15, 3);
-      g.fill();
-      g.fillStyle = this.#colours.of("background");
-      g.textAlign = "left";
-      clipped(g, left, top, wide - 4, 15, () => g.fillText(text, left + 5, top + 8));
-    }
   }
 
   /** Draw the instants at the pointer and shown. */
@@ -371,21 +291,4 @@ export class Timeline {
     else return;
     e.preventDefault();
   }
-}
-
-function describe(span: Span) {
-  const { from, to, preempt, serviced, abandoned } = span;
-  const purpose = purposeOfVisit(span);
-  const seconds = (some: number) => `${(some / 1000).toFixed(3)} s`;
-  const lines = [
-    purpose ? `${span.path} \u2192 ${purpose}` : span.path,
-    to === null ? "runs" : `${seconds(to - from)}, ${span.outcome ?? "its end is unknown"}`,
-  ];
-  if (span.attempt) lines.push(`attempt ${span.attempt}`);
-  if (preempt !== null) {
-    lines.push(`asked to stop after ${seconds(preempt - from)} by ${askerText(span.asked) ?? "?"}`);
-    if (serviced !== null) lines.push(`preempt serviced ${seconds(serviced - preempt)} later`);
-    if (abandoned !== null) lines.push(`abandoned ${seconds(abandoned - preempt)} later`);
-  }
-  return lines.join("\n");
 }
