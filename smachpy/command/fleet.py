@@ -415,7 +415,7 @@ class Runner:
             tell("smachpy runner", f"old missions are not deleted: {error}")
             return
         if gone:
-            print(deleted(gone), flush=True)
+            print(printable(deleted(gone)), flush=True)
 
     def _begin_next(self, schedule: MissionRow, now: float) -> None:
         """Put the next mission of a schedule into the queue; one that cannot be read is told."""
