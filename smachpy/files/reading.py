@@ -285,6 +285,10 @@ class _Reader:
             )
         if given is not REQUIRED and not found.fits(given):
             section.problem("default", WORDS[kind])
+        if "${" in str(given):
+            section.report(
+                "default", f"got {given!r}; expected a value: a default names no parameter."
+            )
         return found
 
     def machine(self, arguments: Mapping[str, Any]) -> StateMachine:

@@ -131,6 +131,16 @@ def test_a_parameter_is_not_named_as_an_argument_of_load(file, name):
     assert problems_of(path)[0].startswith(expected)
 
 
+@pytest.mark.parametrize("default", ['"${n}"', '["${n}"]'])
+def test_the_default_of_a_parameter_names_no_other(file, default):
+    """It was taken as it is written, without a word."""
+    states = "states:\n  A: {state: wait, with: {seconds: 1}}\n"
+    parameters = f"parameters:\n  n: {{type: text, default: x}}\n  m: {{default: {default}}}\n"
+    (problem,) = problems_of(file(f"outcomes: [done, preempted]\n{parameters}{states}"))
+    assert problem.startswith("4:")
+    assert problem.endswith("expected a value: a default names no parameter.")
+
+
 def test_every_mistake_has_its_place_and_a_suggestion(file):
     path = file(
         """\
