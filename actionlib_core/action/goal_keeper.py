@@ -171,15 +171,15 @@ class GoalKeeper:
         again. Clients that have died meanwhile are noticed `CLIENTS_S` later; a goal that ends with
         its client waits until that is found.
         """
+        others: list[ServerGoalHandle] = []
         with self.lock:
-            self._waiting = [
-                handle
-                for handle in handles
-                if (self._cancels_lost or handle.record.cancel_if_lost)
-                and handle.record.client  # else nobody knows who has sent it
-                and not self._ends(handle)
-            ]
-            others = [handle for handle in handles if handle not in self._waiting]
+            for handle in handles:
+                waits = (
+                    (self._cancels_lost or handle.record.cancel_if_lost)
+                    and handle.record.client  # else nobody knows who has sent it
+                    and not self._ends(handle)
+                )
+                (self._waiting if waits else others).append(handle)
         for handle in others:
             self._settle(handle)
         self._settle_waiting()
@@ -217,13 +217,11 @@ class GoalKeeper:
         if not self._waiting:
             return
         with self.lock:
-            there, waiting = self.port.clients(), self._waiting
-            self._waiting = [
-                handle
-                for handle in waiting
-                if not (handle.record.client in there or self._ends(handle))
-            ]
-            ready = [handle for handle in waiting if handle not in self._waiting]
+            there, waiting, self._waiting = self.port.clients(), self._waiting, []
+            ready: list[ServerGoalHandle] = []
+            for handle in waiting:
+                goes_on = handle.record.client in there or self._ends(handle)
+                (ready if goes_on else self._waiting).append(handle)
             if self.goals.closed:  # `stop` ends them
                 return
         for handle in ready:

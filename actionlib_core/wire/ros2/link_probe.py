@@ -102,9 +102,11 @@ class LinkProbe:
 
     def _send(self) -> None:
         self._asked_at = self._clock.now()
-        with contextlib.suppress(TransportError):  # the session is closed
-            self._keep(self._ask())
-        self._later(min(self._every, WAIT_S), self._judge)  # once it is sent
+        try:
+            with contextlib.suppress(TransportError):  # the session is closed
+                self._keep(self._ask())
+        finally:
+            self._later(min(self._every, WAIT_S), self._judge)  # once it is sent
 
     def _judge(self) -> None:
         self._timer = None
