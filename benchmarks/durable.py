@@ -25,8 +25,9 @@ from pathlib import Path
 
 import smachpy
 from smachpy.durable.journal import read_position
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import MissionRow, open_store
+from smachpy.durable.store import MissionRow
 
 PAST = 100_000
 BUDGETS = {"transition NORMAL us": 150.0, "transition FULL / DBOS step": 1.0, "recovery ms": 200.0}

@@ -35,9 +35,9 @@ import smachpy
 from actionlib_core.clock import Clock, RealClock, VirtualClock
 from smachpy.command.warm import Starter
 from smachpy.durable.mission import kept_mission, new_mission
+from smachpy.durable.opening import open_store
 from smachpy.durable.overview import overview
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store
 from smachpy.events.recording import Recorder, read_summary
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from actionlib_core.config import ROS2_VARIABLE, ROUTER_ENDPOINT, load_config
 from actionlib_core.exceptions import ConfigError, TransportError
 from actionlib_core.process.output import printable
 from smachpy.command.pruning import size_text
-from smachpy.durable.store import open_store, store_name
+from smachpy.durable.opening import open_store
+from smachpy.durable.store import store_name
 
 if TYPE_CHECKING:
     import argparse

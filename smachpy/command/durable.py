@@ -199,7 +199,8 @@ def journalled(
         yield
         return
     from smachpy.durable.mission import kept_mission
-    from smachpy.durable.store import Lease, open_store
+    from smachpy.durable.opening import open_store
+    from smachpy.durable.store import Lease
 
     info = mission_info(target.thing)
     limit = info.max_outage if options.max_outage is None else options.max_outage

@@ -164,8 +164,8 @@ def _submit(args: argparse.Namespace) -> int:
     from smachpy.command.needs import driven_robot, needed_servers
     from smachpy.command.targets import load_target
     from smachpy.durable.mission import new_mission
+    from smachpy.durable.opening import open_store
     from smachpy.durable.schedule import next_due, read_time
-    from smachpy.durable.store import open_store
     from smachpy.events.introspection import describe
 
     robot = robot_name(args.robot) if args.robot else None
@@ -247,7 +247,8 @@ def _open_in_time(args: argparse.Namespace, ending: Shutdown) -> Store | None:
     Returns:
         None if the process was asked to end before it answered.
     """
-    from smachpy.durable.store import StoreError, open_store
+    from smachpy.durable.opening import open_store
+    from smachpy.durable.store import StoreError
 
     wake = ending.event()
     is_told = False

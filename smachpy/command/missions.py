@@ -92,7 +92,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _open(args: argparse.Namespace) -> Any:
-    from smachpy.durable.store import open_store
+    from smachpy.durable.opening import open_store
 
     return contextlib.closing(open_store(args.durable, create=False))
 

@@ -182,7 +182,7 @@ def take_row(args: argparse.Namespace) -> None:
         TargetError: the row's target is not allowed, or it has other arguments.
         SmachError: the row cannot be read.
     """
-    from smachpy.durable.store import open_store
+    from smachpy.durable.opening import open_store
 
     with contextlib.closing(open_store(args.durable, create=False)) as store:
         row = store.mission(args.mission)
@@ -197,8 +197,9 @@ def take_row(args: argparse.Namespace) -> None:
 def given_back(args: argparse.Namespace) -> Iterator[None]:
     """Note in a row why its mission did not begin, if a runner reserved it for this process."""
     from smachpy.durable.mission import note_of
+    from smachpy.durable.opening import open_store
     from smachpy.durable.processes import this_runner
-    from smachpy.durable.store import Lease, open_store
+    from smachpy.durable.store import Lease
 
     try:
         yield

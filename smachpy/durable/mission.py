@@ -15,10 +15,11 @@ from smachpy.base.problems import Problems
 from smachpy.durable import structure
 from smachpy.durable.held import Held
 from smachpy.durable.journal import Journal, read_position
+from smachpy.durable.opening import open_store
 from smachpy.durable.position import VERSION, Position
 from smachpy.durable.processes import this_runner
 from smachpy.durable.recorder import Recorder, SteadyTime
-from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, StoreError, open_store
+from smachpy.durable.store import INTERRUPTED, OVER, QUEUED, MissionRow, StoreError
 from smachpy.engine.journal import NO_JOURNAL
 from smachpy.engine.preempt import asking, request_soon
 from smachpy.exceptions import MissionError

@@ -32,8 +32,9 @@ from actionlib_core.ros1 import frames, rpc
 from actionlib_core.transport.tokens import parse_token
 from smachpy.checks.suppression import read_settings
 from smachpy.durable.mission import new_mission
+from smachpy.durable.opening import open_store
 from smachpy.durable.overview import overview
-from smachpy.durable.store import StoreError, open_store
+from smachpy.durable.store import StoreError
 from smachpy.events.introspection import StateRecord, describe
 from smachpy.events.recording import Recorder, read_recording
 from smachpy.exceptions import SmachError

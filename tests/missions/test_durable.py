@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from smachpy.durable.mission import kept_mission, new_mission
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from smachpy.machines.mission_info import mission_info
 from tests.missions.test_twice import (
     OTHERS,

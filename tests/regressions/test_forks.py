@@ -15,7 +15,8 @@ from actionlib_core.clock.forks import end_copy
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.shutdown.child_process import ChildProcess
 from smachpy import CBState, Concurrence, StateMachine
-from smachpy.durable.store import StoreError, open_store
+from smachpy.durable.opening import open_store
+from smachpy.durable.store import StoreError
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork"),

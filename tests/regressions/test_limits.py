@@ -326,7 +326,7 @@ READERS = {
         import smachpy
         from smachpy.durable.journal import MAX_STATE_DEPTH, read_position
         from smachpy.durable.mission import new_mission
-        from smachpy.durable.store import open_store
+        from smachpy.durable.opening import open_store
         machine = smachpy.StateMachine(["a"], name="M")
         machine.add("A", smachpy.CBState(lambda _: "a", outcomes=["a"]))
         store = open_store(tmp / "j.db")
@@ -342,7 +342,7 @@ READERS = {
         from smachpy.durable.journal import read_position
         from smachpy.durable.mission import new_mission
         from smachpy.durable.sqlite import MAX_VALUE_BYTES
-        from smachpy.durable.store import open_store
+        from smachpy.durable.opening import open_store
         machine = smachpy.StateMachine(["a"], name="M")
         machine.add("A", smachpy.CBState(lambda _: "a", outcomes=["a"]))
         store = open_store(tmp / "j.db")
@@ -391,7 +391,7 @@ READERS = {
     """,
     "a journal: a view that never ends": """
         import sqlite3
-        from smachpy.durable.store import open_store
+        from smachpy.durable.opening import open_store
         open_store(tmp / "j.db").close()
         with sqlite3.connect(tmp / "j.db") as other:
             other.execute("CREATE VIEW v AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n) SELECT * FROM n")

@@ -30,7 +30,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 
 ROBOTS = ("r1", "r2")
 NAMES = ("{}", "/{}", "")  # the last: the mission's action says which robot it is

@@ -16,7 +16,7 @@ from actionlib_core.wire.ros2.graph import RosNode, RosType
 from actionlib_core.wire.ros2.names import Kind
 from smachpy.command import doctor, main
 from smachpy.command.doctor import look_at
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from tests.free_port import free_port
 from tests.ros2_server import Ros2Server
 

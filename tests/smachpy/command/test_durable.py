@@ -16,8 +16,9 @@ import pytest
 from smachpy.command import main
 from smachpy.command.fleet import Runner
 from smachpy.command.pruning import size_text
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import PAGE, open_store
+from smachpy.durable.store import PAGE
 from smachpy.events.recording import read_recording
 from smachpy_viz.runs.listing import run_row
 from smachpy_viz.runs.statistics import Statistics

@@ -18,8 +18,9 @@ from smachpy.command.durable import whole_target
 from smachpy.command.queued import Allowed, arguments_of, check_is_mission
 from smachpy.command.targets import TargetError, load_target
 from smachpy.durable.mission import new_mission
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import for_child, open_store, store_name
+from smachpy.durable.store import for_child, store_name
 
 MISSION = """
 import subprocess

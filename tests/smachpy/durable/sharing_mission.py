@@ -16,7 +16,7 @@ from typing import Any
 
 from smachpy import State, StateMachine
 from smachpy.durable.mission import kept_mission, new_mission
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from smachpy.events import ResourceUse
 
 

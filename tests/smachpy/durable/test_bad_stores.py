@@ -13,8 +13,9 @@ from dataclasses import replace
 import pytest
 
 import smachpy
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import StoreError, digest_of, open_store
+from smachpy.durable.store import StoreError, digest_of
 from smachpy.engine.interrupt import Interruption
 from smachpy.exceptions import MissionError
 from tests.free_port import free_port
@@ -261,7 +262,8 @@ def test_a_full_disk_loses_nothing_that_was_written(place):
 NO_ROOM = """
 import resource, signal, sys
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store, StoreError
+from smachpy.durable.opening import open_store
+from smachpy.durable.store import (StoreError)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 store = open_store(sys.argv[1])
 lease = store.claim("m1", this_runner(), seconds=60)

@@ -7,8 +7,8 @@ import itertools
 import smachpy
 from smachpy.durable import journal
 from smachpy.durable.journal import SNAPSHOT_EVERY, read_position
+from smachpy.durable.opening import open_store
 from smachpy.durable.position import Position
-from smachpy.durable.store import open_store
 from tests.smachpy.checks.test_growth import lines_run
 
 STEPS = 5 * SNAPSHOT_EVERY // 2

@@ -15,8 +15,8 @@ import pytest
 import smachpy
 from smachpy import CBState, StateMachine
 from smachpy.durable.journal import read_position
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store
 from tests.postgres_server import PostgresServer
 from tests.smachpy.durable.test_stores import LONG_S, ROW
 

@@ -19,7 +19,7 @@ from actionlib_core import node
 from smachpy.command import main
 from smachpy.command.durable import whole_target
 from smachpy.command.fleet import MAX_UNFIT_STARTS, _Rest, recording_name
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from smachpy.events.recording import read_recording
 from tests.smachpy.durable.test_stores import ROW
 

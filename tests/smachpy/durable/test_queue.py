@@ -16,14 +16,9 @@ from dataclasses import replace
 import pytest
 
 from smachpy.durable import sql, sql_queue, sqlite
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import (
-    FencedError,
-    MissionInUseError,
-    MissionOverError,
-    StoreError,
-    open_store,
-)
+from smachpy.durable.store import FencedError, MissionInUseError, MissionOverError, StoreError
 from tests.smachpy.durable.test_stores import LONG_S, ROW
 
 ELSEWHERE = "elsewhere:7"
@@ -374,7 +369,7 @@ def test_who_listens_is_woken_by_what_comes_into_the_queue(store):
 KILLED = """
 import os, signal, sys
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 
 place, act, kill_at = sys.argv[1], sys.argv[2], int(sys.argv[3])
 store = open_store(place)
@@ -506,7 +501,8 @@ def test_prune_lets_others_write_between_parts_of_bounded_size(tmp_path, monkeyp
 
 NO_ROOM = """
 import resource, signal, sys
-from smachpy.durable.store import open_store, StoreError
+from smachpy.durable.opening import open_store
+from smachpy.durable.store import (StoreError)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 store = open_store(sys.argv[1])
 size = int(sys.argv[2])

@@ -14,8 +14,8 @@ from smachpy import StateMachine
 from smachpy.command import main
 from smachpy.durable.held import Held
 from smachpy.durable.mission import new_mission
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,9 +9,10 @@ import pytest
 
 import smachpy
 from smachpy.durable.mission import new_mission
+from smachpy.durable.opening import open_store
 from smachpy.durable.overview import overview
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import StoreError, open_store
+from smachpy.durable.store import StoreError
 from tests.places import DOCS
 
 pytestmark = pytest.mark.postgres

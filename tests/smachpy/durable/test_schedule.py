@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 
 import pytest
 
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
 from smachpy.durable.schedule import ScheduleError, next_due, next_of, read_time
-from smachpy.durable.store import open_store
 from tests.smachpy.durable.test_stores import ROW
 
 NOW = datetime(2026, 3, 27, 9, 0, tzinfo=UTC).timestamp()  # a Friday

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import pytest
 
+from smachpy.durable.opening import open_store
 from smachpy.durable.processes import process_lives, process_mark, this_runner
 from smachpy.durable.store import (
     FencedError,
@@ -23,7 +24,6 @@ from smachpy.durable.store import (
     UnknownMissionError,
     host_and_pid,
     may_take,
-    open_store,
 )
 from smachpy.exceptions import MissionError
 
@@ -47,7 +47,7 @@ LONG_S = 3600.0
 HOLDER = """
 import sys
 from smachpy.durable.processes import this_runner
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 store = open_store(sys.argv[1])
 store.claim(sys.argv[2], this_runner(), seconds=float(sys.argv[3]))
 print("taken", flush=True)

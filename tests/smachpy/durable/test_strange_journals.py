@@ -15,8 +15,9 @@ import smachpy
 from actionlib_core.process.output import printable
 from smachpy import command
 from smachpy.durable.mission import new_mission
+from smachpy.durable.opening import open_store
 from smachpy.durable.position import Position
-from smachpy.durable.store import StoreError, open_store
+from smachpy.durable.store import StoreError
 from smachpy.exceptions import SmachError
 from smachpy_viz.live.journals import Journals
 

@@ -28,7 +28,7 @@ from actionlib_core.interfaces.geometry_msgs.msg import Point
 from smachpy import Secret, StateMachine, describe
 from smachpy.command import main
 from smachpy.command.targets import Target
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from smachpy.events import to_record
 from smachpy.network.values import value_text
 from smachpy.userdata.json_text import dumps, encoded

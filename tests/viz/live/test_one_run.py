@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from smachpy.command import main
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from smachpy.exceptions import SmachError
 from smachpy_viz.live import journals as journals_module
 from smachpy_viz.live.journals import Journals

@@ -11,7 +11,7 @@ import pytest
 
 import smachpy
 from smachpy import CBState, Concurrence, StateMachine, describe
-from smachpy.durable.store import open_store
+from smachpy.durable.opening import open_store
 from smachpy.events.recording import RecordingError, header_line, recording_lines
 from smachpy.exceptions import SmachError
 from smachpy_viz.live import runs as runs_module

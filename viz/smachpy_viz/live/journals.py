@@ -16,6 +16,7 @@ from actionlib_core.shutdown.child_process import python_command
 from smachpy.command import EXIT_ERROR
 from smachpy.command.queued import Allowed
 from smachpy.command.targets import TargetError
+from smachpy.durable.opening import open_store
 from smachpy.durable.overview import overview
 from smachpy.durable.store import (
     CANCELLED,
@@ -26,7 +27,6 @@ from smachpy.durable.store import (
     MissionOverError,
     Store,
     for_child,
-    open_store,
 )
 from smachpy.durable.store import store_name as _name
 from smachpy.events.outcome_classes import outcome_class
