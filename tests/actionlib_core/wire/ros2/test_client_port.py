@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import threading
 from collections import deque
 
 import pytest
@@ -604,6 +605,25 @@ def test_probe_that_waited_for_a_full_link_is_judged_after_it_was_sent(clock):
     probe.close()
     assert len(sent) > 1
     assert silent == []
+
+
+def test_link_is_probed_again_after_a_probe_that_raised(clock, monkeypatch):
+    told, asked, silent = [], [], []
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_type))
+
+    def ask():
+        asked.append(clock.now())
+        if len(asked) == 1:
+            raise ValueError
+        probe.note_received()
+        return contextlib.ExitStack()
+
+    probe = LinkProbe(clock, 5.0, ask, lambda: True, silent.append)
+    probe.watch()
+    clock.sleep(30.0)
+    probe.close()
+    assert len(asked) > 1
+    assert told == [ValueError]
 
 
 @pytest.mark.parametrize("answered", [{1}, {2}, set()])
