@@ -72,7 +72,6 @@ def _run(frame: Frame, parent_ud: Any) -> str:
     try:
         with FLAGS:  # a request comes either before this, or to this run
             live.frame = frame
-            live.runs += live.root is None  # a root has counted its run already
         if live.listeners or live.buffers:
             run.watched = True
         # A durable run that goes on inside this container has its userdata from the journal.

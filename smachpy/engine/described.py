@@ -127,7 +127,7 @@ class Live:
         control: The operator's control, once it was used.
         journal: The journal of its next run as a root.
         origin: Who asked it to stop before its run.
-        runs: Number of its runs that have begun.
+        ended: Grows whenever a run of it ends: what was asked before is for no later run.
         is_passing_on: A request to stop is being passed on to its children.
         end_waiters: Events to set when it stops running.
         goes_on: Its next run goes on where the last one was interrupted, with its userdata: "last",
@@ -138,7 +138,7 @@ class Live:
 
     __slots__ = (
         *("frame", "root", "coming", "callback", "plan", "listeners", "buffers"),
-        *("control", "journal", "origin", "runs", "is_passing_on", "end_waiters"),
+        *("control", "journal", "origin", "ended", "is_passing_on", "end_waiters"),
         *("goes_on", "stopped_at"),
     )
 
@@ -153,7 +153,7 @@ class Live:
         self.control: Gate | None = None
         self.journal: RunJournal = NO_JOURNAL
         self.origin: Origin | None = None
-        self.runs = 0
+        self.ended = 0
         self.is_passing_on = False
         self.end_waiters: list[ClockEvent] = []
         self.goes_on = ""

@@ -310,6 +310,7 @@ class Visit:
                     live.callback = None
                 if live.frame is each:
                     live.frame = None
+                    live.ended += live.root is None
                     each.container._preempt_requested = False
                     waiters, live.end_waiters = live.end_waiters, []
                     for ended in waiters:
@@ -602,8 +603,8 @@ def request(
     Args:
         container: The container. Before a run only its flag is set, and the next run ends at once.
         only: Ask only if the run of this frame is still on.
-        before: The number of its runs that had begun when it was asked, between two runs. If the
-            next one is over, too, nobody is asked.
+        before: What `Live.ended` was when it was asked, between two runs. If one has ended since,
+            the request was for that one, and nobody is asked.
 
     Returns:
         The run that was asked, or None.
@@ -613,7 +614,7 @@ def request(
     with asking(*origin):
         with FLAGS:
             frame = frame_of(container)
-            is_for_next = frame is None and only is None and before in {None, live.runs}
+            is_for_next = frame is None and only is None and before in {None, live.ended}
             if is_for_next:
                 live.origin = origin
                 container._preempt_requested = True  # the run that begins next sees it
@@ -626,24 +627,29 @@ def request(
             now = frame_of(container)
             # It may have just ended. Or it goes on in another frame: the user's code around its
             # children has begun them meanwhile.
-            if live.is_passing_on or now is None or not frame.run is now.run is wanted:
+            if now is None or not frame.run is now.run is wanted:
+                return None
+            if live.is_passing_on or before not in {None, live.ended}:
                 return None
             # A listener that answers each request with a further one would never come to an end.
             if container._preempt_requested and wanted.is_publishing():
                 return None
-            frame = now
-            if frame.run.journal.asked(frame, origin):
-                return None
-            if frame is live.root:
-                ask(frame)
-                if frame.run.control is not None:  # what may still run now is not to be held
-                    frame.run.control.stop(frame.run)
-            else:
-                try:
-                    pass_on(container)
-                except Exception as error:  # noqa: BLE001  reported; all children were asked
-                    frame.note_failure(frame.path, _request_of(container), error)
-        return frame.run
+            return None if wanted.journal.asked(now, origin) else _ask_in(now, container)
+
+
+def _ask_in(frame: Frame, container: Parent) -> Run:
+    """Ask a container that runs in `frame`, and all that runs in it; with the run's lock held."""
+    run = frame.run
+    if frame is container._smachpy.live.root:
+        ask(frame)
+        if run.control is not None:  # what may still run now is not to be held
+            run.control.stop(run)
+    else:
+        try:
+            pass_on(container)
+        except Exception as error:  # noqa: BLE001  reported; all children were asked
+            frame.note_failure(frame.path, _request_of(container), error)
+    return run
 
 
 def request_now(container: Parent, by: str = "") -> None:
@@ -661,8 +667,9 @@ def request_now(container: Parent, by: str = "") -> None:
     origin = current_origin()
     if by:
         origin = Origin("signal" if by in signal.Signals.__members__ else "program", by)
-    begun = container._smachpy.live.runs
+    ended = container._smachpy.live.ended
     frame = frame_of(container)
+    before = ended if frame is None else None  # else it is for the run of this frame
     clock = current_clock() if frame is None else frame.run.clock
     told = clock.event()
 
@@ -670,7 +677,7 @@ def request_now(container: Parent, by: str = "") -> None:
         token = REQUESTING.set(container)
         try:
             with asking(*origin):
-                run = request(container, frame, before=begun)
+                run = request(container, frame, before=before)
         finally:
             REQUESTING.reset(token)
             told.set()
@@ -966,6 +973,7 @@ def leave(frame: Frame) -> None:
             if visit is not None and visit.step.state is frame.container:
                 visit.answered = frame.answered
             frame.container._preempt_requested = False
+            live.ended += live.root is None  # else it goes on, with another attempt maybe
         waiters, live.end_waiters = live.end_waiters, []
     if frame.visit is not None:
         forget_visit(frame)

@@ -468,6 +468,7 @@ def _forget_late_request(top: Root) -> None:
             live.coming = None
         if live.frame is None and live.root is None and live.coming is None:
             root._preempt_requested = False  # else it may be for the next run, which has begun
+            live.ended += 1
 
 
 class Root(Branch):
@@ -550,7 +551,6 @@ class Root(Branch):
         self.visit = Visit(self, step, Phase.RUNNING)
         with self.run.lock, FLAGS:  # from here on a request belongs to this run
             live.root, live.coming = self, None
-            live.runs += 1
             is_asked = self._is_stopped or root._preempt_requested
         if live.control is not None:  # maybe since the start was published
             live.control.attach(self.run)
@@ -574,10 +574,15 @@ class Root(Branch):
         finally:
             if self.visit is not None:
                 forget_visit(self)
-            if live.root is self:
-                live.root = None
+            self._leave()
             if self.run.watched:
                 self.emit(Finished, outcome)
+
+    def _leave(self) -> None:
+        with FLAGS:
+            if self.live.root is self:
+                self.live.root = None
+                self.live.ended += 1
 
     def _begin(self) -> None:
         """Attach the journal, and publish the start."""
@@ -638,8 +643,6 @@ class Root(Branch):
             if self.ended:
                 return None
             self.ended = True
-            live = self.live
-            if live.root is self:
-                live.root = None
+            self._leave()
         self.outcome, self.error = outcome, error
         return self._done

@@ -252,13 +252,3 @@ def test_a_listener_that_asks_again_at_each_request_comes_to_an_end(clock):
     clock.call_later(1.0, machine.request_preempt)
     assert machine.execute() == "preempted"
     assert seen == ["/M", "/M/DRIVE"]
-
-
-def test_a_run_of_a_root_counts_once():
-    inner, machine = within(Wait(0.0)), within(Wait(0.0))
-    machine.add("IN", inner)
-    machine.set_initial_state(["IN"])
-    for number in (1, 2):
-        machine.execute()
-        assert machine._smachpy.live.runs == number
-    assert inner._smachpy.live.runs == 1
