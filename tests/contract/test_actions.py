@@ -27,10 +27,17 @@ from actionlib_core.time import Duration
 from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire.actions import pack_statuses
 from actionlib_core.wire.encoding import encoding_of
+from actionlib_core.wire.ros2 import server_port
 
 S = GoalStatus
 C = CommState
 LONG_S = 60.0
+
+
+@pytest.fixture
+def refuses_late(monkeypatch):
+    """Let a server take its time: on ROS 2 a goal that is undecided for long is accepted."""
+    monkeypatch.setattr(server_port, "DECISION_S", LONG_S)
 
 
 class Doubler:
@@ -126,9 +133,10 @@ def test_cancel_preempts(world):
 
 
 def test_execute_timeout_cancels(world):
-    Doubler(world)
+    doubler = Doubler(world)
     client = simple_client(world)
-    assert client.send_goal_and_wait(msg.TestGoal(-1), 0.2, LONG_S) == S.PREEMPTED
+    state = client.send_goal_and_wait(msg.TestGoal(-1), 0.2, LONG_S)
+    assert state == S.PREEMPTED or (state == S.RECALLED and not doubler.runs)  # a busy computer
 
 
 def test_newer_goal_preempts_the_running_one(world):
@@ -168,6 +176,7 @@ def test_queue_policy_runs_all(world):
     assert queueing.runs == list(range(5))
 
 
+@pytest.mark.usefixtures("refuses_late")
 def test_reject_policy_refuses_while_a_goal_runs(world):
     rejecting = Doubler(world, policy="reject")
     client = full_client(world)
@@ -202,6 +211,7 @@ def no_text(_error):
 
 @pytest.mark.parametrize("base", [Exception, BaseException])
 @pytest.mark.parametrize("style", ["execute", "goal callback"])
+@pytest.mark.usefixtures("refuses_late")
 def test_exception_without_a_text_ends_its_goal_too(world, caplog, monkeypatch, style, base):
     """Its goal stayed ACTIVE for ever, and the server took no other."""
     mute = type("Mute", (base,), {"__str__": no_text, "__repr__": no_text})
@@ -228,6 +238,7 @@ def test_exception_without_a_text_ends_its_goal_too(world, caplog, monkeypatch, 
         assert reported.wait(LONG_S)
 
 
+@pytest.mark.usefixtures("refuses_late")
 def test_goal_callback_style_accepts_and_rejects(world):
     server = SimpleActionServer("demo", msg.TestAction, auto_start=False, node=world.node("server"))
 
@@ -527,6 +538,7 @@ def test_wrong_type_is_an_error_on_both_sides(world, caplog):
 # -- the full pair -------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("refuses_late")
 def test_many_goals_each_accepted_rejected_or_cancelled(world):
     handles = {}
 
@@ -565,6 +577,7 @@ def test_many_goals_each_accepted_rejected_or_cancelled(world):
     server.stop()
 
 
+@pytest.mark.usefixtures("refuses_late")
 def test_goal_callback_that_raises_ends_the_goal(world, monkeypatch):
     raised, both = [], world.event()
 

@@ -199,11 +199,13 @@ def test_the_view_in_a_terminal_shows_none(clock):
 
     async def look():
         app = MissionApp(machines, lambda *_: {"text": "told" + BAD})
+        app.NOTIFICATION_TIMEOUT = 600.0
         async with app.run_test(size=(150, 50)) as pilot:
             app.refresh_view()
             for key in ("comma", "comma", "l", "s"):
                 await pilot.press(key)
-                await pilot.pause(0.05)
+                while key == "s" and not app._notifications:  # it tells the command's answer
+                    await pilot.pause(0.01)
                 app.refresh_view()
                 shown.extend(str(one.render()) for one in app.query(Static))
                 shown.extend(str(node.label) for node in _nodes(app.query_one(Tree).root))
