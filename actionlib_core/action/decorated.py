@@ -121,6 +121,8 @@ class GoalContext(Generic[F]):
         """Wait until the goal is asked to stop; return whether it is, or has ended.
 
         Blocks: until then, `timeout` [s] at most; None: no limit.
+
+        Threads: any; one that outlives the function hears of the goal's end.
         """
         self.accept()
         return self._is_over() or self._runner.wait_preempt(timeout) or self._is_over()
@@ -209,6 +211,8 @@ class _DecoratedServer(SimpleActionServer):
         else:
             context.accept()
             self._end("return", "succeed", result, "")
+        finally:
+            self._preempted.set()  # wakes a thread of the function that outlives it
 
 
 class RunningServer:

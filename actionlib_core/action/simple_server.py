@@ -284,15 +284,13 @@ class SimpleActionServer:
     def _take_next(self) -> ServerGoalHandle | None:
         """Make the waiting goal the current one, not yet accepted; None when none waits."""
         with self.lock:
-            # `_preempted` follows `preempt_requested`, which here still belongs to the goal before.
-            asked = self._policy.preempt_requested
             new, replaced = self._policy.accept()
             if new is None:
                 return None
             if self._policy.preempt_requested:
                 self._tell_preempt()
-            elif asked:
-                self._preempted.clear()
+            else:
+                self._preempted.clear()  # it was for the goal before
         # Without the lock: sending the result blocks while a link is full.
         if replaced is not None:
             with contextlib.suppress(IllegalTransitionError):  # its own code has just ended it

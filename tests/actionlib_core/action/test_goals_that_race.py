@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from actionlib_core import (
+    Abort,
     ActionClient,
     ActionServer,
     SimpleActionClient,
@@ -261,6 +262,32 @@ def test_a_thread_that_outlives_its_goal_is_not_told_of_the_next_one(world):
         world.clock.sleep(1.0)
     assert asked == [True, True, False]
     assert heard == [2]
+
+
+@pytest.mark.parametrize("end", [None, Abort("no way"), ValueError("a slip")])
+def test_a_thread_that_waits_for_a_preempt_hears_of_the_end_of_its_goal(world, end, caplog):
+    """It slept on through all later goals, until one of them was asked to stop."""
+    heard = []
+
+    @server("a", TestAction)
+    def drive(goal, context):
+        def watch():
+            heard.append((goal.goal, context.wait_preempt(), world.clock.now() - begun))
+
+        begun = world.clock.now()
+        world.clock.spawn(watch, name="watch")
+        world.clock.sleep(1.0)
+        if end is not None:
+            raise end
+        return TestResult(goal.goal)
+
+    with drive.start(node=world.robot):
+        sender = client(world)
+        for number in (1, 2):
+            sender.send_goal(TestGoal(number))
+            assert sender.wait_for_result(60.0)
+            world.clock.sleep(1.0)
+            assert heard == [(n, True, 1.0) for n in range(1, number + 1)]
 
 
 def test_a_server_whose_preempt_cannot_be_told_leaves_the_network_all_the_same(world):
