@@ -571,13 +571,14 @@ class Terminated(KeyboardInterrupt):
 
 
 @contextlib.contextmanager
-def terminable() -> Iterator[None]:
+def terminable(signals: Iterable[int] | None = None) -> Iterator[None]:
     """Raise `Terminated` on the signals that end a program by default, inside the `with` block.
 
     They would end Python at once, without any `finally` of the command. Ctrl-C raises
-    KeyboardInterrupt anyway. A signal within `ECHO_S` of the first is its echo, as when a terminal
-    is closed: it would end what the first has begun. In a thread that may not handle signals
-    nothing is done.
+    KeyboardInterrupt anyway. `signals` are others to raise it on, as those of `handle_signals`
+    before there is anything to stop; ignored ones stay so. A signal within `ECHO_S` of the first is
+    its echo, as when a terminal is closed: it would end what the first has begun. In a thread that
+    may not handle signals nothing is done.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -595,17 +596,20 @@ def terminable() -> Iterator[None]:
             return
         raise Terminated(number)
 
-    taken = [number for number in default_signals() if number != signal.SIGINT]
+    if signals is None:
+        signals = [number for number in default_signals() if number != signal.SIGINT]
+    handlers = ((number, signal.getsignal(number)) for number in signals)
+    before = {number: handler for number, handler in handlers if handler is not signal.SIG_IGN}
 
     def restore() -> None:
-        for number in taken:
+        for number, handler in before.items():
             if signal.getsignal(number) is on_signal:
-                signal.signal(number, signal.SIG_DFL)
+                signal.signal(number, handler)
 
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     try:
         restorers.append(restore)
-        for number in taken:
+        for number in before:
             signal.signal(number, on_signal)
         yield
     finally:

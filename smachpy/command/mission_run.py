@@ -124,7 +124,10 @@ def run_mission(target: Target, options: RunOptions) -> int:
             open_surroundings(options.pace, options.robot, options.names, options.namespace)
         )
         kept = options.durable is not None
-        machine = build(target, options.inputs, options.words, kept=kept)
+        if ending.requested():
+            return signal_exit(ending)
+        with shutdown.terminable(shutdown.SIGNALS):  # there is nothing to preempt yet
+            machine = build(target, options.inputs, options.words, kept=kept)
         record = describe(machine)
         _check_success(target, record, options)
         out = None

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from actionlib_core import node
+from actionlib_core import node, shutdown
 from smachpy.command import main
 from smachpy.places.maps import OFFICE_MAP
 from tests.places import ROOT
@@ -152,6 +152,20 @@ def test_a_signal_stops_the_robot_and_everything_ends_soon(far, number, code):
         assert "PATROL: preempted" in output
         assert "stopped on request" in output
         assert not is_alive(robot)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_a_mission_that_is_being_built(number, tmp_path, capsys):
+    """It was heard when the function had returned, which may compute for a minute."""
+    (tmp_path / "slow.py").write_text(
+        f"import signal\n\ndef mission():\n    signal.raise_signal({number:d})\n"
+        '    print("went on")\n'
+    )
+    before = [signal.getsignal(each) for each in shutdown.SIGNALS]
+    assert main(["run", str(tmp_path / "slow.py")]) == shutdown.EXIT_SIGNAL + number
+    assert [signal.getsignal(each) for each in shutdown.SIGNALS] == before
+    assert "went on" not in capsys.readouterr().out
+    assert not shutdown.requested()
 
 
 @pytest.mark.slow
