@@ -92,7 +92,7 @@ class Step:
         facts: The fields that are compared.
         lane: The branch in which it happened, "" for the trunk.
         took: How long the attempt took that it ends [s].
-        index: Number among all events, from 0.
+        index: Number among all events of its run, from 0.
         t: When, by the mission's clock [s].
     """
 

@@ -15,7 +15,15 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.pubsub.topic import Publisher
 from smachpy.engine.control import ControlError
 from smachpy.engine.preempt import asking
-from smachpy.events import Entered, GoalSent, Left, PreemptRequested, QuestionAsked, Started
+from smachpy.events import (
+    Entered,
+    GoalFeedback,
+    GoalSent,
+    Left,
+    PreemptRequested,
+    QuestionAsked,
+    Started,
+)
 from smachpy.events.inputs import message_value
 from smachpy.events.introspection import describe
 from smachpy.reproduce.compare import Odd, Said, place
@@ -120,7 +128,7 @@ class Player:
         said: What conditions said of messages.
         odd_requests: Requests to services that differ from the recorded ones; `at` is a moment of
             this run.
-        count: Number of events until now.
+        count: Number of events until now, besides feedback: not all that was recorded comes again.
     """
 
     def __init__(self, kit: MissionKit, world: World, events: list[dict[str, Any]]) -> None:
@@ -237,6 +245,8 @@ class Player:
             return None
 
     def _on_event(self, event: Event) -> None:
+        if isinstance(event, GoalFeedback):
+            return
         self._aligned.on_event(event)
         if self.count in self._world.pauses:
             self._machine.control.pause()

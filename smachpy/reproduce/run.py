@@ -190,7 +190,7 @@ def reproduce(
         now = buffer.read()
     comparison = compare(
         steps_of(events, recording.record, recorded_cancels(world), tolerate),
-        steps_of(now, record, cancelled, tolerate),
+        steps_of(first_run(now), record, cancelled, tolerate),
         is_complete=world.is_complete,
         limits=limit_changes(recording.record, record),
         changed=own_states(record) if code_has_changed(recording) else (),

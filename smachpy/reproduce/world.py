@@ -180,7 +180,7 @@ class World:
         own: Topic on which the mission publishes -> how many subscribers it had had when each of
             these messages was published.
         acts: Everything else, in order.
-        pauses: Numbers, among the run's events, of those after which an operator paused it.
+        pauses: Numbers, in `first_run`, of the events after which an operator paused it.
         breakpoints: Paths of states before which it stopped.
         once: Path of a state and key -> what its calls of `smachpy.once` returned, as recorded.
         lacks: What the recording does not say, in words.
@@ -201,7 +201,10 @@ class World:
 
 
 def first_run(events: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the events of the first run in a recording, up to an outage of its process."""
+    """Return the events of the first run in a recording, up to an outage of its process.
+
+    Feedback is left out: what is recorded of it was only shown, and does not come again.
+    """
     found: list[dict[str, Any]] = []
     root = ""
     for event in events:
@@ -214,7 +217,8 @@ def first_run(events: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
             root = path
         elif kind == "Recovered" or event.get("dropped"):
             break
-        found.append(dict(event))
+        if kind != "GoalFeedback":
+            found.append(dict(event))
         if kind == "Finished" and path == root:
             break
     return found

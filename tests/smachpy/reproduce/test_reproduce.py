@@ -654,6 +654,31 @@ def test_answers_and_commands_of_operators_come_again(tmp_path):
     assert again == kinds
 
 
+def driving_and_waiting():
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="DRIVES")
+    with sm:
+        drive = smachpy.SimpleActionState("move_base", MoveBaseAction)
+        sm.add("DRIVE", drive, {"succeeded": "WAIT"})
+        sm.add("WAIT", Wait(1.0), {"done": "succeeded"})
+    return sm
+
+
+def test_a_run_is_paused_again_after_feedback_that_only_the_page_shows(tmp_path):
+    """The feedback is recorded and does not come again: the run was never paused."""
+    path = tmp_path / "run.jsonl"
+    with mission_kit() as kit:
+        robot = kit.action_server("move_base", MoveBaseAction)
+        robot.reply(duration=3.0, feedback=[{}, {}])
+        machine = driving_and_waiting()
+        kit.trigger(lambda _: machine.control.pause(), at=2.0)
+        kit.trigger(lambda _: machine.control.resume(), at=7.0)
+        with Recorder(path, machine):
+            kit(machine)
+    found = reproduce(read_recording(path), make=driving_and_waiting)
+    assert found.is_same, lines_of(found)
+    assert [one["t"] for one in found.events if one["kind"] == "Resumed"] == [pytest.approx(7.0)]
+
+
 def driving_home():
     sm = StateMachine(["succeeded", "aborted", "preempted"], name="DRIVES")
     with sm:
