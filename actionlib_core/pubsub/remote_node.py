@@ -31,7 +31,7 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy
 from actionlib_core.wire.ros2.network import choose_network
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
     from typing import TypeAlias
 
     from actionlib_core.node import Node
@@ -58,6 +58,7 @@ _FIELDS = {
 }
 """The field of a ParameterValue that holds its value, by its `type` (ParameterType)."""
 _NUMBERS = {field: number for number, field in _FIELDS.items()}
+_ARRAYS = frozenset(number for number, field in _FIELDS.items() if field.endswith("array_value"))
 _PARTS: Any = {bool: BoolParameter, int: IntParameter, float: DoubleParameter, str: StrParameter}
 
 
@@ -161,11 +162,15 @@ class RemoteNode(_ServicesOfNode):
         return found
 
     def _values(self, names: tuple[str, ...]) -> list[Any]:
+        return [value_of(message) for message in self._messages(names)]
+
+    def _messages(self, names: Iterable[str]) -> list[Any]:
+        """Return the ParameterValues; an empty list if one of them is undeclared."""
         response = self._call("get_parameters", "rcl_interfaces/GetParameters", names=list(names))
-        return [value_of(value) for value in response.values]
+        return list(response.values)
 
     def set_parameters(self, values: Mapping[str, Value]) -> None:
-        """Set parameters by name.
+        """Set parameters by name; an empty list is of the type that the parameter has.
 
         Raises:
             RemoteNodeError: some values are not possible for a parameter, and nothing was sent; or
@@ -174,9 +179,17 @@ class RemoteNode(_ServicesOfNode):
         make: Any = ros2.get_message("rcl_interfaces/ParameterValue", self._distro)
         make_parameter: Any = ros2.get_message("rcl_interfaces/Parameter", self._distro)
         parameters, problems = [], {}
+        empty = [name for name, value in values.items() if isinstance(value, list) and not value]
+        now = self._messages(empty) if empty else []
+        arrays = {
+            name: make(type=message.type)
+            for name, message in zip(empty, now, strict=False)
+            if message.type in _ARRAYS
+        }
         for name, value in values.items():
             try:
-                parameters.append(make_parameter(name=name, value=parameter_value(value, make)))
+                message = arrays.get(name) or parameter_value(value, make)
+                parameters.append(make_parameter(name=name, value=message))
             except ValueError as error:
                 problems[name] = str(error)
         if problems:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actionlib_core.exceptions import RemoteNodeError, ServiceException, WaitTimeoutError
@@ -22,7 +24,7 @@ from smachpy.machines.state import State
 from smachpy.userdata.secret import masked
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from typing import Protocol, TypeVar, Unpack
 
     from actionlib_core.time import Duration
@@ -46,6 +48,8 @@ NODE_S: Final = 10.0  # [s] a node answers in a moment; this includes the wait f
 LIFECYCLE_S: Final = 60.0  # [s] a node reads maps and plugins when it is configured
 MOVING_S: Final = 0.5  # [s] a node that is between two states, because of somebody, is asked again
 BEFORE: Final = "parameters_before"
+
+_NOTING: Final = threading.Lock()
 
 TARGETS: Final = ("unconfigured", "inactive", "active", "finalized")
 _WAYS: Final = {
@@ -76,7 +80,7 @@ class SetParameters(State):
     Args:
         node: Name of the node.
         values: Name of the parameter -> value: a bool, int, float or str, in ROS 2 also bytes or a
-            list of one of them. A whole number for a parameter that is a float is sent as one.
+            list of one of them. Whole numbers for a parameter of floats are sent as floats.
         before: The userdata key.
         ros1: The node is one of ROS 1, and has dynamic_reconfigure, as the parts of move_base have
             (`move_base/DWAPlannerROS`). Parameters that a node reads only when it starts are not
@@ -136,23 +140,24 @@ class SetParameters(State):
 
             # A process that is killed after it has set them must not take them for the old ones.
             now = read() if frame is None else frame.run.journal.once(frame, "parameters", read)
-            values = {
-                name: float(value) if type(now[name]) is float and type(value) is int else value
-                for name, value in self.__values.items()
-            }
-            wire = {"ros1": True} if self.__ros1 else {}
-            kept = _copy(userdata[self.__before]) if self.__before in userdata else {}
-            earlier = kept.setdefault(remote.name, {})
-            for name, value in values.items():
-                was = earlier[name]["was"] if name in earlier else now[name]
-                earlier[name] = {"was": was, "set": value} | wire
-            userdata[self.__before] = kept
+            values = {name: _like(now[name], value) for name, value in self.__values.items()}
+
+            def note(given: Mapping[str, Any]) -> None:
+                with _noting(userdata, self.__before) as kept:
+                    entries = kept.setdefault(remote.name, {})
+                    for name, value in given.items():
+                        entry = entries.setdefault(name, {"was": now[name], "set": []})
+                        if not _is_one_of(value, entry["set"]):
+                            entry["set"] = [*entry["set"], value]
+                        if self.__ros1:
+                            entry["ros1"] = True
+
+            note(values)
             try:
                 call(lambda: remote.set_parameters(values))
             except RemoteNodeError as error:
-                for name, value in error.values.items():  # beyond a limit of it: that is set back
-                    earlier[name]["set"] = value
-                userdata[self.__before] = _copy(kept)
+                if error.values:  # beyond a limit of the node: that is set back, too
+                    note(error.values)
                 raise
 
         return _talk(self, _kind_of(self.__ros1), self.__node, self.__timeout_s, change)
@@ -207,9 +212,8 @@ class RestoreParameters(State):
 
         Blocks: until all nodes have answered, `timeout` for each, or a preempt.
         """
-        kept = _copy(userdata[self.__before]) if self.__before in userdata else {}
         outcome = "succeeded"
-        for node, entries in [*kept.items()]:
+        for node, entries in _kept(userdata, self.__before).items():
 
             def restore(remote: Any, call: Call, entries: Any = entries) -> None:
                 names, missing = list(entries), None
@@ -222,10 +226,10 @@ class RestoreParameters(State):
                 others = {
                     name: value
                     for name, value in now.items()
-                    if value not in (entries[name]["set"], entries[name]["was"])
+                    if not _is_one_of(value, [*entries[name]["set"], entries[name]["was"]])
                 }
                 for name, value in others.items():
-                    got, ours = masked(value, name), masked(entries[name]["set"], name)
+                    got, ours = masked(value, name), masked(entries[name]["set"][-1], name)
                     log.logwarn(
                         f"{_where(self)}: /{remote.name}: {name}: got {got!r}; expected {ours!r}, "
                         "which this mission has set. Somebody has changed it since; it is left as "
@@ -242,8 +246,8 @@ class RestoreParameters(State):
             ros1 = any(entry.get("ros1") for entry in entries.values())
             ended = _talk(self, _kind_of(ros1), f"/{node}", self.__timeout_s, restore)
             if ended == "succeeded":
-                del kept[node]
-                userdata[self.__before] = _copy(kept)
+                with _noting(userdata, self.__before) as kept:
+                    kept.pop(node, None)
             else:
                 outcome = ended
             if ended == "preempted":
@@ -370,8 +374,33 @@ def _where(state: State) -> str:
     return current_path() or type(state).__name__
 
 
-def _copy(kept: Mapping[str, Any]) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return a copy that may be changed: a value of the userdata belongs to everybody."""
+def _like(now: Any, value: Any) -> Any:
+    """Return a value as the parameter has it: whole numbers as floats, and a tuple as a list."""
+    if isinstance(value, (list, tuple)):
+        inner = now[0] if isinstance(now, list) and now else None
+        return [_like(inner, item) for item in value]
+    return float(value) if type(now) is float and type(value) is int else value
+
+
+def _is_one_of(value: Any, others: Iterable[Any]) -> bool:
+    """Return whether a value is one of others; NaN is itself."""
+    return any(value == other or repr(value) == repr(other) for other in others)
+
+
+def _kept(userdata: UserData, key: str) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return a copy of what the key has: a value of the userdata belongs to everybody."""
+    if key not in userdata:
+        return {}
     return {
-        node: {name: dict(each) for name, each in entries.items()} for node, entries in kept.items()
+        node: {name: dict(each) for name, each in entries.items()}
+        for node, entries in userdata[key].items()
     }
+
+
+@contextlib.contextmanager
+def _noting(userdata: UserData, key: str) -> Iterator[dict[str, dict[str, dict[str, Any]]]]:
+    """Change what the key has, so that no branch loses what another one has noted meanwhile."""
+    with _NOTING:
+        kept = _kept(userdata, key)
+        yield kept
+        userdata[key] = kept

@@ -22,6 +22,7 @@ SERVICES: Final = {
     "get_state": "lifecycle_msgs/GetState",
     "change_state": "lifecycle_msgs/ChangeState",
 }
+STRING_ARRAY: Final = 9  # of rcl_interfaces/ParameterType
 MOVES: Final = {
     ("unconfigured", "configure"): "inactive",
     ("inactive", "activate"): "active",
@@ -114,25 +115,26 @@ class ScriptedNode(ScriptedEnd):
     def _get(self, request: Any, response: Any) -> Any:
         make: Any = ros2.get_message("rcl_interfaces/ParameterValue")
         if set(request.names) <= set(self.parameters):  # as rclcpp: otherwise an empty list
-            response.values = [
-                parameter_value(self.parameters[name], make) for name in request.names
-            ]
+            response.values = [_message(self.parameters[name], make) for name in request.names]
         return response
 
     def _set(self, request: Any, response: Any) -> Any:
         result: Any = ros2.get_message("rcl_interfaces/SetParametersResult")
+        make: Any = ros2.get_message("rcl_interfaces/ParameterValue")
         results, changed = [], {}
         for parameter in request.parameters:
             name, value = parameter.name, value_of(parameter.value)
             reason = self.refused.get(name, "")
             if name not in self.parameters:
                 reason = f"parameter '{name}' cannot be set because it was not declared"
-            elif type(value) is not type(self.parameters[name]):
-                old, new = type(self.parameters[name]).__name__, type(value).__name__
-                reason = (
-                    f"Wrong parameter type, parameter {{{name}}} is of type {{{old}}}, setting it "
-                    f"to {{{new}}} is not allowed."
-                )
+            else:
+                old = _type_of(_message(self.parameters[name], make))
+                new = _type_of(parameter.value)
+                if not (old.startswith(new) or new.startswith(old)):  # "list" has nothing in it
+                    reason = (
+                        f"Wrong parameter type, parameter {{{name}}} is of type {{{old}}}, setting "
+                        f"it to {{{new}}} is not allowed."
+                    )
             if not reason:
                 changed[name] = self.parameters[name] = value
             results.append(result(successful=not reason, reason=reason))
@@ -189,3 +191,15 @@ class ScriptedRos1Node(ScriptedNode):
         for name, value in self.parameters.items():
             add_to_config(response.config, name, value)
         return response
+
+
+def _message(value: Any, make: Any) -> Any:
+    """Return the ParameterValue of a value; an empty list is one of texts."""
+    return make(type=STRING_ARRAY) if value == [] else parameter_value(value, make)
+
+
+def _type_of(message: Any) -> str:
+    """Return the type of a ParameterValue for a text: "float", "list of int", "list" if empty."""
+    value = value_of(message)
+    inner = f" of {type(value[0]).__name__}" if isinstance(value, list) and value else ""
+    return f"{type(value).__name__}{inner}"

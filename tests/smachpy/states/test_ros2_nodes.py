@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from smachpy import Concurrence, InvalidStateError, State, StateMachine
@@ -199,6 +201,49 @@ def test_a_node_that_restarts_has_its_own_values_again(mission, controller):
     assert controller.parameters == FAST
 
 
+def test_what_was_set_first_is_set_back_if_the_node_refuses_the_second_value(mission, controller):
+    sm = StateMachine(ENDS, name="TWICE")
+    sm.add("SLOW", SetParameters("controller", SLOW), {"succeeded": "SLOWER"})
+    sm.add("SLOWER", SetParameters("controller", {"max_vel_x": "0.1"}))
+    sm.add_cleanup("RESTORE", RestoreParameters())
+    mission(sm).assert_outcome("aborted")
+    assert controller.parameters == FAST
+
+
+@pytest.mark.parametrize(
+    ("was", "value", "sent"),
+    [
+        ([0.5, 1.0], (0.1, 0.2), [0.1, 0.2]),
+        ([0.5, 1.0], [1, 2], [1.0, 2.0]),
+        (0.5, math.nan, math.nan),
+        (math.nan, 0.5, 0.5),
+        ([], ["scan"], ["scan"]),
+    ],
+)
+def test_values_of_every_form_are_set_back(mission, was, value, sent):
+    node = mission.ros2_node("costmap", {"x": was, "speed": 1.0})
+    sm = StateMachine(ENDS, name="M")
+    sm.add("SET", SetParameters("costmap", {"x": value, "speed": 2.0}))
+    sm.add_cleanup("RESTORE", RestoreParameters())
+    mission(sm).assert_outcome("succeeded")
+    told = [repr(each["x"]) for each in node.changes]
+    assert told == [repr(sent), repr(was)]
+    assert node.parameters["speed"] == 1.0
+
+
+def test_a_branch_that_is_limited_keeps_what_another_one_has_noted_meanwhile(mission, controller):
+    planner = mission.ros1_node("move_base/Planner", {"max_vel_x": 0.5})
+    planner.highest, planner.takes = {"max_vel_x": 0.8}, {"set_parameters": 2.0}
+    both = Concurrence(ENDS, "succeeded")
+    both.add("A", SetParameters("move_base/Planner", {"max_vel_x": 3.0}, ros1=True))
+    both.add("B", SetParameters("controller", SLOW))
+    both.add_cleanup("RESTORE", RestoreParameters())
+    controller.takes["get_parameters"] = 3.0  # between the planner's answers, at 2 and at 4 s
+    mission(both).assert_outcome("succeeded")
+    assert controller.parameters == FAST
+    assert planner.parameters == {"max_vel_x": 0.5}
+
+
 def test_what_could_not_be_restored_stays_in_the_key(mission, controller, caplog):
     class Kill(State):
         def __init__(self):
@@ -211,7 +256,9 @@ def test_what_could_not_be_restored_stays_in_the_key(mission, controller, caplog
     sm = slowly(Kill())
     mission(sm).assert_outcome("done")
     assert "/controller/get_parameters: no server" in caplog.text
-    assert sm.userdata.parameters_before == {"controller": {"max_vel_x": {"was": 0.5, "set": 0.2}}}
+    assert sm.userdata.parameters_before == {
+        "controller": {"max_vel_x": {"was": 0.5, "set": [0.2]}}
+    }
 
 
 def test_the_others_are_restored_where_a_node_does_not_have_one_any_more(
