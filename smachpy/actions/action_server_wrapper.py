@@ -360,8 +360,12 @@ class ActionServerWrapper:
 
     def __on_event(self, event: Event) -> None:
         """Send feedback at once when a child of the container writes it."""
-        # Depth 2, "/ROOT/CHILD": deeper states write to the userdata of another container.
-        if isinstance(event, UserdataWritten) and event.path.count("/") == 2:  # noqa: PLR2004
+        if not isinstance(event, UserdataWritten):
+            return
+        container = self.wrapped_container
+        label = event.path.removeprefix(f"/{container.name or 'SM_ROOT'}/")
+        # Deeper states write to the userdata of another container.
+        if label in container.get_children():
             keys = {self.__feedback_key, *self.__feedback_slots_map.values()}
             if event.key in keys and self.__executing:
                 self.publish_feedback(self.wrapped_container.userdata)

@@ -54,10 +54,6 @@ def overview(store: Store, row: MissionRow) -> dict[str, Any]:
         "current": [
             [path, visit.get("entered_ns", visit["since_ns"])]
             for path, visit in position.visits.items()
-            if visit["outcome"] is None and path.count("/") == _DEPTH
+            if visit["outcome"] is None and position.visits.get(visit["in"], {}).get("in") == ""
         ],
     }
-
-
-_DEPTH = 2
-"""Slashes in the path of a child of the root."""

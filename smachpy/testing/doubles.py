@@ -6,6 +6,7 @@ import inspect
 from collections import deque
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from smachpy.engine.described import walk
 from smachpy.events.introspection import describe
 from smachpy.exceptions import SmachError
 from smachpy.machines.container import Container
@@ -146,15 +147,17 @@ class Places:
             DoubleError: it is the root.
         """
         record = describe(root)
-        labels = find_path(record, path).split("/")[2:]
-        if not labels:
+        wanted = find_path(record, path)
+        if wanted == record.path:
             raise DoubleError(f"replace: got the root {record.path}; expected a state in it.")
-        container = root
-        for label in labels[:-1]:
-            inner = container[label]
-            assert isinstance(inner, Container)
-            container = inner
-        return self.exchange(container, labels[-1], make)
+        # The name of a machine may have slashes, so the path is not divided at them.
+        container, label = next(
+            (container, label)
+            for above, container in walk(root, record.path)
+            if isinstance(container, Container)
+            and (label := wanted.removeprefix(f"{above}/")) in container.get_children()
+        )
+        return self.exchange(container, label, make)
 
     def exchange(self, container: Container, label: str, make: Callable[[Any], S]) -> S:
         """Replace a child by the result of `make`."""

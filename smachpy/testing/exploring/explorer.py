@@ -815,7 +815,7 @@ def _tempo(
     own, above, group = dict[str, float](), dict[str, float](), dict[str, str]()
     longest = dict[str, float]()  # of the loops
     for leaf in [s.path for s in states if not s.is_container]:
-        *around, _ = _above(leaf)
+        *around, _ = (path for path in _above(leaf) if path in limits)
         own[leaf] = _bound([limits[leaf]])
         above[leaf] = _bound([limits[path] for path in around])
         name = group[leaf] = next((path for path in around if path in together), leaf)
@@ -838,7 +838,10 @@ def _tempo(
 
 
 def _above(path: str) -> list[str]:
-    """Return the paths of all states from the root down to this one."""
+    """Return the paths of all states from the root down to this one.
+
+    The name of the root may have slashes: there are others before its path then.
+    """
     parts = path.split("/")
     return ["/".join(parts[:number]) for number in range(2, len(parts) + 1)]
 

@@ -307,6 +307,28 @@ def test_results_of_an_earlier_goal_do_not_leak(world):
         assert client.get_result() == Result(expected)
 
 
+def test_feedback_of_a_machine_with_a_slash_in_its_name_is_sent_at_once(world):
+    """Only what a state wrote last arrived, when it had ended."""
+
+    class Counts(State):
+        def __init__(self):
+            super().__init__(ALL, output_keys=["action_feedback"])
+
+        def execute(self, ud):
+            for number in (1, 2):
+                ud.action_feedback = Feedback(number)
+                self.sleep(1.0)
+            return "done"
+
+    machine = machine_of(Counts())
+    machine.name = "r1/do"
+    world.wrap(machine)
+    client = world.client()
+    world.send(client, 1)
+    assert client.wait_for_result(5.0)
+    assert [f for _, f in world.feedback] == [1, 2]
+
+
 def test_feedback_changed_in_place_is_sent_at_the_transition(world):
     class Change(State):
         def __init__(self):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 
 import pytest
 
+import smachpy
 from smachpy.durable.journal import Journal
+from smachpy.durable.opening import open_store
+from smachpy.durable.overview import overview
 from smachpy.durable.position import Position
 from smachpy.durable.store import Lease, StoreError
 from smachpy.engine.interrupt import Interruption
@@ -96,3 +100,20 @@ def test_an_entry_whose_write_is_interrupted_is_written_once(was_written, last):
     journal.commit(put("Noted", "/M"))
     assert len(store.writes) == 3
     assert len(store.blobs) == 1
+
+
+def test_the_state_that_runs_is_listed_for_a_machine_with_a_slash_in_its_name(tmp_path):
+    """None was: the slashes of its path were counted."""
+    found = []
+    with contextlib.closing(open_store(tmp_path / "journal.db")) as store:
+
+        def look(_):
+            found.extend(overview(store, store.mission("one"))["current"])
+            return "done"
+
+        inner = smachpy.StateMachine(["done"])
+        inner.add("LOOK", smachpy.CBState(look, outcomes=["done"]))
+        machine = smachpy.StateMachine(["done"], name="r1/M")
+        machine.add("A", inner)
+        assert smachpy.run_durable(machine, store, mission="one") == "done"
+    assert [path for path, _ in found] == ["/r1/M/A"]

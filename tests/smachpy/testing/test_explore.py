@@ -26,6 +26,7 @@ from smachpy import (
     SimpleActionState,
     State,
     StateMachine,
+    set_options,
 )
 from smachpy.testing import TimeLimitError, UnknownStateError, explore, mission_kit, replay
 from smachpy.testing.exploring import exploration
@@ -64,6 +65,16 @@ def test_a_sound_machine_is_explored_to_the_end():
     assert found.stopped_by == ""
     assert found.runs > 8
     assert "all there are: no counterexample" in str(found)
+
+
+def test_a_machine_with_a_slash_in_its_name_is_explored():
+    """It raised a KeyError: the first part of the name was taken for a machine around."""
+    inner, limited = sound(), StateMachine(["done", "late", "preempted"], name="r1/M")
+    set_options(inner, timeout=5.0, timeout_outcome="late")
+    limited.add("IN", inner, {"failed": "done"})
+    expected = explore(limited).runs
+    limited.name = "M"
+    assert explore(limited).runs == expected
 
 
 def test_the_machine_is_as_it_was_afterwards():

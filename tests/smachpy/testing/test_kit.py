@@ -162,6 +162,22 @@ def test_a_double_takes_a_state_s_place_for_the_test():
     assert sm["A"] is original
 
 
+def test_a_double_in_a_machine_with_a_slash_in_its_name(mission):
+    """`replace` looked for a state "M" in it."""
+    inner = StateMachine(["done", "preempted"])
+    inner.add("IN", Wait())
+    sm = two_waits()
+    sm.name = "r1/M"
+    sm.add("C", inner)
+    sm.set_initial_state(["C"])
+    mission.replace("C/IN", outcomes=["done"], duration=1)
+    mission.replace("/r1/M/A", outcomes=["preempted"])
+    run = mission(sm)
+    assert (run.outcome, run.duration) == ("done", 1)
+    sm.set_initial_state(["A"])
+    assert mission(sm).outcome == "preempted"
+
+
 def test_a_double_with_a_function(mission):
     mission.replace("A", execute=lambda ud: "preempted")
     assert mission(two_waits()).outcome == "preempted"
