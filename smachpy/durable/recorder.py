@@ -142,6 +142,7 @@ class Recorder(RunJournal):
         self.mission, self.run = row.id, row.run
         self.time = time
         self.broken: Exception | None = None
+        self._noted = 0  # the number of the last request to stop
         self.on_fenced: Callable[[FencedError], object] | None = None
         self.on_suspend: Callable[[str, Any], object] | None = None
         self._is_suspended = False
@@ -250,10 +251,21 @@ class Recorder(RunJournal):
 
         `value` is the name of the fact that is an encoded value, which may be large.
         """
-        if is_copy(self._pid):  # a process that a state has forked: the mission is its parent's
-            return True
-        if self.broken is not None:
-            return False
+        number = self._note(frame, step, kind, path, facts, value)
+        return self.broken is None if number is None else self._commit(number)
+
+    def _note(
+        self,
+        frame: Frame | None,
+        step: Step | None,
+        kind: str,
+        path: str,
+        facts: dict[str, Any],
+        value: str = "",
+    ) -> int | None:
+        """Queue an entry as `_write_with` writes it; return its number, None if there is none."""
+        if self.broken is not None or is_copy(self._pid):  # a fork of a state: its parent writes
+            return None
         journal = self._journal
         # The lock covers reading the userdata and queueing the entry: a change that an entry
         # reports must not be older than the one that an earlier entry has reported.
@@ -266,18 +278,28 @@ class Recorder(RunJournal):
                 changes, learn = self._changes(frame, step, path)
                 entry.update(changes)
             if entry.pop("only_changes", False) and "userdata" not in entry:
-                return True
+                return None
             number = journal.put(entry)
             if learn is not None:
                 learn()
+        return number
+
+    def _commit(self, number: int) -> bool:
         # Without the lock: other branches queue their entries meanwhile, see `Journal`.
         try:
-            journal.commit(number)
-            self.held.give_ended(journal.position.visits)
+            self._journal.commit(number)
+            self.held.give_ended(self._journal.position.visits)
         except (StoreError, FencedError) as error:
             self.stop(error)
             return False
         return True
+
+    def _note_request(self, kind: str, path: str, **facts: Any) -> None:
+        self._noted = self._note(None, None, kind, path, facts) or self._noted
+
+    def commit(self) -> None:
+        if self._noted and self.broken is None:
+            self._commit(self._noted)
 
     @property
     def is_taken_over(self) -> bool:
@@ -883,7 +905,7 @@ class Recorder(RunJournal):
         if source in _MADE_AGAIN or path not in self._containers:
             return False
         if not self._is_known(path, origin):
-            self._write("PreemptRequested", **request)
+            self._note_request("PreemptRequested", **request)
         if not self._unresumed or self._gave_up_waiting:
             return False
         # Kept until all states that were active have been entered again, or `RESUME_S` is over.
@@ -905,7 +927,8 @@ class Recorder(RunJournal):
             if not is_open and (source, by, why) in self._served.get(path, ()):
                 return True
         if not self._is_known(path, origin):
-            self._write("PreemptRequested", path, source=source, by=by, why=why, passed=True)
+            facts = {"source": source, "by": by, "why": why, "passed": True}
+            self._note_request("PreemptRequested", path, **facts)
         return False
 
     def holds_back(self, path: str) -> bool:
@@ -931,7 +954,7 @@ class Recorder(RunJournal):
         if path in self._journal.position.visits:
             origins = sorted(self._heard.pop(path, ()))
             self._recalled.setdefault(path, set()).update(origins)
-            self._write("Recalled", path, origins=origins)
+            self._note_request("Recalled", path, origins=origins)
 
     def stopped(self) -> None:
         if not self._journal.position.data.get("emergency"):
@@ -985,7 +1008,8 @@ class Recorder(RunJournal):
             source, by, why = current_origin()
             wanted = None if override is None else list(override)
             facts = {"source": source, "by": by, "why": why, "override": wanted}
-            self._write("PreemptRequested", path, **facts, **({"goes_on": left} if left else {}))
+            left_at = {"goes_on": left} if left else {}
+            self._note_request("PreemptRequested", path, **facts, **left_at)
 
     def _give_up_waiting(self) -> None:
         """Pass on the requests, although an operator still holds some of the states."""

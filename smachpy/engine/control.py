@@ -18,7 +18,14 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from smachpy.base import log
 from smachpy.engine.described import EPOCH, ContainerData, walk
-from smachpy.engine.preempt import ask_child, asking, frame_of, on_preempt, request_soon
+from smachpy.engine.preempt import (
+    ask,
+    ask_child,
+    asking,
+    frame_of,
+    on_preempt,
+    request_soon,
+)
 from smachpy.engine.visit import Override
 from smachpy.events import Paused, Resumed
 from smachpy.exceptions import SmachError, did_you_mean, error_text
@@ -354,10 +361,17 @@ class Control:
     def _cancel(self, why: str, *, written: bool = True) -> None:
         with asking("operator", "", why):
             for frame, step in self._active():
-                if not step.state._smachpy_is_container:
-                    # Also in the journal: a resumed run asks it again, which runs it again.
-                    again = Override(label=step.label, if_stopped=True)
-                    (self._ask if written else ask_child)(frame, step, again)
+                if step.state._smachpy_is_container:
+                    continue
+                again = Override(label=step.label, if_stopped=True)
+                with frame.run.lock:
+                    if written:  # a resumed run asks it again, which runs it again
+                        frame.run.journal.asked_one(frame, step, again)
+                    ask(frame, step, override=again)
+        if self._run is not None:
+            if written:
+                self._run.journal.commit()
+            self._run.flush_soon()
 
     def _end_pause(self, stop: object | None = None) -> bool:
         """Let all waiting states go on, if `stop` is None or holds them; return whether any did."""

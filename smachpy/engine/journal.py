@@ -62,7 +62,7 @@ class RunJournal:
         """Write that attempt number `attempt` has ended, and the next begins in `wait` [s]."""
 
     def asked(self, frame: Frame, origin: Origin) -> bool:  # noqa: ARG002
-        """Write that the container of `frame` was asked to stop.
+        """Note that the container of `frame` was asked to stop; `commit` writes it.
 
         Returns:
             Whether the journal will pass the request on itself, once all states that were active
@@ -71,7 +71,7 @@ class RunJournal:
         return False
 
     def has_served(self, path: str) -> bool:  # noqa: ARG002
-        """Write that the container at `path` gets the present request to stop, to pass it on.
+        """Note that the container at `path` gets the present request to stop, to pass it on.
 
         Returns:
             Whether it has got it before the resume, and begun another child since: that one is not
@@ -94,7 +94,7 @@ class RunJournal:
         return True
 
     def recalled(self, path: str) -> None:
-        """Write that the child at `path` withdraws the requests to stop that it has got."""
+        """Note that the child at `path` withdraws the requests to stop that it has got."""
 
     def asked_one(
         self,
@@ -103,7 +103,7 @@ class RunJournal:
         override: Override | None,
         left: Mapping[str, str] | None = None,
     ) -> None:
-        """Write that an operator asked the child of `step` to stop, with the override.
+        """Note that an operator asked the child of `step` to stop, with the override.
 
         A resumed run asks it again.
 
@@ -112,6 +112,15 @@ class RunJournal:
             step: The child.
             override: What follows instead.
             left: Where the next run of the child goes on: path of a machine -> label.
+        """
+
+    def commit(self) -> None:
+        """Write what was only noted, as the run's lock was held: requests to stop.
+
+        They are told before that, and do not wait for a slow disk or database. What is written next
+        comes after them in any case.
+
+        Blocks: for the disk, or the database; never call it with the run's lock held.
         """
 
     def stopped(self) -> None:

@@ -167,6 +167,7 @@ class Visit:
                     self._frame.run.journal.recalled(self._frame.here())
                 self.override = None  # an operator's choice was part of the request
                 self.happen(Event.RECALL)
+        self._frame.run.journal.commit()
 
     def settle(self) -> None:
         """Wait until the `request_preempt` of the child, which has ended, has returned as well.
@@ -560,6 +561,7 @@ def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool
     """
     with frame.run.lock:
         asked = ask(frame, step, override=override)
+    frame.run.journal.commit()
     frame.run.flush_soon()
     return asked
 
@@ -634,7 +636,9 @@ def request(
             # A listener that answers each request with a further one would never come to an end.
             if container._preempt_requested and wanted.is_publishing():
                 return None
-            return None if wanted.journal.asked(now, origin) else _ask_in(now, container)
+            asked = None if wanted.journal.asked(now, origin) else _ask_in(now, container)
+        wanted.journal.commit()
+        return asked
 
 
 def _ask_in(frame: Frame, container: Parent) -> Run:

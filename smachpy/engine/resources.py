@@ -12,7 +12,7 @@ from smachpy.base import log
 from smachpy.base.context import current_frame
 from smachpy.engine.interrupt import Interruption
 from smachpy.engine.options import REFUSED
-from smachpy.engine.preempt import ask_child, asking, on_preempt
+from smachpy.engine.preempt import ask, asking, on_preempt
 from smachpy.events import ResourceUse
 from smachpy.exceptions import InvalidStateError
 
@@ -73,10 +73,14 @@ def _claim(frame: Frame, resource: Resource) -> Claim:
 def _stop(frame: Frame, step: Any, visit: Any, taker: Claim) -> None:
     """Ask a holder to stop, unless that visit has ended."""
     why = f"takes {taker.resource}"
-    with asking("state", taker.who(), why), frame.run.lock:
-        if frame.visit is visit:
+    with asking("state", taker.who(), why):
+        with frame.run.lock:
+            if frame.visit is not visit:
+                return
             frame.run.journal.asked_one(frame, step, None)
-            ask_child(frame, step)
+            ask(frame, step)
+        frame.run.journal.commit()
+        frame.run.flush_soon()
 
 
 def _take(frame: Frame, state: Child, all_of: Resources, claim: Claim) -> str | None:

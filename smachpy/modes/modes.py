@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from smachpy.base.functions import name_of as name_of_code
 from smachpy.base.problems import Problems, unknown_name
 from smachpy.engine.child import run_child
-from smachpy.engine.preempt import ask_child, asking, choose
+from smachpy.engine.preempt import ask, asking, choose
 from smachpy.engine.visit import Override, Why
 from smachpy.events import Jumped
 from smachpy.events.introspection import TransitionRecord
@@ -219,6 +219,7 @@ class Modes(StateMachine):
         """Write to the journal that `target` follows, and where the present mission is left."""
         if step is not None:
             frame.run.journal.asked_one(frame, step, Override(label=target), left)
+            frame.run.journal.commit()
 
     def __place_of(self, step: Step | None, target: str) -> dict[str, str]:
         """Return where the present mission is if it is to go on there; with the run's lock held."""
@@ -238,7 +239,7 @@ class Modes(StateMachine):
                 frame.visit.override = Override(label=target)
             return
         remember(step.state, step.path_in(frame), self.__place_of(step, target))
-        ask_child(frame, step, Override(label=target))
+        ask(frame, step, override=Override(label=target))
 
     def emergency_stop(self, why: str = "") -> None:
         """Stop everything at once: states are preempted, goals are cancelled, and nothing starts.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import threading
 
 import pytest
 
@@ -571,3 +572,95 @@ def test_an_emergency_stop_while_another_one_is_released_is_in_the_journal():
         smachpy.run_durable(sm, store, mission="m")
     held = [kind for kind in kinds if kind in {"Stopped", "Released"}]
     assert held == ["Stopped", "Released", "Stopped"]
+
+
+# -- slow disks and databases ----------------------------------------------------------------------
+
+
+class HangingStore(KillingStore):
+    """Writes nothing while it `hangs`."""
+
+    def __init__(self):
+        super().__init__()
+        self.hangs = False
+        self.asked, self.free = threading.Event(), threading.Event()
+
+    def append(self, *args, **options):
+        if self.hangs:
+            self.asked.set()
+            assert self.free.wait(60.0)
+        super().append(*args, **options)
+
+
+@pytest.mark.parametrize("stop", ["request", "operator", "pause", "emergency"])
+def test_no_stop_waits_for_a_slow_journal(stop):
+    """The robot drove on until the database had answered, or for 8 s."""
+    store = HangingStore()
+    began = {name: threading.Event() for name in ("LEFT", "RIGHT")}
+    told = {name: threading.Event() for name in began}
+
+    class Drive(State):
+        def __init__(self, name):
+            super().__init__(["done", "preempted"])
+            self.name = name
+
+        def execute(self, userdata):
+            began[self.name].set()
+            assert self.wait_preempt(60.0)
+            told[self.name].set()
+            return "preempted"
+
+    both = Concurrence(["preempted"], "preempted")
+    for name in began:
+        both.add(name, Drive(name))
+    sm = StateMachine(ENDS, name="M")
+    sm.add("BOTH", both)
+    stops = {
+        "request": sm.request_preempt,
+        "operator": lambda: sm.control.preempt("/M/BOTH/RIGHT"),
+        "pause": lambda: sm.control.pause(running="cancel"),
+        "emergency": sm.control.emergency_stop,
+    }
+
+    def operate():
+        assert all(each.wait(60.0) for each in began.values())
+        store.hangs = True
+        threads = [threading.Thread(target=sm.control.preempt, args=["/M/BOTH/LEFT"])]
+        threads[0].start()
+        assert told["LEFT"].wait(60.0)
+        assert store.asked.wait(60.0)
+        threads.append(threading.Thread(target=stops[stop]))
+        threads[1].start()
+        heard.append(told["RIGHT"].wait(60.0))
+        store.hangs = False
+        store.free.set()
+        for thread in threads:
+            thread.join()
+        sm.request_preempt()
+        sm.control.resume()
+
+    heard = []
+    operator = threading.Thread(target=operate)
+    operator.start()
+    try:
+        assert smachpy.run_durable(sm, store, mission="m") == "preempted"
+    finally:
+        store.free.set()
+        operator.join()
+    assert heard == [True]
+
+
+def test_a_stop_is_in_the_journal_when_its_request_returns():
+    store = KillingStore()
+    kinds = []
+
+    def ask():
+        sm.request_preempt()
+        kinds.extend(json.loads(entry)["kind"] for entry in store.entries["m"])
+
+    sm = StateMachine(ENDS, name="M")
+    sm.add("DRIVE", Work([], "DRIVE"))
+    with VirtualClock() as clock, use_clock(clock):
+        clock.call_later(REQUEST_S, ask)
+        assert smachpy.run_durable(sm, store, mission="m") == "preempted"
+    assert "PreemptRequested" in kinds
