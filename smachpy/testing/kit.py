@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import signal
 import tempfile
 import threading
@@ -17,6 +18,7 @@ from actionlib_core.interfaces.bags import read_bag
 from actionlib_core.node import use_node
 from actionlib_core.shutdown import Shutdown, use_shutdown
 from actionlib_core.transport.memory import MemoryNetwork
+from smachpy.base.problems import Problems
 from smachpy.engine.preempt import asking
 from smachpy.events.introspection import describe
 from smachpy.exceptions import error_text
@@ -202,6 +204,7 @@ class MissionKit:
 
         Raises:
             TypeError: it is not a container.
+            InvalidStateError: `limit` is no number of seconds, or `steps` is less than 1.
             RuntimeError: the kit is not open: its `with` block or its test has ended.
             Deadlock: everything waits for something that cannot happen.
             TimeLimitError: it did not end in time, or took too many steps.
@@ -220,6 +223,7 @@ class MissionKit:
                 "mission: got a kit that is not open; expected a call in `with mission_kit() as "
                 "mission:`, or in the test that has the fixture."
             )
+        limit, steps = check_limits(self.call, limit, steps)
         for name, make, made in self._replacements:
             made.append(self._places.put(machine, name, make))
         self._replacements.clear()
@@ -335,13 +339,17 @@ class MissionKit:
             A list that holds the double once the run has begun.
 
         Raises:
+            InvalidStateError: `duration` is no number of seconds, or `outcomes` no list.
             UnknownStateError, DoubleError: it does not fit the machine; raised by the run.
         """
         made: list[Double] = []
-        script = tuple(outcomes)
+        problems = Problems("replace")
+        script = problems.values("outcomes", outcomes)
+        seconds = problems.seconds("duration", duration, optional=False)
+        problems.raise_all()
 
         def make(state: Any) -> Double:
-            return Double(state, script, duration=duration, writes=writes, execute=execute)
+            return Double(state, script, duration=seconds or 0.0, writes=writes, execute=execute)
 
         self._replacements.append((path, make, made))
         return made
@@ -366,6 +374,7 @@ class MissionKit:
 
         Raises:
             ValueError: neither or both of `at` and `on`, or `after` or `visit` without `on`.
+            InvalidStateError: a time is no number of seconds, or `visit` is less than 1.
         """
         self._add_trigger("preempt", at, on, after, visit)
 
@@ -426,6 +435,12 @@ class MissionKit:
             raise ValueError(
                 f"{what}: got after={after!r} and visit={visit!r} without on; expected a state."
             )
+        problems = Problems(what)
+        if at is not None:
+            at = problems.seconds("at", at, optional=False)
+        delay = problems.seconds("after", after, optional=False)
+        visit = problems.whole("visit", visit, 1, "a whole number >= 1")
+        problems.raise_all()
 
         def ask(machine: Container) -> None:
             if what == "interrupt":
@@ -434,7 +449,7 @@ class MissionKit:
                 machine.request_preempt()
 
         act = act or ask
-        self._triggers.append(Trigger(what, act, at, on, after, visit))
+        self._triggers.append(Trigger(what, act, at, on, delay or 0.0, visit))
 
     # -- servers and topics --------------------------------------------------------------------
 
@@ -556,6 +571,24 @@ def check_machine(given: object, call: str, *, functions: bool = False) -> None:
         raise TypeError(
             f"{call}: machine: got the function {name}; expected a container. Try to call it."
         )
+
+
+def check_limits(call: str, limit: float, steps: int) -> tuple[float, int]:
+    """Return the limits of a run in the form to use.
+
+    Args:
+        call: The call's name.
+        limit: The longest run [s].
+        steps: The most steps while no time passes.
+
+    Raises:
+        InvalidStateError: one of them is none.
+    """
+    problems = Problems(call)
+    seconds = problems.seconds("limit", limit)
+    steps = problems.whole("steps", steps, 1, "a whole number >= 1")
+    problems.raise_all()
+    return math.inf if seconds is None else seconds, steps
 
 
 def _reraise(

@@ -705,9 +705,11 @@ class _Turns:
 
     Attributes:
         endless: It is one message, again and again.
+        given: What the test gave.
     """
 
     def __init__(self, topic: ScriptedTopic, messages: Any) -> None:
+        self.given = messages
         self._make = topic.make_message
         self._taken: list[Any] = []
         self._rest: Iterator[Any] = iter(())
@@ -770,7 +772,12 @@ class ScriptedTopic(ScriptedEnd):
     def publish_at(
         self, at: float, message: Any = None, *, latch: bool = False, **fields: Any
     ) -> None:
-        """Publish `at` this long from now [s]; other arguments as for `publish`."""
+        """Publish `at` this long from now [s]; other arguments as for `publish`.
+
+        Raises:
+            InvalidStateError: `at` is no number of seconds.
+        """
+        at = self._seconds("publish_at", "at", at)
         made = self.make_message(message if message is not None else fields)
         self._calls.append(lambda topic: topic.publish_at(at, made, latch=latch))
         self._due.append((self._clock.now() + at, 0))
@@ -784,7 +791,7 @@ class ScriptedTopic(ScriptedEnd):
             period: See above; more than 0.
             messages: One message, or a dict of its fields, which is published again and again; or
                 an iterable of them, from which each is taken when its time has come, so that it
-                may have no end.
+                may have no end. An exception that it raises then fails the run.
             start: See above.
 
         Raises:
@@ -816,7 +823,10 @@ class ScriptedTopic(ScriptedEnd):
 
         def publish(number: int, message: Any) -> None:
             publisher.publish(message)
-            schedule(number + 1)
+            try:
+                schedule(number + 1)
+            except Exception as error:  # noqa: BLE001  the test's own code: it fails the run
+                self.note_raised(turns.given, error)
 
         schedule(0)
 
@@ -829,8 +839,18 @@ class ScriptedTopic(ScriptedEnd):
         self.disturb(TWICE, count)
 
     def delay(self, seconds: float, count: int = 1) -> None:
-        """Deliver the next messages late by `seconds`; later messages may overtake them."""
-        self.disturb((seconds,), count)
+        """Deliver the next messages late by `seconds`; later messages may overtake them.
+
+        Raises:
+            InvalidStateError: it is no number of seconds.
+        """
+        self.disturb((self._seconds("delay", "seconds", seconds),), count)
+
+    def _seconds(self, call: str, argument: str, given: float) -> float:
+        problems = Problems(f"{self.name}: {call}")
+        seconds = problems.seconds(argument, given, optional=False)
+        problems.raise_all()
+        return seconds or 0.0
 
     def copy_to(self, kit: Test) -> Self:
         """Make the same topic in another test, and repeat its script there."""

@@ -34,7 +34,7 @@ from smachpy.testing.exploring.explorer import (
 )
 from smachpy.testing.exploring.search import Search
 from smachpy.testing.exploring.verdicts import judge
-from smachpy.testing.kit import MissionKit, check_machine
+from smachpy.testing.kit import MissionKit, check_limits, check_machine
 from smachpy.testing.process import Killed
 
 if TYPE_CHECKING:
@@ -199,7 +199,8 @@ def explore(
 
     Raises:
         TypeError: `machine` is neither a container nor a function, or there is no such option.
-        InvalidStateError: an invariant is no plain function of the run.
+        InvalidStateError: an invariant is no plain function of the run, or `limit` or `steps` is
+            none.
         ValueError: there is no such fault, or `jobs` is less than 1.
         UnknownStateError: `keep` or `writes` names a state that does not exist; or a name in
             `writes` is ambiguous.
@@ -382,6 +383,7 @@ class RepeatedRun:
     Raises:
         TypeError: there is no such option.
         ValueError: there is no such fault.
+        InvalidStateError: `limit` or `steps` is none.
     """
 
     def __init__(
@@ -397,6 +399,7 @@ class RepeatedRun:
         faults = sorted(set(options["faults"]) - FAULTS)
         if faults:
             raise ValueError(f"{call}: faults: got {faults}; expected some of {sorted(FAULTS)}.")
+        options["limit"], options["steps"] = check_limits(call, options["limit"], options["steps"])
         self.source = machine
         self.options = options
         self._call = call

@@ -18,6 +18,7 @@ from actionlib_core.interfaces.std_srvs.srv import SetBool
 from smachpy import (
     CBState,
     Concurrence,
+    InvalidStateError,
     InvalidUserCodeError,
     MonitorState,
     ServiceState,
@@ -225,6 +226,41 @@ def test_doubles_that_do_not_fit(mission, arguments, error, said):
     mission.replace(**arguments)
     with pytest.raises(error, match=said):
         mission(two_waits())
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda m: m.preempt(at=NAN), "preempt: at: got nan; expected seconds >= 0"),
+        (lambda m: m.preempt(at="3"), "preempt: at: got '3'; .* Try 3."),
+        (lambda m: m.preempt(on="A", after=NAN), "preempt: after: got nan"),
+        (lambda m: m.interrupt(on="A", after=-1), "interrupt: after: got -1"),
+        (lambda m: m.preempt(on="A", visit=0), "preempt: visit: got 0; expected a whole number"),
+        (lambda m: m.trigger("stop", on="A", visit=1.5), "trigger: visit: got 1.5"),
+        (lambda m: m.replace("A", ["done"], duration=NAN), "replace: duration: got nan"),
+        (lambda m: m.replace("A", "done"), r"outcomes: got 'done'; .* Try \['done'\]."),
+        (lambda m: m(two_waits(), limit=NAN), "mission: limit: got nan"),
+        (lambda m: m(two_waits(), steps=0), "mission: steps: got 0"),
+        (lambda m: m.explore(two_waits(), limit=NAN), "explore: limit: got nan"),
+        (lambda m: m.replay(two_waits(), [], steps="x"), "replay: steps: got 'x'"),
+        (lambda m: m.topic("a", Bool).publish_at(-1, data=True), "a: publish_at: at: got -1"),
+        (lambda m: m.topic("a", Bool).delay("x"), "a: delay: seconds: got 'x'"),
+    ],
+)
+def test_times_and_counts_that_are_none_are_refused(mission, call, said):
+    """NaN was no limit, no time, or a preempt that never came; the run itself refused a text."""
+    with pytest.raises(InvalidStateError, match=said):
+        call(mission)
+
+
+def test_a_run_without_a_limit(mission):
+    week_s = 7 * 24 * 3600
+    sm = StateMachine(["done", "preempted"], name="M")
+    sm.add("A", Wait(week_s))
+    assert mission(sm, limit=float("inf")).duration == week_s
 
 
 # -- preempts --------------------------------------------------------------------------------------

@@ -517,6 +517,25 @@ def test_messages_without_an_end_are_taken_when_their_time_has_come(mission, top
     assert taken[0] == begun
 
 
+@pytest.mark.parametrize(
+    ("last", "text"),
+    [(lambda: 1 / 0, "ZeroDivisionError: division by zero"), (lambda: 7, "got 7; expected std_")],
+    ids=["raises", "wrong message"],
+)
+def test_messages_that_cannot_be_made_fail_the_run(mission, topic, last, text):
+    """The topic fell silent, and the test passed."""
+
+    def words():
+        yield String("go")
+        yield last()
+
+    chatter = topic("chatter", String)
+    chatter.publish_every(3.0, words())
+    chatter.publish_at(10.0, data="stop")
+    with pytest.raises(AssertionError, match=f"chatter: .*words.* of the test raised .*{text}"):
+        mission(watch())
+
+
 def test_copies_of_a_topic_take_the_same_messages(topic):
     """An iterator was used up by the first of the runs."""
     chatter = topic("chatter", String)
