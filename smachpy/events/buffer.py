@@ -284,7 +284,7 @@ _CLOSES = {"Finished": "", "Left": "", "Failed": "", "GoalDone": "goal of "}
 _WITHIN = {
     **dict.fromkeys(("PreemptRequested", "PreemptServiced", "Abandoned"), ""),
     **dict.fromkeys(("Retried", "Noted", "ResourceUse", "Paused", "Resumed"), ""),
-    **dict.fromkeys(("QuestionAsked", "QuestionAnswered"), ""),
+    **dict.fromkeys(("QuestionAsked", "QuestionAnswered", "Fired", "HeldBack"), ""),
     "Iterated": "item of ",
     "GoalFeedback": "goal of ",
     "UserdataWritten": "userdata of ",

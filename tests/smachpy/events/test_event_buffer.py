@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 import smachpy
 from actionlib_core.clock import RealClock, VirtualClock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
-from smachpy.events import Entered, Left, Recovered, Started, UserdataWritten, to_record
+from smachpy.events import (
+    Entered,
+    Fired,
+    HeldBack,
+    Left,
+    Recovered,
+    Started,
+    UserdataWritten,
+    to_record,
+)
 from smachpy.events import buffer as buffers
 from smachpy.events.buffer import RawEventBuffer
 from smachpy.events.run_state import RunState
@@ -282,6 +291,22 @@ def test_a_question_that_waits_is_not_lost_in_a_flood():
     entries.insert(2, {"kind": "Left", "path": "/ROOT/ASK"})
     kept, _ = buffers.thin(entries)
     assert asked not in kept
+
+
+def test_the_marking_of_a_plan_is_not_lost_in_a_flood():
+    """Viewers showed a plan whose tokens were where they had been before the flood."""
+    entries = [Entered("/P", 0.0, 0)]
+    for number in range(50):
+        entries.append(Fired("/P", 0.0, 0, f"t{number}", (f"p{number}",)))
+        entries.append(HeldBack("/P", 0.0, 0, (f"t{number + 1}",), ("there",)))
+        entries += [Entered("/P/BUSY", 0.0, 0), Left("/P/BUSY", 0.0, 0, "done")]
+    state = RunState()
+    for kept in buffers.thin(entries)[0]:
+        if not isinstance(kept, buffers._Dropped):
+            state.fold(to_record(kept))
+    plan = state.data["states"]["/P"]
+    assert (plan["marking"], plan["fired"]) == (["p49"], "t49")
+    assert plan["held"] == {"t50": "there is false"}
 
 
 def test_a_flood_of_visits_keeps_whole_visits(monkeypatch):
