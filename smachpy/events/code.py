@@ -60,16 +60,20 @@ def own_files() -> dict[str, Path]:
     """Return the program's own modules that are loaded: name -> file, sorted."""
     found = {}
     for name, module in sys.modules.copy().items():
-        file = getattr(module, "__file__", None)
-        if not isinstance(file, str) or name.partition(".")[0] in _LIBRARY:
-            continue
-        path = _own_file(file, None if file.startswith("/") else Path.cwd())
+        path = None if name.partition(".")[0] in _LIBRARY else _file_of(module)
         if path is not None and path.is_file():
             # A file that is loaded again has a number behind its name.
             first, _, number = name.rpartition("_")
             again = first == path.stem and number.isascii() and number.isdigit()
             found[path.stem if again else name] = path
     return dict(sorted(found.items())[:MAX_FILES])
+
+
+def _file_of(module: Any) -> Path | None:
+    file = getattr(module, "__file__", None)
+    if not isinstance(file, str):
+        return None
+    return _own_file(file, None if file.startswith("/") else Path.cwd())
 
 
 @cache  # each recording asks it of all modules
@@ -87,10 +91,11 @@ def _folders_of_installed() -> frozenset[Path]:
 
 def own_constants(files: Mapping[str, Path]) -> dict[str, str]:
     """Return the constants of these modules: names in capitals with plain values."""
-    names = {str(file): name for name, file in files.items()}
+    names = {file: name for name, file in files.items()}
     found = {}
     for module in sys.modules.copy().values():
-        name = names.get(str(getattr(module, "__file__", None)))
+        file = _file_of(module)
+        name = None if file is None else names.get(file)
         for word, value in list(vars(module).items()) if name else ():
             if not (word.isupper() and _is_plain(value)):
                 continue

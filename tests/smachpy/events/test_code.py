@@ -31,6 +31,20 @@ def test_a_git_that_hangs_is_not_waited_for(tmp_path, monkeypatch, hangs_in, fou
     assert set(limits) == {code.GIT_S}
 
 
+def test_constants_of_a_program_behind_a_link_are_found(tmp_path, monkeypatch):
+    """`runs reproduce` did not tell that one of them had changed."""
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real" / "linked_constants.py").write_text("LOW = 0.3\n")
+    (tmp_path / "link").symlink_to("real")
+    monkeypatch.syspath_prepend(str(tmp_path / "link"))
+    import linked_constants
+
+    try:
+        assert code.code_facts()["constants"]["linked_constants.LOW"] == "0.3"
+    finally:
+        del sys.modules[linked_constants.__name__]
+
+
 CONSTANTS = """
 LOW = 0.3
 NAMES = ("ann", "bob")
