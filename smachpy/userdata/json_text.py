@@ -29,10 +29,13 @@ from smachpy.userdata.secret import masked
 from smachpy.userdata.shown import literal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 _DEPTH = 40
-_SIZED = (str, bytes, bytearray, list, tuple, dict, set, frozenset)
+_NESTED = (list, tuple, dict, set, frozenset)
+_SIZED = (str, bytes, bytearray, *_NESTED)
+_AGAIN = 10_000
+"""Number of containers of containers that are written again in one text."""
 
 
 def dumps(values: Mapping[str, Any], *, longest: int | None = None) -> str:
@@ -41,17 +44,18 @@ def dumps(values: Mapping[str, Any], *, longest: int | None = None) -> str:
     Args:
         values: Name -> value.
         longest: Texts, bytes and containers with more elements become a `$repr` of their size, for
-            display; None to write everything.
+            display; None to write everything that is not written again and again.
     """
     if longest is not None:  # for display
         values = {key: masked(value, key) for key, value in values.items()}
-    encoded = {key: _encode(value, longest, 0) for key, value in values.items()}
+    text = _Text(longest)
+    encoded = {key: _encode(value, text, 0) for key, value in values.items()}
     return json.dumps(encoded, allow_nan=False)
 
 
 def encoded(value: Any) -> Any:
     """Return a value as `dumps` writes it, before it becomes text."""
-    return _encode(value, None, 0)
+    return _encode(value, _Text(None), 0)
 
 
 def decoded(value: Any, where: str) -> Any:
@@ -103,22 +107,60 @@ def find_lost(values: Mapping[str, Any]) -> list[str]:
     return [key for key, value in values.items() if '{"$repr"' in dumps({"_": value})]
 
 
-def _encode(value: Any, longest: int | None, depth: int) -> Any:
-    """Return the JSON form of a value; `longest` as in `dumps`."""
+class _Text:
+    """One text that is made.
+
+    Args:
+        longest: As in `dumps`.
+    """
+
+    __slots__ = ("_again", "_seen", "longest")
+
+    def __init__(self, longest: int | None) -> None:
+        self.longest = longest
+        self._seen: set[int] = set()
+        self._again = 0
+
+    def is_too_large(self, value: Any, depth: int) -> bool:
+        """Return whether only the size of a value is shown.
+
+        A value that several others hold is written in each of them. Where places know their
+        neighbours, as on a map of roads, there are more ways to each than anybody can write.
+        """
+        if self.longest is not None and len(value) > self.longest:
+            return True
+        if not isinstance(value, _NESTED):
+            return False
+        if depth >= _DEPTH:
+            return True
+        if id(value) not in self._seen:
+            self._seen.add(id(value))
+        elif any(isinstance(one, _NESTED) for one in _parts(value)):
+            self._again += 1
+        return self._again > _AGAIN
+
+
+def _parts(value: Any) -> Iterable[Any]:
+    return value.values() if isinstance(value, dict) else value
+
+
+def _encode(value: Any, text: _Text, depth: int) -> Any:
+    """Return the JSON form of a value, as a part of a text."""
     if value is None or isinstance(value, bool):
         return value
-    if longest is not None and isinstance(value, _SIZED) and len(value) > longest:
+    if isinstance(value, _SIZED) and text.is_too_large(value, depth):
         return {"$repr": f"<{type(value).__name__} of {len(value)} elements>"}
     if isinstance(value, str):
         return str(value)
     if depth < _DEPTH:
-        inside = partial(_encode, longest=longest, depth=depth + 1)
+        inside = partial(_encode, text=text, depth=depth + 1)
         for kind, encode in _ENCODERS:
             if isinstance(value, kind):
                 return encode(value, inside)
         if hasattr(value, "_md5sum") and hasattr(value, "to_dict"):
             with contextlib.suppress(ActionlibError):  # a field has an invalid value: send its repr
-                return {"$msg": value._type, "fields": inside(value.to_dict())}
+                fields = _encode(value.to_dict(), _Text(text.longest), depth + 1)
+                return {"$msg": value._type, "fields": fields}
     return {"$repr": _repr(value)}
 
 

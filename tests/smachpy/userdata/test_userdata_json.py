@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
 from actionlib_core.time import Duration, Time
+from smachpy.userdata import json_text
 from smachpy.userdata.json_text import dumps, find_lost, loads
 
 SCALARS = (
@@ -121,3 +123,34 @@ def test_messages_are_carried_over():
     assert loads(dumps({"goal": [pose]})) == {"goal": [pose]}
     pose.pose.position.x = "here"
     assert find_lost({"goal": pose}) == ["goal"]
+
+
+def places(count):
+    """A map of roads: each place knows its neighbours."""
+    found = [{"name": f"p{number}", "near": []} for number in range(count)]
+    for one, other in [(a, b) for a in range(count) for b in (a + 1, a + 2) if b < count]:
+        found[one]["near"].append(found[other])
+        found[other]["near"].append(found[one])
+    return found
+
+
+@pytest.mark.parametrize("longest", [None, 100])
+def test_a_value_with_many_ways_to_each_part_is_cut(longest):
+    """A map of 30 places was written along each way between two of them: it never ended."""
+    text = dumps({"map": places(30)}, longest=longest)
+    assert "<list of " in text
+    assert len(text) < 5_000_000
+    assert find_lost({"map": places(30)}) == ["map"]
+
+
+def test_parts_that_a_value_has_in_common_are_written_in_each_place():
+    home, many = [1.0, {"name": "home"}], [0.0, 0.0]
+    value = {"home": home, "last": home, "all": [home] * 100, "track": [many] * 20_000}
+    assert loads(dumps({"v": value})) == {"v": value}
+
+
+def test_many_messages_are_no_parts_in_common(monkeypatch):
+    """What their fields are converted to may have the address of an earlier one."""
+    monkeypatch.setattr(json_text, "_AGAIN", 10)
+    value = [MoveBaseGoal() for _ in range(100)]
+    assert loads(dumps({"v": value})) == {"v": value}
