@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import partial
@@ -43,6 +44,7 @@ SHORTEST_S = 0.001  # [s] doubles do not become faster for a shorter timeout
 APART = 0.001  # part added per leaf if there are kills, so that no two end at the same moment
 AFTER = 1e-4  # part of a double's duration after which one that outlasts it looks around
 WITHIN = 0.9  # a leaf outlasts others for this part of its remaining timeout
+LONG_TEXT = 1_000  # characters of the text of a value's part, above which its hash is compared
 _OUTSIDE = frozenset({"monitor", "condition", "service"})
 
 # The options of a leaf besides its outcomes.
@@ -930,21 +932,51 @@ def _text(value: Any) -> str:
     counts as different from all others.
     """
     try:
-        if is_dataclass(value) and not isinstance(value, type):
-            parts = [_text(getattr(value, each.name)) for each in fields(value)]
-        elif type(value) in {list, tuple}:
-            parts = [_text(each) for each in value]
-        elif type(value) is dict:
-            parts = [f"{key!r}: {_text(each)}" for key, each in value.items()]
-        elif hasattr(value, "tobytes") and hasattr(value, "dtype"):
-            parts = [str(value.dtype), str(value.shape), str(value.tobytes())]
-        else:
+        return _part_text(value, {})
+    except RecursionError:  # nested too deeply
+        return object.__repr__(value)
+
+
+def _part_text(value: Any, known: dict[int, tuple[str, Any]]) -> str:
+    """Return the text of a part of a value.
+
+    Args:
+        value: The part.
+        known: Identity of a part -> its text, and the part, as long as whose life its identity is
+            its own. Parts may know each other, so that each is looked at once, and a long text is
+            replaced by its hash.
+    """
+    found = known.get(id(value))
+    if found is not None:
+        return found[0]
+    try:
+        parts = _parts_of(value, known)
+        if parts is None:
             return repr(value)
-        return f"{type(value).__qualname__}({', '.join(parts)})"
-    except RecursionError:  # it contains itself
-        return repr(value)
+        text = f"{type(value).__qualname__}({', '.join(parts)})"
+    except RecursionError:
+        raise
     except Exception:  # noqa: BLE001  the value's own code
         return object.__repr__(value)
+    if len(text) > LONG_TEXT:
+        text = f"{type(value).__qualname__} {hashlib.sha256(text.encode()).hexdigest()}"
+    known[id(value)] = text, value
+    return text
+
+
+def _parts_of(value: Any, known: dict[int, tuple[str, Any]]) -> list[str] | None:
+    """Return the texts of the parts of a value; None if it is told by its `repr`."""
+    if hasattr(value, "tobytes") and hasattr(value, "dtype"):
+        return [str(value.dtype), str(value.shape), str(value.tobytes())]
+    is_record = is_dataclass(value) and not isinstance(value, type)
+    if not is_record and type(value) not in {list, tuple, dict}:
+        return None
+    known[id(value)] = f"...{len(known)}", value  # until it has its own
+    if is_record:
+        return [_part_text(getattr(value, each.name), known) for each in fields(value)]
+    if type(value) is dict:
+        return [f"{key!r}: {_part_text(each, known)}" for key, each in value.items()]
+    return [_part_text(each, known) for each in value]
 
 
 def _kept_by(record: StateRecord, names: Iterable[str]) -> set[str]:

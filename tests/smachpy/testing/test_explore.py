@@ -77,6 +77,19 @@ def test_a_machine_with_a_slash_in_its_name_is_explored():
     assert explore(limited).runs == expected
 
 
+def test_userdata_whose_parts_know_each_other_is_explored():
+    """Places that list their neighbours: the text of 30 was made along each way, and never ended."""
+    places = [{"near": []} for _ in range(30)]
+    for one, place in enumerate(places):
+        place["near"] += [places[one - 1], places[one - 2]]
+    sm = sound()
+    expected = explore(sm)
+    sm.userdata.places = places
+    found = explore(sm)
+    assert found.exhaustive
+    assert found.runs == expected.runs
+
+
 def test_the_machine_is_as_it_was_afterwards():
     sm = sound()
     before = dict(sm.get_children())
