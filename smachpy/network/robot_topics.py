@@ -52,12 +52,14 @@ class RobotTopics:
 
     Args:
         node: The node, whose clock is used too; None for the current node.
+        scans: Whether scans are among them; a simulated robot makes none for nobody.
 
     Threads: every method may be called from any thread. Listeners are called in threads of the
         node's clock, one at a time; an exception of a listener goes to `threading.excepthook`.
     """
 
-    def __init__(self, node: Node | None = None) -> None:
+    def __init__(self, node: Node | None = None, *, scans: bool = True) -> None:
+        self._scans = scans
         self._node = get_node() if node is None else node
         self._lock = threading.Lock()
         # Held while listeners are called, so that records keep their order. Re-entrant, because a
@@ -171,6 +173,8 @@ class RobotTopics:
             return None
         # The robot is named with the namespace, as the actions in events are.
         found = role_of(end.type, end.name)
+        if found is not None and found[0] == "scan" and not self._scans:
+            return None
         return found or ((NUMBERS, self._inside(end.name)) if inside else None)
 
     def _change(self, end: Endpoint, key: str, *, alive: bool) -> None:

@@ -19,7 +19,7 @@ import pytest
 import smachpy_viz.runs.simulate
 from smachpy.command import main
 from smachpy.events.introspection import StateRecord
-from smachpy.events.recording import each_recording
+from smachpy.events.recording import each_recording, read_recording
 from smachpy.exceptions import MissionError, SmachError
 from smachpy_viz.runs.report import MachineRuns, by_quarter, collect, report
 from smachpy_viz.runs.simulate import SimulationPlan, Vary, simulate
@@ -184,6 +184,15 @@ def test_parameters_of_the_robot_can_vary(tmp_path):
     )
     assert {result.error for result in results} == {""}
     assert not list(tmp_path.glob("*.yaml"))
+
+
+def test_recordings_have_the_map_the_poses_and_the_battery_of_the_robot(tmp_path):
+    [result] = simulate(SimulationPlan("shuttle", 1, tmp_path, []), Here())
+    told = read_recording(result.task.file).observed
+    assert {"map", "pose", "plan"} <= {one["what"] for one in told}
+    assert "battery" in {one["name"] for one in told if one["what"] == "value"}
+    assert "scan" not in {one["what"] for one in told}  # they would take longer than the run
+    assert told == sorted(told, key=lambda one: one["stamp_ns"])
 
 
 def test_a_parameter_of_the_robot_that_is_no_number_is_named(tmp_path):

@@ -30,6 +30,7 @@ from smachpy.events.recording import Recorder, RecordingError
 from smachpy.events.run_state import innermost
 from smachpy.exceptions import MissionError
 from smachpy.machines.mission_info import mission_info
+from smachpy.network.robot_topics import RobotTopics
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.places.robot_file import load_config
 
@@ -398,10 +399,21 @@ def _execute(task: SimulatedRun) -> tuple[str | None, str]:
         surroundings.start(machine, others)
         if not surroundings.wait(SERVER_TIMEOUT_S):
             raise MissionError("the program was asked to end")
-        with Recorder(task.file, machine), _limited(machine, task.limit) as limit:
+        with _recorded(task.file, machine), _limited(machine, task.limit) as limit:
             outcome = machine.execute()
         surroundings.over()
     return (outcome, "") if limit.reached is None else (None, limit.reached)
+
+
+@contextlib.contextmanager
+def _recorded(file: Path, machine: Container) -> Iterator[None]:
+    """Record a machine, and its robot without scans: these would take longer than the run."""
+    with RobotTopics(scans=False) as robot, Recorder(file, machine) as recorder:
+        ends = robot.listen(recorder.observe)
+        try:
+            yield
+        finally:
+            ends()
 
 
 class _Limit:
