@@ -74,7 +74,7 @@ export class Gif implements Encoder {
   end() {
     this.#write();
     this.#gif.finish();
-    return { data: this.#gif.bytes().slice().buffer, type: "image/gif" as const };
+    return { data: this.#gif.bytes().buffer, type: "image/gif" as const };
   }
 }
 
