@@ -6281,8 +6281,8 @@ var Viewport = class {
   }
   set(x3, y5, k4) {
     Object.assign(this, { x: x3, y: y5, k: k4 });
-    this.world.setAttribute("transform", `translate(${x3} ${y5}) scale(${k4})`);
     this.onChange();
+    this.world.setAttribute("transform", `translate(${x3} ${y5}) scale(${k4})`);
   }
   /** Show all of a box. */
   frame(box, { margin = MARGIN, most = 1.6, animate = true } = {}) {
@@ -6756,17 +6756,18 @@ var Minimap = class {
     if (!this.#size) return;
     const { x: x3, y: y5, k: k4, width, height } = view2;
     const { w: w5, h: h5 } = this.#size;
+    const own2 = { w: this.svg.clientWidth, h: this.svg.clientHeight };
     const place = { x: -x3 / k4, y: -y5 / k4, width: width / k4, height: height / k4 };
     for (const [name, value] of Object.entries(place)) this.#window.setAttribute(name, String(value));
     this.#window.style.strokeWidth = `${Math.max(w5, h5) / 70}px`;
     const seen2 = (from, size, room) => Math.max(0, Math.min(room, from + size * k4) - Math.max(0, from)) / (size * k4);
     const isIdle = seen2(x3, w5, width) * seen2(y5, h5, height) > SHOWN_BELOW;
     this.svg.classList.toggle("idle", isIdle);
-    if (!isIdle) this.svg.setAttribute("data-corner", this.#freeCorner(view2));
+    if (!isIdle) this.svg.setAttribute("data-corner", this.#freeCorner(view2, own2));
   }
-  /** The corner of the view where the minimap covers the fewest states. */
-  #freeCorner({ x: x3, y: y5, k: k4, width, height }) {
-    const [w5, h5] = [this.svg.clientWidth + 20, this.svg.clientHeight + 20];
+  /** The corner of the view where the minimap covers the fewest states. @param own its size [px] */
+  #freeCorner({ x: x3, y: y5, k: k4, width, height }, own2) {
+    const [w5, h5] = [own2.w + 20, own2.h + 20];
     const covered = Object.fromEntries(CORNERS.map((corner) => [corner, 0]));
     for (const box of this.#leaves) {
       const [left, top] = [box.x * k4 + x3, box.y * k4 + y5];
@@ -8027,9 +8028,9 @@ var Page = class {
     this.minimap = new Minimap(minimap2, (x3, y5) => this.view.centre(x3, y5));
     this.diagram = new Diagram(svg2, (path, active) => this.minimap.light(path, active));
     this.view = new Viewport(svg2, this.diagram.world, () => {
+      this.minimap.showWindow(this.view);
       this.diagram.showScale(this.view.k);
       store.view.scale.value = this.view.k;
-      this.minimap.showWindow(this.view);
     });
     this.timeline = new Timeline(canvas2, {
       onPick: (path) => this.goTo(path),

@@ -63,6 +63,7 @@ export class Minimap {
     if (!this.#size) return;
     const { x, y, k, width, height } = view;
     const { w, h } = this.#size;
+    const own = { w: this.svg.clientWidth, h: this.svg.clientHeight };
     const place = { x: -x / k, y: -y / k, width: width / k, height: height / k };
     for (const [name, value] of Object.entries(place)) this.#window.setAttribute(name, String(value));
     this.#window.style.strokeWidth = `${Math.max(w, h) / 70}px`;
@@ -70,12 +71,12 @@ export class Minimap {
       Math.max(0, Math.min(room, from + size * k) - Math.max(0, from)) / (size * k);
     const isIdle = seen(x, w, width) * seen(y, h, height) > SHOWN_BELOW;
     this.svg.classList.toggle("idle", isIdle);
-    if (!isIdle) this.svg.setAttribute("data-corner", this.#freeCorner(view));
+    if (!isIdle) this.svg.setAttribute("data-corner", this.#freeCorner(view, own));
   }
 
-  /** The corner of the view where the minimap covers the fewest states. */
-  #freeCorner({ x, y, k, width, height }: Viewport) {
-    const [w, h] = [this.svg.clientWidth + 20, this.svg.clientHeight + 20];
+  /** The corner of the view where the minimap covers the fewest states. @param own its size [px] */
+  #freeCorner({ x, y, k, width, height }: Viewport, own: { w: number; h: number }) {
+    const [w, h] = [own.w + 20, own.h + 20];
     const covered = Object.fromEntries(CORNERS.map((corner) => [corner, 0]));
     for (const box of this.#leaves) {
       const [left, top] = [box.x * k + x, box.y * k + y];

@@ -52,9 +52,9 @@ export class Page {
     this.minimap = new Minimap(minimap, (x, y) => this.view.centre(x, y));
     this.diagram = new Diagram(svg, (path, active) => this.minimap.light(path, active));
     this.view = new Viewport(svg, this.diagram.world, () => {
+      this.minimap.showWindow(this.view);
       this.diagram.showScale(this.view.k);
       store.view.scale.value = this.view.k;
-      this.minimap.showWindow(this.view);
     });
     this.timeline = new Timeline(canvas, {
       onPick: (path) => this.goTo(path),

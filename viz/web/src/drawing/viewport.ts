@@ -53,8 +53,8 @@ export class Viewport {
 
   set(x: number, y: number, k: number) {
     Object.assign(this, { x, y, k });
+    this.onChange(); // before the diagram is moved: it asks for sizes, which would lay all of it out once more
     this.world.setAttribute("transform", `translate(${x} ${y}) scale(${k})`);
-    this.onChange();
   }
 
   /** Show all of a box. */
