@@ -174,6 +174,18 @@ def test_buttons_zoom_and_cover_nothing(served, look):
     assert page.evaluate(below)
 
 
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844), (844, 390)])
+def test_the_words_about_the_past_cover_nothing_of_the_machine(served, look, size):
+    late = ("Left", "/JOB/A", {"outcome": "ok", "at": 500.0})  # "8 min 19 ago" is long
+    served.add("one", labels="ABCDEFGHIJ", events=[*BEGUN, late])
+    page = look(served.start(), viewport={"width": size[0], "height": size[1]})
+    seek(page, 1)
+    page.wait_for_selector(".banner.past")
+    between = """() => document.querySelector('.diagram g[data-path="/JOB"] .frame').getBoundingClientRect().top
+        - document.querySelector('.banner.past').getBoundingClientRect().bottom"""
+    assert page.evaluate(between) >= 0
+
+
 def test_the_tree_opens_on_a_small_screen(served, look):
     served.add("one", events=BEGUN)
     page = look(served.start())

@@ -209,3 +209,15 @@ def test_a_phone_shows_the_question_and_its_buttons_at_once(served, look):
         "(card) => document.getElementById(card.getAttribute('aria-labelledby')).textContent"
     )
     assert " " not in page.get_attribute("[role=alertdialog]", "aria-labelledby")
+
+
+@pytest.mark.browser
+def test_beside_a_question_no_button_of_a_phone_held_sideways_is_cut(served, look):
+    served.add("one", labels="ABCDEFGHIJKL", events=WAITS)
+    page = look(f"{served.start(token='t')}#token=t", viewport={"width": 844, "height": 390})
+    page.wait_for_selector(OPEN)
+    cut = """() => { const { right } = document.querySelector('.stage').getBoundingClientRect();
+        return [...document.querySelectorAll('.strip button')].map((b) => b.getBoundingClientRect())
+            .filter((box) => box.width && box.right > right).length; }"""
+    page.wait_for_selector(".zoom .offer")  # the widest
+    assert page.evaluate(cut) == 0

@@ -6239,7 +6239,7 @@ var Labels = class {
 // src/drawing/viewport.ts
 var LEAST_SCALE = 0.04;
 var MOST_SCALE = 4;
-var HEAD4 = 18;
+var HEAD4 = 30;
 var MARGIN = 16;
 var Viewport = class {
   svg;
@@ -11718,10 +11718,12 @@ function Overlay({ page: page2 }) {
     return /* @__PURE__ */ a4("div", { class: "banner past", children: [
       "Viewing ",
       /* @__PURE__ */ a4("b", { children: store.clock.instantText(store.playback.cursor.value) }),
-      ", ",
-      duration(ago),
-      " ",
-      when,
+      /* @__PURE__ */ a4("span", { class: "ago", children: [
+        ", ",
+        duration(ago),
+        " ",
+        when
+      ] }),
       /* @__PURE__ */ a4("button", { onClick: () => page2.timeline.live(), children: [
         "Back to ",
         isOver ? "the end" : "live"

@@ -4,7 +4,7 @@ import type { Box, Point } from "#core/types.ts";
 
 const LEAST_SCALE = 0.04;
 const MOST_SCALE = 4;
-const HEAD = 18; // height that a banner covers [px]
+const HEAD = 30; // height that a banner covers [px]
 const MARGIN = 16; // around all of the machine [px]
 
 /** translation [px] and scale */

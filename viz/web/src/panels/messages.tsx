@@ -79,7 +79,10 @@ export function Overlay({ page }: { page: Page }) {
     const when = isOver ? "before the end" : "ago";
     return (
       <div class="banner past">
-        Viewing <b>{store.clock.instantText(store.playback.cursor.value)}</b>, {duration(ago)} {when}
+        Viewing <b>{store.clock.instantText(store.playback.cursor.value)}</b>
+        <span class="ago">
+          , {duration(ago)} {when}
+        </span>
         <button onClick={() => page.timeline.live()}>Back to {isOver ? "the end" : "live"}</button>
       </div>
     );
