@@ -1108,8 +1108,8 @@ var widened = (all, dock, width) => ({
   widths: { ...all.widths, [dock]: within(width, WIDTHS) }
 });
 function dropAt(at, docks, page2) {
-  const inside = (box) => at.x >= box.x && at.x <= box.x + box.w && at.y >= box.y && at.y <= box.y + box.h;
-  const over = docks.find((one) => inside(one.box));
+  const inside2 = (box) => at.x >= box.x && at.x <= box.x + box.w && at.y >= box.y && at.y <= box.y + box.h;
+  const over = docks.find((one) => inside2(one.box));
   const far = [
     ["left", at.x / page2.w],
     ["right", 1 - at.x / page2.w],
@@ -1561,11 +1561,11 @@ var ESCAPES = { "\\": "\\\\", "\n": "\\n", "\r": "\\r", "	": "\\t" };
 function quoted(text2) {
   const quote = text2.includes("'") && !text2.includes('"') ? '"' : "'";
   const hex = (c4) => c4.charCodeAt(0).toString(16);
-  const inside = text2.replace(QUOTED, (c4) => {
+  const inside2 = text2.replace(QUOTED, (c4) => {
     const long = c4.charCodeAt(0) > 255;
     return ESCAPES[c4] ?? (long ? `\\u${hex(c4)}` : `\\x${hex(c4).padStart(2, "0")}`);
   });
-  return `${quote}${quote === "'" ? inside.replaceAll("'", "\\'") : inside}${quote}`;
+  return `${quote}${quote === "'" ? inside2.replaceAll("'", "\\'") : inside2}${quote}`;
 }
 var isTree = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
 var items = (value) => {
@@ -1722,9 +1722,9 @@ var Axis = class {
   constructor(folds, { from, to }, left, right) {
     [this.from, this.to, this.left, this.right] = [from, to, left, right];
     this.folds = folds.filter((one) => one.from < to && one.to > from && !(one.from <= from && one.to >= to));
-    const inside = this.folds.map((one) => Math.min(one.to, to) - Math.max(one.from, from));
-    const parts = this.folds.reduce((sum, one, i4) => sum + inside[i4] / lengthOf(one), 0);
-    const busy = to - from - inside.reduce((a5, b3) => a5 + b3, 0);
+    const inside2 = this.folds.map((one) => Math.min(one.to, to) - Math.max(one.from, from));
+    const parts = this.folds.reduce((sum, one, i4) => sum + inside2[i4] / lengthOf(one), 0);
+    const busy = to - from - inside2.reduce((a5, b3) => a5 + b3, 0);
     if (parts) this.#width = Math.min(WIDTH, (right - left) * MOST2 / parts);
     this.rate = (right - left - parts * this.#width) / Math.max(busy, 1e-6);
   }
@@ -3267,8 +3267,8 @@ var Status = class {
     const [last] = left.reduce((a5, b3) => (b3[1].left ?? 0) > (a5[1].left ?? 0) ? b3 : a5);
     const entered = (this.#data.run.visitAt(last)?.from ?? 0) * 1e6;
     const isWithin = (path, top) => `${path}/`.startsWith(`${top}/`);
-    const inside = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered);
-    const end = innermost(inside, ([path]) => path);
+    const inside2 = left.filter(([path, state]) => isWithin(path, last) && (state.left ?? 0) >= entered);
+    const end = innermost(inside2, ([path]) => path);
     const newest3 = end.reduce((a5, b3) => {
       const later = (b3[1].left ?? 0) - (a5[1].left ?? 0);
       return later > 0 || later === 0 && depth(b3[0]) > depth(a5[0]) ? b3 : a5;
@@ -3444,11 +3444,11 @@ var View = class {
     const top = node.children.length ? node : node.parent;
     if (!model || !top) return;
     const below = top.depth + model.readableDepth(AROUND, top);
-    const inside = model.order.filter(
+    const inside2 = model.order.filter(
       (one) => one.children.length && one.depth < below && (one === top || one.path.startsWith(`${top.path}/`))
     );
     this.follow.value = false;
-    this.setOpened(new Set([...model.ancestors(top.path), ...inside].map((one) => one.path)));
+    this.setOpened(new Set([...model.ancestors(top.path), ...inside2].map((one) => one.path)));
   }
   toggle(path) {
     const next = new Set(this.opened.value);
@@ -3702,15 +3702,15 @@ function targetText() {
   return robots.length === 1 ? `${name} on ${robots[0]}` : `${name} on ${robots.length} robots`;
 }
 function endsText(within3) {
-  const inside = (path) => `${path}/`.startsWith(`${within3}/`);
+  const inside2 = (path) => `${path}/`.startsWith(`${within3}/`);
   const { states: states2, goals } = store.data.run.now;
   const now = store.data.liveMs();
-  const leaves = store.data.runningLeaves().filter(inside);
+  const leaves = store.data.runningLeaves().filter(inside2);
   const running = leaves.slice(0, MOST_NAMED).map((path) => {
     const since = own(states2, path)?.since;
     return `${store.data.nameOf(path)}${since == null ? "" : ` (${duration((now - since / 1e6) / 1e3)})`}`;
   });
-  const sentGoals = Object.entries(goals).filter(([, goal]) => goal.ended == null && inside(goal.path));
+  const sentGoals = Object.entries(goals).filter(([, goal]) => goal.ended == null && inside2(goal.path));
   const targets = sentGoals.slice(0, MOST_NAMED).map(([id, goal]) => goalText(id, goal));
   const more = (count) => count > MOST_NAMED ? `, and ${count - MOST_NAMED} more` : "";
   return [
@@ -4639,8 +4639,8 @@ var Picture = class {
     if (!isNet) group.append(icon(node.kind, left, middle - 5));
     group.append(el("text", { class: "name", x: left + (isNet ? 7 : 14), y: middle + 3.9 }, node.shown));
     if (closed) {
-      const inside = `⊞ ${node.total - 1}`;
-      group.append(el("text", { class: "inside", x: left + nameWidth + 7, y: middle + 3.4 }, inside));
+      const inside2 = `⊞ ${node.total - 1}`;
+      group.append(el("text", { class: "inside", x: left + nameWidth + 7, y: middle + 3.4 }, inside2));
     }
     for (const dot of place.dots) {
       const kind = endClass(node, dot.outcome);
@@ -4654,13 +4654,13 @@ var Picture = class {
   }
   /** Write the name of a branch, and below it what runs in it. */
   #card({ node, w: w5 }, group, x3, y5) {
-    const inside = el("text", { class: "doing", x: x3 + 10, y: y5 + 36 }, "");
+    const inside2 = el("text", { class: "doing", x: x3 + 10, y: y5 + 36 }, "");
     group.append(
       icon(node.kind, x3 + 9, y5 + 9),
       el("text", { class: "name", x: x3 + 24, y: y5 + 18 }, fitting(node.shown, w5 - 70))
     );
-    group.append(inside);
-    this.cards.set(node.path, { element: inside, text: "" });
+    group.append(inside2);
+    this.cards.set(node.path, { element: inside2, text: "" });
   }
   /**
    * Add the badges, which are empty at first, and keep the elements that change.
@@ -5831,8 +5831,8 @@ var countOf = (node, open) => isOpen(node, open) ? node.children.reduce((sum, ch
 var CARDS = "cards";
 var areCards = (node, open) => hasManyBranches(node) && !node.children.some((child) => isOpen(child, open) || child.change);
 function keyOf2(node, open, keys2, inner) {
-  const inside = node.children.filter((child) => isOpen(child, open)).map((child) => keys2.get(child));
-  return `${node.path}(${inside.join(SEP)})${inside.length && inner !== 1 ? inner : ""}`;
+  const inside2 = node.children.filter((child) => isOpen(child, open)).map((child) => keys2.get(child));
+  return `${node.path}(${inside2.join(SEP)})${inside2.length && inner !== 1 ? inner : ""}`;
 }
 
 // src/drawing/layout_controller.ts
@@ -5970,8 +5970,8 @@ var LayoutController = class {
     if (!diagram.size) return null;
     const x3 = (view2.width / 2 - view2.x) / view2.k;
     const y5 = (view2.height / 2 - view2.y) / view2.k;
-    const inside = (b3) => x3 >= b3.x && x3 <= b3.x + b3.w && y5 >= b3.y && y5 <= b3.y + b3.h;
-    const path = this.#toggled ?? [...diagram.picture.boxes].findLast(([, box2]) => inside(box2))?.[0] ?? null;
+    const inside2 = (b3) => x3 >= b3.x && x3 <= b3.x + b3.w && y5 >= b3.y && y5 <= b3.y + b3.h;
+    const path = this.#toggled ?? [...diagram.picture.boxes].findLast(([, box2]) => inside2(box2))?.[0] ?? null;
     this.#toggled = null;
     const box = diagram.boxOf(path);
     return path !== null && box ? { path, x: box.x, y: box.y } : null;
@@ -6398,6 +6398,7 @@ function grab(element, {
 
 // src/drawing/map.ts
 var MARGIN2 = 10;
+var MARKED = 20;
 var ROBOT_M = 8;
 var REACH = 9;
 var SCAN_MS = 1500;
@@ -6459,8 +6460,9 @@ var MapView = class {
     const box = scene.extent(now);
     const robot = this.followed === null ? null : scene.robots.get(this.followed);
     const pose = robot && scene.poseAt(robot, now);
+    const [margin, most] = scene.mapAt(now) ? [MARGIN2, Infinity] : [MARKED, Math.min(width, height) / ROBOT_M];
     const whole2 = box ? {
-      k: Math.min((width - 2 * MARGIN2) / box.w, (height - 2 * MARGIN2) / box.h),
+      k: Math.min(most, (width - 2 * margin) / box.w, (height - 2 * margin) / box.h),
       x: box.x + box.w / 2,
       y: box.y + box.h / 2
     } : { k: 20, x: 0, y: 0 };
@@ -7100,12 +7102,92 @@ function densityOf(events, columnOf, columns, model = null) {
 }
 var asksIn = (waits, now) => waits.filter(({ kind }) => kind === "asks").map(({ from, to }) => [from, to ?? now]);
 
+// src/drawing/time_window.ts
+var LIVE_MS = 3e4;
+var SHORTEST_MS2 = 20;
+var LONGEST_MS = 30 * 864e5;
+var WIDE2 = 1e3;
+var TimeWindow = class {
+  length = LIVE_MS;
+  // [ms]
+  end = null;
+  // [ms]; null: now
+  reset() {
+    this.end = null;
+    this.length = LIVE_MS;
+  }
+  /** Show the whole run. */
+  fitAll() {
+    const first = store.data.run.first();
+    const last = store.playback.nowMs();
+    if (first == null) return;
+    const folded = store.clock.folds().reduce((sum, one) => sum + lengthOf(one), 0);
+    const margin = (last - first - folded) * 0.02;
+    this.length = Math.max(SHORTEST_MS2, last - first + 2 * margin);
+    this.end = Math.max(last + margin, first + this.length * 0.98);
+  }
+  /** Show a visit with some time around it. @param to [ms] */
+  fit(from, to) {
+    this.length = Math.max(SHORTEST_MS2, (to - from) * 1.1);
+    this.end = (from + to) / 2 + this.length / 2;
+  }
+  /** Show a range [ms]; one that reaches the present of a running machine moves on with it. */
+  show({ from, to }) {
+    const { playback, data } = store;
+    const isLive = playback.cursor.value === null && playback.goes.value && to >= data.liveMs();
+    this.length = Math.max(SHORTEST_MS2, to - from);
+    this.end = isLive ? null : to;
+  }
+  /** The range [ms]. */
+  range() {
+    const now = store.playback.nowMs();
+    const isPast = store.playback.cursor.value !== null;
+    let end = this.end ?? now + this.length * 0.01;
+    if (this.end === null && isPast) end = now + this.length / 2;
+    const first = store.data.run.first();
+    if (this.end === null && !isPast && first != null) end = Math.max(end, first + this.length * 0.98);
+    return [end - this.length, end];
+  }
+  /** Where the instants of the range are between two places. */
+  axis(left, right) {
+    const [from, to] = this.range();
+    return new Axis(store.clock.folds(), { from, to }, left, right);
+  }
+  /** Let the range stay where it is. */
+  hold() {
+    this.end ??= this.range()[1];
+  }
+  /** Move the range by a part of what it shows. */
+  move(part) {
+    const axis = this.axis(0, WIDE2);
+    const [from, to] = [part * WIDE2, (1 + part) * WIDE2].map((px) => axis.timeAt(px));
+    this.length = Math.max(SHORTEST_MS2, to - from);
+    this.end = to;
+  }
+  /** Make the range longer by a factor, around an instant [ms]. */
+  zoom(factor, at) {
+    const axis = this.axis(0, WIDE2);
+    const isHeld = this.end !== null || store.playback.cursor.value !== null;
+    const fixed = isHeld ? axis.x(at) : WIDE2;
+    const [from, to] = [0, WIDE2].map((px) => axis.timeAt(fixed + (px - fixed) * factor));
+    const length = Math.max(SHORTEST_MS2, Math.min(to - from, LONGEST_MS));
+    if (isHeld) this.end = length === to - from ? to : at + (to - at) * length / (to - from);
+    this.length = length;
+  }
+  /** Keep the played instant in view. */
+  keepInView() {
+    const at = store.playback.cursor.value;
+    if (this.end === null || at === null || !store.playback.playing.value) return;
+    if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
+    else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
+  }
+};
+
 // src/drawing/strip.ts
 var RIGHT = 14;
 var GRIP = 8;
 var COLUMN = 3;
 var FAILURE2 = 2.5;
-var SHORTEST_MS2 = 500;
 var Strip = class {
   canvas;
   left = 168;
@@ -7132,7 +7214,7 @@ var Strip = class {
   #whole() {
     const from = store.data.run.first();
     if (from === null) return null;
-    return { from, to: Math.max(store.data.liveMs(), from + 1e3) };
+    return { from, to: Math.max(store.data.liveMs(), from + SHORTEST_MS2) };
   }
   draw() {
     const g5 = this.#context;
@@ -7210,9 +7292,9 @@ var Strip = class {
     }
   }
   #ends(x3, width) {
-    const inside = (px) => Math.max(this.left, Math.min(width - RIGHT, px));
-    const left = inside(x3(this.shown.from));
-    return [left, Math.max(inside(x3(this.shown.to)), left + 4)];
+    const inside2 = (px) => Math.max(this.left, Math.min(width - RIGHT, px));
+    const left = inside2(x3(this.shown.from));
+    return [left, Math.max(inside2(x3(this.shown.to)), left + 4)];
   }
   /** Drag the window or one of its ends; a press beside it brings it there. */
   #down(e4) {
@@ -7245,6 +7327,8 @@ var Strip = class {
 // src/drawing/bars.ts
 var THINNEST = 0.5;
 var FAILED = 3;
+var LATER = 0.35;
+var NAME = 11;
 var LEAST_LETTERS = 2;
 var MOST_WIDTHS = 4e3;
 var Bars = class {
@@ -7268,7 +7352,10 @@ var Bars = class {
     g5.fillStyle = this.colours.of("muted");
     g5.textAlign = "left";
     const indent = 10 + Math.min(lane.depth, 6) * 9;
-    clipped(g5, 0, y5, scale.left - 8, h5, () => g5.fillText(lane.name, indent, y5 + h5 / 2));
+    const room = scale.left - 8 - indent;
+    const widthOf = (one) => this.#widthOf(one, NAME);
+    const name = widthOf(lane.name) > room ? beginningOf(lane.name, room, widthOf) : lane.name;
+    g5.fillText(name, indent, y5 + h5 / 2);
     this.#visits(lane, y5, lanes, model, scale);
     this.#waits(lane, y5, lanes, model, scale);
   }
@@ -7294,7 +7381,7 @@ var Bars = class {
       const wide = Math.max(isFailure2 ? FAILED : 2, end - begin);
       const hit = { left: begin, right: begin + wide, ...rowOf(lanes, lane, node, span.from, y5), span };
       const paint2 = () => {
-        g5.globalAlpha = later ? 0.35 : 1;
+        g5.globalAlpha = later ? LATER : 1;
         this.#visit(hit, node, ended, x3, later ? Infinity : now);
         g5.globalAlpha = 1;
         this.hits.push(hit);
@@ -7311,6 +7398,31 @@ var Bars = class {
     const [wide, tall] = [right - left, bottom - top];
     const asked2 = span.preempt !== null && span.preempt <= now ? span.preempt : null;
     const kind = ended ? endClass(node, span.outcome) : asked2 !== null ? "preempted" : "active";
+    const shown = x3(now);
+    const paint2 = () => this.#body({ span, ...bar }, kind, asked2 === null ? null : x3(asked2));
+    if (!ended && shown < right - 1) {
+      g5.globalAlpha = LATER;
+      clipped(g5, shown, top - 1, right + 1 - shown, tall + 2, paint2);
+      g5.globalAlpha = 1;
+      clipped(g5, left - 1, top - 1, shown - left + 1, tall + 2, paint2);
+    } else paint2();
+    if (store.view.selected.value === span.path) {
+      g5.strokeStyle = this.colours.of("ink");
+      g5.lineWidth = 2;
+      g5.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
+    }
+    const lit = store.pointer.hovered.value;
+    if (lit?.path === span.path && lit.from === span.from) this.#halo(bar);
+    if (span.serviced !== null && span.serviced <= now) this.#mark(Math.min(x3(span.serviced), right), bar, "preempted");
+    if (span.abandoned !== null && span.abandoned <= now)
+      this.#mark(Math.min(x3(span.abandoned), right), bar, "failure");
+    const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? store.playback.nowMs() : now);
+    this.#text(words2, `${kind}-text`, bar);
+  }
+  /** @param asked where the hatch of a request to stop begins [px] */
+  #body({ span, ...bar }, kind, asked2) {
+    const g5 = this.context;
+    const { left, right, top, bottom } = bar;
     g5.fillStyle = this.colours.of(`${kind}-fill`);
     g5.strokeStyle = this.colours.of(kind);
     g5.lineWidth = 1.1;
@@ -7321,27 +7433,14 @@ var Bars = class {
       g5.clip();
       g5.fillStyle = this.colours.of("preempted");
       g5.globalAlpha *= 0.55;
-      for (let px = Math.max(left, x3(asked2)); px < right; px += 5) g5.fillRect(px, top, 2.5, tall);
+      for (let px = Math.max(left, asked2); px < right; px += 5) g5.fillRect(px, top, 2.5, bottom - top);
       g5.restore();
     }
     g5.stroke();
-    if (store.view.selected.value === span.path) {
-      g5.strokeStyle = this.colours.of("ink");
-      g5.lineWidth = 2;
-      g5.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
-    }
     const driver = store.data.scene.colourOf(span.path);
-    if (driver >= 0) {
-      g5.fillStyle = this.colours.of(`s${1 + driver % COLOURS}`);
-      g5.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
-    }
-    const lit = store.pointer.hovered.value;
-    if (lit?.path === span.path && lit.from === span.from) this.#halo(bar);
-    if (span.serviced !== null && span.serviced <= now) this.#mark(Math.min(x3(span.serviced), right), bar, "preempted");
-    if (span.abandoned !== null && span.abandoned <= now)
-      this.#mark(Math.min(x3(span.abandoned), right), bar, "failure");
-    const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? store.playback.nowMs() : now);
-    this.#text(words2, `${kind}-text`, bar);
+    if (driver < 0) return;
+    g5.fillStyle = this.colours.of(`s${1 + driver % COLOURS}`);
+    g5.fillRect(left + 2, bottom - 4, Math.max(0, right - left - 4), 2.5);
   }
   /** Draw the times in which the lane's states were paused before they began, or asked. */
   #waits(lane, y5, lanes, model, axis) {
@@ -7578,87 +7677,6 @@ var isNamed = (path, words2) => {
   return words2.some((word) => name.includes(word));
 };
 
-// src/drawing/time_window.ts
-var LIVE_MS = 3e4;
-var SHORTEST_MS3 = 200;
-var LONGEST_MS = 30 * 864e5;
-var WIDE2 = 1e3;
-var TimeWindow = class {
-  length = LIVE_MS;
-  // [ms]
-  end = null;
-  // [ms]; null: now
-  reset() {
-    this.end = null;
-    this.length = LIVE_MS;
-  }
-  /** Show the whole run. */
-  fitAll() {
-    const first = store.data.run.first();
-    const last = store.playback.nowMs();
-    if (first == null) return;
-    const folded = store.clock.folds().reduce((sum, one) => sum + lengthOf(one), 0);
-    const margin = Math.max(10, (last - first - folded) * 0.02);
-    this.length = Math.max(500, last - first + 2 * margin);
-    this.end = last + margin;
-  }
-  /** Show a visit with some time around it. @param to [ms] */
-  fit(from, to) {
-    this.length = Math.max(SHORTEST_MS3, (to - from) * 1.1);
-    this.end = (from + to) / 2 + this.length / 2;
-  }
-  /** Show a range [ms]; one that reaches the present of a running machine moves on with it. */
-  show({ from, to }) {
-    const { playback, data } = store;
-    const isLive = playback.cursor.value === null && playback.goes.value && to >= data.liveMs();
-    this.length = Math.max(SHORTEST_MS3, to - from);
-    this.end = isLive ? null : to;
-  }
-  /** The range [ms]. */
-  range() {
-    const now = store.playback.nowMs();
-    const isPast = store.playback.cursor.value !== null;
-    let end = this.end ?? now + this.length * 0.01;
-    if (this.end === null && isPast) end = now + this.length / 2;
-    const first = store.data.run.first();
-    if (this.end === null && !isPast && first != null) end = Math.max(end, first + this.length * 0.98);
-    return [end - this.length, end];
-  }
-  /** Where the instants of the range are between two places. */
-  axis(left, right) {
-    const [from, to] = this.range();
-    return new Axis(store.clock.folds(), { from, to }, left, right);
-  }
-  /** Let the range stay where it is. */
-  hold() {
-    this.end ??= this.range()[1];
-  }
-  /** Move the range by a part of what it shows. */
-  move(part) {
-    const axis = this.axis(0, WIDE2);
-    const [from, to] = [part * WIDE2, (1 + part) * WIDE2].map((px) => axis.timeAt(px));
-    this.length = Math.max(SHORTEST_MS3, to - from);
-    this.end = to;
-  }
-  /** Make the range longer by a factor, around an instant [ms]. */
-  zoom(factor, at) {
-    const axis = this.axis(0, WIDE2);
-    const isHeld = this.end !== null || store.playback.cursor.value !== null;
-    const fixed = isHeld ? axis.x(at) : WIDE2;
-    const [from, to] = [0, WIDE2].map((px) => axis.timeAt(fixed + (px - fixed) * factor));
-    const length = Math.max(SHORTEST_MS3, Math.min(to - from, LONGEST_MS));
-    if (isHeld) this.end = length === to - from ? to : at + (to - at) * length / (to - from);
-    this.length = length;
-  }
-  /** Keep the played instant in view. */
-  keepInView() {
-    const at = store.playback.cursor.value;
-    if (this.end === null || at === null || !store.playback.playing.value) return;
-    if (at > this.end - 0.02 * this.length) this.end = at + 0.8 * this.length;
-    else if (at < this.end - this.length) this.end = at + 0.95 * this.length;
-  }
-};
-
 // src/drawing/timeline_marks.ts
 var NOTE = 130;
 function drawOutages(g5, colours, axis, height) {
@@ -7754,7 +7772,11 @@ var TOOLS_NARROW = 176;
 var RIGHT2 = 14;
 var TOP = 3;
 var FOOT = 26;
-var STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400];
+var FLAG = "600 11px 'JetBrains Mono', ui-monospace, monospace";
+var STEPS_S = [
+  ...[1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5],
+  ...[1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400]
+];
 var Timeline = class {
   canvas;
   context;
@@ -7880,6 +7902,9 @@ var Timeline = class {
     g5.textAlign = "left";
     g5.lineWidth = 1;
     const next = (t4) => begun + Math.ceil((t4 - begun) / step) * step;
+    const digits = Math.max(0, Math.ceil(3 - Math.log10(step)));
+    const shown = store.playback.cursor.value;
+    const flag = shown === null ? null : this.#flagBox(inside(axis, shown), shown);
     let free = this.names === NAMES_NARROW ? TOOLS_NARROW : 0;
     for (let t4 = next(from); t4 < to; t4 += step) {
       const fold = axis.folds.find((one) => one.from < t4 && one.to > t4);
@@ -7889,9 +7914,10 @@ var Timeline = class {
       g5.moveTo(px, 0);
       g5.lineTo(px, height - FOOT);
       g5.stroke();
-      const text2 = store.clock.instantText(t4, step < 1e3 ? 1 : 0);
+      const text2 = store.clock.instantText(t4, digits);
       const end = px + 3 + g5.measureText(text2).width;
-      if (px < free || end > width) continue;
+      const isCovered = flag !== null && px < flag.right && end > flag.left;
+      if (t4 < first || px < free || end > width || isCovered) continue;
       g5.fillText(text2, px + 3, height - FOOT / 2);
       free = end + 4;
     }
@@ -7911,31 +7937,33 @@ var Timeline = class {
   }
   /** Draw the instants at the pointer and shown. */
   #cursor(axis, height) {
-    const { left, right } = axis;
-    const x3 = (t4) => axis.x(t4);
     const at = store.playback.cursor.value;
     const pointed = store.pointer.pointed.value;
-    if (pointed !== null && x3(pointed) >= left) this.#flag(x3(pointed), pointed, height, "muted", 1);
-    if (at === null) return;
-    const px = Math.max(left, Math.min(right, x3(at)));
-    this.#flag(px, at, height, "active", 2);
+    if (pointed !== null && axis.x(pointed) >= axis.left) this.#flag(axis.x(pointed), pointed, height, "muted", 1);
+    if (at !== null) this.#flag(inside(axis, at), at, height, "active", 2);
   }
   /** Draw a line through the lanes, with its instant at the axis. */
   #flag(px, t4, height, colour, wide) {
     const g5 = this.context;
-    const text2 = store.clock.instantText(t4);
-    g5.font = "600 11px 'JetBrains Mono', ui-monospace, monospace";
-    const half = g5.measureText(text2).width / 2 + 5;
-    const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
+    const { left, right } = this.#flagBox(px, t4);
+    g5.font = FLAG;
     g5.fillStyle = this.#colours.of(colour);
     g5.fillRect(px - wide / 2, 0, wide, height - FOOT);
     g5.beginPath();
-    g5.roundRect(middle - half, height - FOOT + 3, 2 * half, FOOT - 6, 4);
+    g5.roundRect(left, height - FOOT + 3, right - left, FOOT - 6, 4);
     g5.fill();
     g5.fillStyle = this.#colours.of("background");
     g5.textAlign = "center";
-    g5.fillText(text2, middle, height - FOOT / 2 + 0.5);
+    g5.fillText(store.clock.instantText(t4), (left + right) / 2, height - FOOT / 2 + 0.5);
     g5.font = FONT;
+  }
+  /** The ends of the flag with an instant, at the axis [px]. */
+  #flagBox(px, t4) {
+    this.context.font = FLAG;
+    const half = this.context.measureText(store.clock.instantText(t4)).width / 2 + 5;
+    this.context.font = FONT;
+    const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
+    return { left: middle - half, right: middle + half };
   }
   // -- input ------------------------------------------------------------------------------------
   #timeAt(px) {
@@ -8001,6 +8029,7 @@ var Timeline = class {
     e4.preventDefault();
   }
 };
+var inside = (axis, t4) => Math.max(axis.left, Math.min(axis.right, axis.x(t4)));
 
 // src/drawing/page.ts
 var Page = class {
@@ -9864,8 +9893,8 @@ function isShown(row, show2, pins2) {
 }
 function hasText(row, text2) {
   const all = [row.machine, ...row.robots, row.reason, row.outcome ?? "", ...row.strip.map((piece) => piece[1])];
-  const inside = all.join(" ").toLowerCase();
-  return text2.toLowerCase().split(/\s+/).every((word) => inside.includes(word));
+  const inside2 = all.join(" ").toLowerCase();
+  return text2.toLowerCase().split(/\s+/).every((word) => inside2.includes(word));
 }
 function chosen(rows, { show: show2, machine, robot, text: text2 }, pins2) {
   const found = rows.filter(
@@ -10467,7 +10496,7 @@ function targetOf(e4) {
 
 // src/drawing/sketch.ts
 var LEAST = 6;
-var NAME = 11;
+var NAME2 = 11;
 function sketch(g5, diagram, { x: x3, y: y5, k: k4 }, part) {
   const looks = /* @__PURE__ */ new Map();
   g5.save();
@@ -10495,9 +10524,9 @@ function sketch(g5, diagram, { x: x3, y: y5, k: k4 }, part) {
     g5.lineWidth = look.width;
     g5.strokeRect(box.x, box.y, box.w, box.h);
     const own2 = Number.parseFloat(title.style.fontSize);
-    if ((own2 || NAME) * k4 < LEAST) continue;
+    if ((own2 || NAME2) * k4 < LEAST) continue;
     g5.fillStyle = look.ink;
-    g5.font = `620 ${own2 || NAME}px Inter, Arial, sans-serif`;
+    g5.font = `620 ${own2 || NAME2}px Inter, Arial, sans-serif`;
     g5.textBaseline = own2 ? "middle" : "alphabetic";
     g5.fillText(node.shown, Number(title.getAttribute("x")), Number(title.getAttribute("y")));
   }
@@ -11604,7 +11633,7 @@ function MapPanel({ page: page2, children }) {
   return /* @__PURE__ */ a4("section", { class: "map-panel", "aria-label": "map", children: [
     /* @__PURE__ */ a4("header", { children: [
       /* @__PURE__ */ a4("h2", { children: "Map" }),
-      noMap && /* @__PURE__ */ a4("span", { class: "hint", title: NO_MAP, children: NO_MAP }),
+      noMap && /* @__PURE__ */ a4("span", { class: "hint", title: NO_MAP, children: "No map: try --map FILE" }),
       /* @__PURE__ */ a4("span", { class: "spread" }),
       /* @__PURE__ */ a4("span", { class: "group", children: [
         /* @__PURE__ */ a4(

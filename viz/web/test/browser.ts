@@ -3,8 +3,9 @@
 /** Words that a canvas was told to write, and the bars that it was told to fill. */
 export class Paper {
   texts: string[] = [];
-  bars: { x: number; y: number; w: number; h: number; colour: string }[] = [];
+  bars: { x: number; y: number; w: number; h: number; colour: string; opacity: number }[] = [];
   fillStyle = "";
+  globalAlpha = 1;
   font = "";
   #path: { x: number; y: number; w: number; h: number } | null = null;
 
@@ -17,7 +18,7 @@ export class Paper {
     this.#path = { x, y, w, h };
   }
   fill() {
-    if (this.#path) this.bars.push({ ...this.#path, colour: this.fillStyle });
+    if (this.#path) this.bars.push({ ...this.#path, colour: this.fillStyle, opacity: this.globalAlpha });
   }
 }
 

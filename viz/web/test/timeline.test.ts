@@ -58,6 +58,45 @@ test("the axis tells instants since the begin, and the instant shown has a flag"
   assert.ok(drawn().paper.texts.includes("00:02.5"));
 });
 
+test("a bar is pale after the instant shown", () => {
+  store.playback.seek((store.data.run.first() ?? 0) + 5500);
+  const { timeline, paper } = drawn();
+  const docked = timeline.bars.hits.find((hit) => hit.span.path === "/PATROL/DOCK");
+  const painted = paper.bars.filter(({ x, colour }) => x === docked?.left && colour === "active-fill");
+  assert.deepEqual(
+    painted.map(({ opacity }) => opacity),
+    [0.35, 1],
+  );
+});
+
+test("the flag of the instant shown covers no instant of the axis", () => {
+  assert.ok(drawn().paper.texts.includes("00:03"));
+  store.playback.seek((store.data.run.first() ?? 0) + 3100);
+  const { texts } = drawn().paper;
+  assert.ok(texts.includes("00:03.1") && !texts.includes("00:03"), texts.join(", "));
+});
+
+test("the name of a lane that has no room is cut with a sign", () => {
+  const lane = store.data.model.value?.get("/PATROL/ROUND");
+  assert.ok(lane);
+  lane.name = "ROUND_OF_THE_HOUSE";
+  const paper = new Paper();
+  new Timeline(canvasOf(paper, 500, 200), { onPick: () => {}, onDraw: () => {} }).draw();
+  assert.ok(paper.texts.includes("PATROL") && paper.texts.includes("ROUND_OF\u2026"), paper.texts.join(", "));
+});
+
+test("a run of no time fills the timeline, without instants before it", () => {
+  const begun = event("Started", "/PATROL");
+  store.startRun(null, [
+    begun,
+    { ...event("Finished", "/PATROL", { outcome: "succeeded" }), stamp_ns: begun.stamp_ns },
+  ]);
+  const { timeline, paper } = drawn();
+  assert.equal(timeline.window.length, 20);
+  assert.ok(paper.texts.includes("00:00.000"), paper.texts.join(", "));
+  assert.ok(!paper.texts.some((text) => text.startsWith("-")), paper.texts.join(", "));
+});
+
 test("the axis of a machine that has not begun tells no instants", () => {
   store.startRun(null, []);
   assert.deepEqual(
@@ -82,7 +121,7 @@ test("a wheel zooms around the instant below it", () => {
   assert.ok(Math.abs((a + b) / 2 - middle) < 1);
   assert.ok(Math.abs(2 * (b - a) - (to - from)) < 1);
   for (let i = 0; i < 99; i++) window.zoom(0.1, middle);
-  assert.equal(window.length, 200); // at least
+  assert.equal(window.length, 20); // at least
 });
 
 test("the map writes the names of goals beside them", () => {
@@ -100,6 +139,23 @@ test("the map writes the names of goals beside them", () => {
     paper.texts.some((text) => text.includes("kitchen")),
     paper.texts.join(", "),
   );
+});
+
+test("without a map the signs of goals are whole, and a goal alone is not enlarged", () => {
+  const send = (id: string, x: number) => {
+    const goal = { target_pose: { pose: { position: { x, y: 1 }, orientation: {} } } };
+    store.addEvents([event("Entered", A), event("GoalSent", A, { action: "/move_base", goal_id: id, goal })]);
+  };
+  const map = new MapView(canvasOf(new Paper(), 400, 300));
+  const across = () => {
+    map.draw();
+    return [3, 43].map((x) => map.at({ x, y: 1 })[0]);
+  };
+  send("1", 3);
+  const [alone, beside] = across();
+  assert.equal((beside - alone) / 40, 300 / 8); // 8 m are shown
+  send("2", 43);
+  assert.deepEqual(across(), [20, 380]);
 });
 
 test("a night in which nothing happened is folded, and its length is told", () => {

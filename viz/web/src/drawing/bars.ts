@@ -14,6 +14,8 @@ import { type Colours, FONT } from "#drawing/theme.ts";
 // Sizes in CSS pixels
 const THINNEST = 0.5;
 const FAILED = 3; // narrowest bar of a failure
+const LATER = 0.35; // opacity of what is after the instant shown
+const NAME = 11; // of a lane
 const LEAST_LETTERS = 2; // of a name that is cut
 const MOST_WIDTHS = 4000; // texts whose widths are kept
 
@@ -43,7 +45,10 @@ export class Bars {
     g.fillStyle = this.colours.of("muted");
     g.textAlign = "left";
     const indent = 10 + Math.min(lane.depth, 6) * 9;
-    clipped(g, 0, y, scale.left - 8, h, () => g.fillText(lane.name, indent, y + h / 2));
+    const room = scale.left - 8 - indent;
+    const widthOf = (one: string) => this.#widthOf(one, NAME);
+    const name = widthOf(lane.name) > room ? beginningOf(lane.name, room, widthOf) : lane.name;
+    g.fillText(name, indent, y + h / 2);
     this.#visits(lane, y, lanes, model, scale);
     this.#waits(lane, y, lanes, model, scale);
   }
@@ -70,7 +75,7 @@ export class Bars {
       const wide = Math.max(isFailure ? FAILED : 2, end - begin);
       const hit = { left: begin, right: begin + wide, ...rowOf(lanes, lane, node, span.from, y), span };
       const paint = () => {
-        g.globalAlpha = later ? 0.35 : 1;
+        g.globalAlpha = later ? LATER : 1;
         this.#visit(hit, node, ended, x, later ? Infinity : now);
         g.globalAlpha = 1;
         this.hits.push(hit);
@@ -88,6 +93,32 @@ export class Bars {
     const [wide, tall] = [right - left, bottom - top];
     const asked = span.preempt !== null && span.preempt <= now ? span.preempt : null;
     const kind = ended ? endClass(node, span.outcome) : asked !== null ? "preempted" : "active";
+    const shown = x(now);
+    const paint = () => this.#body({ span, ...bar }, kind, asked === null ? null : x(asked));
+    if (!ended && shown < right - 1) {
+      g.globalAlpha = LATER;
+      clipped(g, shown, top - 1, right + 1 - shown, tall + 2, paint);
+      g.globalAlpha = 1;
+      clipped(g, left - 1, top - 1, shown - left + 1, tall + 2, paint);
+    } else paint();
+    if (store.view.selected.value === span.path) {
+      g.strokeStyle = this.colours.of("ink"); // as in the diagram, and different from a running state
+      g.lineWidth = 2;
+      g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
+    }
+    const lit = store.pointer.hovered.value;
+    if (lit?.path === span.path && lit.from === span.from) this.#halo(bar);
+    if (span.serviced !== null && span.serviced <= now) this.#mark(Math.min(x(span.serviced), right), bar, "preempted");
+    if (span.abandoned !== null && span.abandoned <= now)
+      this.#mark(Math.min(x(span.abandoned), right), bar, "failure");
+    const words = wordsOf(node.name, span, now === Infinity ? (span.to ?? store.playback.nowMs()) : now);
+    this.#text(words, `${kind}-text`, bar);
+  }
+
+  /** @param asked where the hatch of a request to stop begins [px] */
+  #body({ span, ...bar }: Hit, kind: string, asked: number | null) {
+    const g = this.context;
+    const { left, right, top, bottom } = bar;
     g.fillStyle = this.colours.of(`${kind}-fill`);
     g.strokeStyle = this.colours.of(kind);
     g.lineWidth = 1.1;
@@ -99,27 +130,14 @@ export class Bars {
       g.clip();
       g.fillStyle = this.colours.of("preempted");
       g.globalAlpha *= 0.55;
-      for (let px = Math.max(left, x(asked)); px < right; px += 5) g.fillRect(px, top, 2.5, tall);
+      for (let px = Math.max(left, asked); px < right; px += 5) g.fillRect(px, top, 2.5, bottom - top);
       g.restore();
     }
     g.stroke();
-    if (store.view.selected.value === span.path) {
-      g.strokeStyle = this.colours.of("ink"); // as in the diagram, and different from a running state
-      g.lineWidth = 2;
-      g.strokeRect(left - 1, top - 1, wide + 2, tall + 2);
-    }
     const driver = store.data.scene.colourOf(span.path);
-    if (driver >= 0) {
-      g.fillStyle = this.colours.of(`s${1 + (driver % COLOURS)}`); // of its track on the map
-      g.fillRect(left + 2, bottom - 4, Math.max(0, wide - 4), 2.5);
-    }
-    const lit = store.pointer.hovered.value;
-    if (lit?.path === span.path && lit.from === span.from) this.#halo(bar);
-    if (span.serviced !== null && span.serviced <= now) this.#mark(Math.min(x(span.serviced), right), bar, "preempted");
-    if (span.abandoned !== null && span.abandoned <= now)
-      this.#mark(Math.min(x(span.abandoned), right), bar, "failure");
-    const words = wordsOf(node.name, span, now === Infinity ? (span.to ?? store.playback.nowMs()) : now);
-    this.#text(words, `${kind}-text`, bar);
+    if (driver < 0) return;
+    g.fillStyle = this.colours.of(`s${1 + (driver % COLOURS)}`); // of its track on the map
+    g.fillRect(left + 2, bottom - 4, Math.max(0, right - left - 4), 2.5);
   }
 
   /** Draw the times in which the lane's states were paused before they began, or asked. */

@@ -12,7 +12,8 @@ import { Colours, FONT, fitted } from "#drawing/theme.ts";
 import { grab } from "#drawing/viewport.ts";
 
 const MARGIN = 10; // around the map [px]
-const ROBOT_M = 8; // shown around a followed robot [m]
+const MARKED = 20; // around goals and robots without a map: their signs are whole [px]
+const ROBOT_M = 8; // shown around a followed robot, and at least without a map [m]
 const REACH = 9; // greatest distance of the pointer from a track that it is on [px]
 const SCAN_MS = 1500; // an older scan is not shown
 const RADIUS_M = 0.25; // of a robot
@@ -80,9 +81,10 @@ export class MapView {
     const box = scene.extent(now);
     const robot = this.followed === null ? null : scene.robots.get(this.followed);
     const pose = robot && scene.poseAt(robot, now);
+    const [margin, most] = scene.mapAt(now) ? [MARGIN, Infinity] : [MARKED, Math.min(width, height) / ROBOT_M];
     const whole = box
       ? {
-          k: Math.min((width - 2 * MARGIN) / box.w, (height - 2 * MARGIN) / box.h),
+          k: Math.min(most, (width - 2 * margin) / box.w, (height - 2 * margin) / box.h),
           x: box.x + box.w / 2,
           y: box.y + box.h / 2,
         }

@@ -5,13 +5,13 @@ import { asksIn, type Density, densityOf } from "#core/density.ts";
 import { Axis } from "#core/idle.ts";
 import { store } from "#core/store.ts";
 import { Colours, fitted } from "#drawing/theme.ts";
+import { SHORTEST_MS } from "#drawing/time_window.ts";
 import { drag } from "#drawing/viewport.ts";
 
 const RIGHT = 14;
 const GRIP = 8; // width of an end of the window
 const COLUMN = 3;
 const FAILURE = 2.5;
-const SHORTEST_MS = 500; // of the window
 
 export type Range = { from: number; to: number };
 
@@ -42,7 +42,7 @@ export class Strip {
   #whole(): Range | null {
     const from = store.data.run.first();
     if (from === null) return null;
-    return { from, to: Math.max(store.data.liveMs(), from + 1000) };
+    return { from, to: Math.max(store.data.liveMs(), from + SHORTEST_MS) };
   }
 
   draw() {

@@ -5,7 +5,7 @@ import { Axis, lengthOf } from "#core/idle.ts";
 import { store } from "#core/store.ts";
 
 const LIVE_MS = 30_000; // shown at first
-const SHORTEST_MS = 200; // the shortest time that can fill the timeline
+export const SHORTEST_MS = 20; // the shortest time that can fill the timeline
 const LONGEST_MS = 30 * 86_400_000;
 const WIDE = 1000; // about the width of the timeline [px]
 
@@ -24,9 +24,9 @@ export class TimeWindow {
     const last = store.playback.nowMs();
     if (first == null) return;
     const folded = store.clock.folds().reduce((sum, one) => sum + lengthOf(one), 0);
-    const margin = Math.max(10, (last - first - folded) * 0.02);
-    this.length = Math.max(500, last - first + 2 * margin);
-    this.end = last + margin;
+    const margin = (last - first - folded) * 0.02;
+    this.length = Math.max(SHORTEST_MS, last - first + 2 * margin);
+    this.end = Math.max(last + margin, first + this.length * 0.98);
   }
 
   /** Show a visit with some time around it. @param to [ms] */

@@ -19,7 +19,11 @@ const TOOLS_NARROW = 176; // width of the buttons at the axis there
 const RIGHT = 14;
 const TOP = 3;
 const FOOT = 26; // height of the axis and its buttons
-const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14_400];
+const FLAG = "600 11px 'JetBrains Mono', ui-monospace, monospace";
+const STEPS_S = [
+  ...[0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5],
+  ...[1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14_400],
+];
 
 export class Timeline {
   canvas: HTMLCanvasElement;
@@ -158,6 +162,9 @@ export class Timeline {
     g.textAlign = "left";
     g.lineWidth = 1;
     const next = (t: number) => begun + Math.ceil((t - begun) / step) * step;
+    const digits = Math.max(0, Math.ceil(3 - Math.log10(step)));
+    const shown = store.playback.cursor.value;
+    const flag = shown === null ? null : this.#flagBox(inside(axis, shown), shown);
     let free = this.names === NAMES_NARROW ? TOOLS_NARROW : 0; // where there is room for text
     for (let t = next(from); t < to; t += step) {
       const fold = axis.folds.find((one) => one.from < t && one.to > t);
@@ -167,9 +174,10 @@ export class Timeline {
       g.moveTo(px, 0);
       g.lineTo(px, height - FOOT);
       g.stroke();
-      const text = store.clock.instantText(t, step < 1000 ? 1 : 0);
+      const text = store.clock.instantText(t, digits);
       const end = px + 3 + g.measureText(text).width;
-      if (px < free || end > width) continue;
+      const isCovered = flag !== null && px < flag.right && end > flag.left;
+      if (t < first || px < free || end > width || isCovered) continue;
       g.fillText(text, px + 3, height - FOOT / 2);
       free = end + 4;
     }
@@ -191,32 +199,35 @@ export class Timeline {
 
   /** Draw the instants at the pointer and shown. */
   #cursor(axis: Axis, height: number) {
-    const { left, right } = axis;
-    const x = (t: number) => axis.x(t);
     const at = store.playback.cursor.value;
     const pointed = store.pointer.pointed.value;
-    if (pointed !== null && x(pointed) >= left) this.#flag(x(pointed), pointed, height, "muted", 1);
-    if (at === null) return;
-    const px = Math.max(left, Math.min(right, x(at))); // outside the range it is drawn at the edge
-    this.#flag(px, at, height, "active", 2);
+    if (pointed !== null && axis.x(pointed) >= axis.left) this.#flag(axis.x(pointed), pointed, height, "muted", 1);
+    if (at !== null) this.#flag(inside(axis, at), at, height, "active", 2);
   }
 
   /** Draw a line through the lanes, with its instant at the axis. */
   #flag(px: number, t: number, height: number, colour: string, wide: number) {
     const g = this.context;
-    const text = store.clock.instantText(t);
-    g.font = "600 11px 'JetBrains Mono', ui-monospace, monospace";
-    const half = g.measureText(text).width / 2 + 5;
-    const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
+    const { left, right } = this.#flagBox(px, t);
+    g.font = FLAG;
     g.fillStyle = this.#colours.of(colour);
     g.fillRect(px - wide / 2, 0, wide, height - FOOT);
     g.beginPath();
-    g.roundRect(middle - half, height - FOOT + 3, 2 * half, FOOT - 6, 4);
+    g.roundRect(left, height - FOOT + 3, right - left, FOOT - 6, 4);
     g.fill();
     g.fillStyle = this.#colours.of("background");
     g.textAlign = "center";
-    g.fillText(text, middle, height - FOOT / 2 + 0.5);
+    g.fillText(store.clock.instantText(t), (left + right) / 2, height - FOOT / 2 + 0.5);
     g.font = FONT;
+  }
+
+  /** The ends of the flag with an instant, at the axis [px]. */
+  #flagBox(px: number, t: number) {
+    this.context.font = FLAG;
+    const half = this.context.measureText(store.clock.instantText(t)).width / 2 + 5;
+    this.context.font = FONT;
+    const middle = Math.max(this.names + half, Math.min(this.canvas.clientWidth - half, px));
+    return { left: middle - half, right: middle + half };
   }
 
   // -- input ------------------------------------------------------------------------------------
@@ -292,3 +303,6 @@ export class Timeline {
     e.preventDefault();
   }
 }
+
+/** The place of an instant on an axis, at an end of it for one outside of its range [px]. */
+const inside = (axis: Axis, t: number) => Math.max(axis.left, Math.min(axis.right, axis.x(t)));

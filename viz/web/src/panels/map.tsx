@@ -22,7 +22,7 @@ export function MapPanel({ page, children }: { page: Page; children?: ComponentC
         <h2>Map</h2>
         {noMap && (
           <span class="hint" title={NO_MAP}>
-            {NO_MAP}
+            No map: try --map FILE
           </span>
         )}
         <span class="spread" />
