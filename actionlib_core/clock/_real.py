@@ -339,6 +339,7 @@ class RealClock:
                         callback()
                     except BaseException:  # noqa: BLE001  reported here; the other timers go on
                         report_callback("clock-timers")
+                    callback = None  # nothing holds it while the next timer is waited for
         except BaseException:  # out of memory, for example: the other timers need a new thread
             with self._timer_lock:
                 self._start_timers()

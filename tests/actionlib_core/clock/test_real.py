@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 
 import pytest
 
@@ -90,6 +91,24 @@ def test_a_thousand_timers_need_one_thread():
     assert threading.active_count() <= before + 1
     for _ in range(left):
         assert done.acquire(timeout=60)
+
+
+def test_what_a_timer_has_called_is_freed_before_the_next_one_is_due():
+    class Call:
+        def __call__(self):
+            pass
+
+    clock = RealClock()
+    next_one = clock.call_later(600.0, int)
+    freed = threading.Event()
+    call = Call()
+    watch = weakref.ref(call, lambda _: freed.set())
+    clock.call_later(0.0, call)
+    del call
+    assert freed.wait(60.0)
+    assert watch() is None
+    next_one.cancel()
+    clock.call_later(0.0, int)  # lets the thread see that nothing is left
 
 
 def test_hand_over_to_cached_threads_under_load():
