@@ -77,7 +77,7 @@ def test_it_runs_after_success():
 
 
 def test_it_runs_after_an_exception_which_is_raised_afterwards():
-    dock = Dock()
+    dock = Dock(0.0)
     with pytest.raises(InvalidUserCodeError, match="no such door"):
         machine_of(Raising(), dock).execute()
     (ending,) = dock.endings
@@ -209,7 +209,7 @@ def test_the_exception_of_the_work_is_raised_if_both_raise():
 
 
 def test_an_operator_stops_it_at_once():
-    sm = machine_of(Step(), Dock(1000.0))
+    sm = machine_of(Step(0.0), Dock(1000.0))
 
     def stop(event: Any) -> None:
         if type(event).__name__ == "Entered" and event.path == "/M/DOCK":
@@ -391,7 +391,7 @@ def test_it_cannot_be_added_while_the_machine_runs():
 
 
 def test_a_copy_has_it_too():
-    dock = Dock()
+    dock = Dock(0.0)
     sm = copy.deepcopy(machine_of(Step(0.0), dock))
     assert sm.execute() == "done"
     assert sm["DOCK"].endings == [Ending("done", "", preempted=False)]

@@ -56,7 +56,7 @@ WORD = 1
 facts = {}
 
 
-@smachpy.state(outcomes=["done"])
+@smachpy.state(outcomes=["done"], preempt_timeout=0.1)  # it does not look at requests
 def wait(userdata):
     facts["modules"] = sorted(sys.modules)
     # Written at once: a reader must not see the half of it.

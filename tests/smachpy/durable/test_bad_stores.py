@@ -295,7 +295,7 @@ def test_a_disk_that_refuses_a_write_loses_nothing_that_was_written(place):
 @pytest.mark.parametrize("url", ["mysql://db/x", "http://db", "://"])
 def test_another_kind_of_url_is_refused(url):
     with pytest.raises(StoreError) as caught:
-        open_store(url)
+        open_store(url, patience=0.1)
     assert caught.value.reason == "unreachable"
 
 
@@ -498,7 +498,7 @@ def test_a_server_with_journals_from_the_future_is_left_alone(server_store, post
 def test_a_server_that_is_not_there_is_told_without_the_password():
     url = f"postgresql://me:secret@127.0.0.1:{free_port()}/missions"
     with pytest.raises(StoreError) as caught:
-        open_store(url)
+        open_store(url, patience=0.1)
     assert caught.value.reason == "unreachable"
     assert "secret" not in str(caught.value)
     with pytest.raises(StoreError) as caught:

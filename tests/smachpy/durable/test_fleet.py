@@ -80,13 +80,12 @@ def submit(errand, place, name, *options):
     )
 
 
-def runner(place, *options):
+def runner(place, *options, start=("-m", "smachpy.command")):
     """Start a runner with its processes in one group, as on one computer."""
     return subprocess.Popen(
         [
             sys.executable,
-            "-m",
-            "smachpy.command",
+            *start,
             "runner",
             "--db",
             place,
@@ -237,12 +236,21 @@ def test_a_robot_has_one_mission_at_a_time(errand, tmp_path):
     }
 
 
+RESTS_SHORTLY = """
+import sys
+from smachpy.command import fleet, main
+
+fleet.LOOK_S = fleet.FIRST_REST_S = 0.1
+sys.exit(main())
+"""
+
+
 def test_a_mission_that_cannot_run_here_is_left_to_others(errand, tmp_path):
     place = str(tmp_path / "queue.db")
     for name in "abcde":
         submit(errand, place, name)
     errand.rename(tmp_path / "gone.py")
-    process = runner(place, "--until-empty")
+    process = runner(place, "--until-empty", start=("-c", RESTS_SHORTLY))
     output, _ = process.communicate(timeout=WITHIN_S)
     assert process.returncode == 2, output  # work is left
     assert statuses(place) == dict.fromkeys("abcde", ("queued", None))

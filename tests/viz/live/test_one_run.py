@@ -138,7 +138,8 @@ def test_a_journal_that_cannot_be_read_is_named_and_the_others_are_listed(interr
     journals.close()
 
 
-def test_a_password_is_told_to_nobody():
+def test_a_password_is_told_to_nobody(monkeypatch):
+    monkeypatch.setattr(journals_module, "PATIENCE_S", 0.1)
     secret = "postgresql://robot:geheim@localhost:1/missions"
     journals = Journals([secret])
     told = json.dumps(Runs(Machines(), [], journals).rows())
