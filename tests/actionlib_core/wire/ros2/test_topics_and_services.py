@@ -30,6 +30,7 @@ from actionlib_core.pubsub.service_proxy import ServiceProxy, wait_for_service
 from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.wire.ros2.attachment import Numbering, unpack_attachment
+from actionlib_core.wire.ros2.end_port import list_any_type
 from actionlib_core.wire.ros2.graph import RosEnd, RosNode, RosType
 from actionlib_core.wire.ros2.names import DEFAULT, LATCHED, Kind, data_key
 from tests.transports import TRANSPORTS, opened
@@ -446,8 +447,13 @@ def test_service_that_is_not_there(world):
 def test_service_that_is_on_ros_2_and_not_here_is_told_with_the_way_there(world):
     service = Service("flag", SetBool, lambda request: (True, ""), node=world.robot)
     # std_srvs are not taken to a robot by `**`, as programs use them among themselves.
-    proxy = ServiceProxy("flag", SetBool1, node=world.node("old", names=("**",)), timeout=1.0)
-    for call in (proxy, lambda: proxy.wait_for_service(1.0)):
+    old = world.node("old", names=("**",))
+    deadline = world.clock.now() + WAIT_S
+    while not list_any_type(old, "flag"):  # their sessions may meet late
+        assert world.clock.now() < deadline
+        world.clock.sleep(0.01)
+    proxy = ServiceProxy("flag", SetBool1, node=old, timeout=0.1)
+    for call in (proxy, lambda: proxy.wait_for_service(0.1)):
         with pytest.raises((ServiceUnavailableError, WaitTimeoutError)) as caught:
             call()
         assert "A ROS 2 robot has one, of type std_srvs/srv/SetBool, in node '/robot'. Try" in str(
