@@ -75,11 +75,11 @@ def _keys_of(kind: type) -> Iterator[str]:
     """Yield the names of a class's fields, and of the properties of a protocol."""
     for base in reversed(kind.__mro__):
         hints = vars(base).get("__annotations__", {})
-        names = [name for name, hint in hints.items() if not _is_of_class(hint)]
+        names = [name for name, hint in hints.items() if not is_of_class(hint)]
         names += [name for name, what in vars(base).items() if isinstance(what, property)]
         yield from (name for name in names if not name.startswith("_"))
 
 
-def _is_of_class(hint: object) -> bool:
+def is_of_class(hint: object) -> bool:
     """Return whether an annotation, maybe a text, is a `ClassVar`: not a field."""
     return str(hint).partition("[")[0].rpartition(".")[2] == "ClassVar"

@@ -15,12 +15,18 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from smachpy.base.context import current_frame, current_path
 from smachpy.base.slips import accepts
-from smachpy.exceptions import InvalidStateError, UserDataKeyError, UserDataTypeError
+from smachpy.exceptions import (
+    InvalidStateError,
+    UserDataKeyError,
+    UserDataTypeError,
+    error_text,
+)
 from smachpy.userdata.readonly import ATOMS, read_only, still_shows, writable
 from smachpy.userdata.secret import masked
+from smachpy.userdata.typed_keys import is_of_class
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, MutableMapping
+    from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 
 __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
@@ -131,6 +137,9 @@ class UserData:
     def __contains__(self, key: object) -> bool:
         return key in self._data
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
     def __getattr__(self, name: str) -> Any:
         if name[0] == "_":
             raise AttributeError(name)
@@ -148,7 +157,10 @@ class UserData:
             self[name] = value
 
     def __delattr__(self, name: str) -> None:
-        del self[name]
+        if name[0] == "_":
+            object.__delattr__(self, name)
+        else:
+            del self[name]
 
     def __dir__(self) -> list[str]:
         return [*object.__dir__(self), *self._data]
@@ -249,10 +261,19 @@ class Fields:
 
     def __init__(self, kind: type) -> None:
         self.kind = kind
+        if not isinstance(kind, type):
+            raise InvalidStateError(f"userdata_type: got {kind!r}; expected a class.")
         try:
-            self.types: dict[str, Any] = typing.get_type_hints(kind)
-        except TypeError as error:
-            raise InvalidStateError(f"userdata_type: got {kind!r}; expected a class.") from error
+            found = typing.get_type_hints(kind)
+        except Exception as error:
+            raise InvalidStateError(
+                f"userdata_type: {kind.__name__}: got an annotation that cannot be read "
+                f"({error_text(error)}); expected types that are known when the program runs. Try "
+                "to import them outside of `if TYPE_CHECKING:`."
+            ) from error
+        self.types: dict[str, Any] = {
+            name: hint for name, hint in found.items() if not is_of_class(hint)
+        }
         if not self.types:
             raise InvalidStateError(
                 f"userdata_type: {kind.__name__}: got no annotated fields; expected a dataclass or "
@@ -262,12 +283,13 @@ class Fields:
     def defaults(self) -> dict[str, Any]:
         """Return field -> default, for the fields that have one; default factories are called."""
         if not hasattr(self.kind, "__dataclass_fields__"):
-            return {
-                name: getattr(self.kind, name) for name in self.types if name in vars(self.kind)
-            }
+            bases = [vars(base) for base in self.kind.__mro__ if base.__module__ != "builtins"]
+            found = {n: base[n] for base in reversed(bases) for n in self.types if n in base}
+            # As in dataclasses: what has no hash is changed in place.
+            return {n: copy.deepcopy(v) if v.__hash__ is None else v for n, v in found.items()}
         from dataclasses import MISSING, fields
 
-        found: dict[str, Any] = {}
+        found = {}
         for field in fields(self.kind):
             if field.default is not MISSING:
                 found[field.name] = field.default
@@ -376,6 +398,9 @@ class Remapper:
 
     def __contains__(self, key: object) -> bool:
         return key in self._input and self._input[str(key)] in self._data
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
 
     def __getitem__(self, key: str) -> Any:
         # The hot path of userdata: two look-ups, and no view for a number or text.

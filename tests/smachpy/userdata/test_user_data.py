@@ -8,7 +8,7 @@ import pickle
 import threading
 from collections import Counter, OrderedDict, defaultdict, deque
 from collections.abc import Sized
-from typing import Literal, NamedTuple, TypedDict
+from typing import ClassVar, Literal, NamedTuple, TypedDict
 
 import pytest
 from hypothesis import given
@@ -373,6 +373,17 @@ def test_userdata_as_attributes_and_items():
     ud._private = 3
     assert ud._private == 3
     assert ud.keys() == []
+    del ud._private
+    assert not hasattr(ud, "_private")
+
+
+def test_loops_over_keys():
+    """The first key was 0: "'int' object is not subscriptable"."""
+    ud = smachpy.UserData()
+    ud.update({"a": 1, "b": 2})
+    assert list(ud) == ["a", "b"]
+    assert list(Remapper(ud, ["c", "d"], remapping={"c": "b"})) == ["c"]
+    assert [*zip(ud, ud, strict=True)] == [("a", "a"), ("b", "b")]
 
 
 def test_update_extract_and_merge():
@@ -537,6 +548,41 @@ def test_states_write_typed_userdata():
     sm.add("A", smachpy.CBState(write, outcomes=["ok"], output_keys=["battery"]))
     with pytest.raises(smachpy.UserDataTypeError, match="'low'"):
         sm.execute()
+
+
+class OfClass:
+    limit: ClassVar[int] = 3
+    goals: list[str] = []  # noqa: RUF012  as users write
+
+
+class OfSubclass(OfClass):
+    battery: float = 1.0
+
+
+def test_defaults_of_a_class_are_of_each_machine():
+    """What one machine had changed in place was the default of the next; those of a base lacked."""
+    sm = smachpy.StateMachine(["ok"], userdata_type=OfSubclass)
+    sm.userdata.goals.append("dock")
+    for other in (sm, smachpy.StateMachine(["ok"], userdata_type=OfSubclass)):
+        other.reset_userdata()
+        assert (other.userdata.goals, other.userdata.battery) == ([], 1.0)
+
+
+def test_a_variable_of_the_class_is_no_key():
+    sm = smachpy.StateMachine(["ok"], userdata_type=OfClass)
+    assert sm.userdata.keys() == ["goals"]
+    with pytest.raises(smachpy.UserDataKeyError, match=r"no field of OfClass: got 'limit'"):
+        sm.userdata.limit = 4
+
+
+def test_an_annotation_that_cannot_be_read_is_told():
+    class Odd:
+        pose: "OnlyForTypeCheckers"  # noqa: F821, UP037  as users write
+
+    with pytest.raises(
+        smachpy.InvalidStateError, match=r"Odd: .*'OnlyForTypeCheckers' is not defined.* Try to"
+    ):
+        smachpy.StateMachine(["ok"], userdata_type=Odd)
 
 
 def test_userdata_type_without_fields_is_told():
