@@ -22,6 +22,7 @@ from smachpy.events import (
 )
 from smachpy.events.pictures import draw_run
 from smachpy.exceptions import SmachError, did_you_mean
+from smachpy.userdata.secret import masked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -216,8 +217,8 @@ class Run:
         }
         if wrong:
             lines = [
-                f"  {key}: got {'no value' if got is missing else repr(got)}; "
-                f"expected {expected[key]!r}"
+                f"  {key}: got {'no value' if got is missing else repr(masked(got, key))}; "
+                f"expected {masked(expected[key], key)!r}"
                 for key, got in wrong.items()
             ]
             self._fail("userdata:\n" + "\n".join(lines))
@@ -295,7 +296,7 @@ def _summary(events: Iterable[Event]) -> list[str]:
             lines.append(f"{event.t - start:8.3f}  {event.path} -{event.outcome}->")
         elif not isinstance(event, Entered) and type(event).__name__ in _SHOWN:
             fields = ", ".join(
-                f"{k}={v}" for k, v in list(event._asdict().items())[3:] if k != "stack"
+                f"{k}={masked(v, k)}" for k, v in list(event._asdict().items())[3:] if k != "stack"
             )
             lines.append(
                 f"{event.t - start:8.3f}  {event.path} {type(event).__name__} {fields}".rstrip()

@@ -440,8 +440,13 @@ class Remapper:
         return [*object.__dir__(self), *self.keys()]
 
     def __repr__(self) -> str:
-        data = self._data
-        values = ", ".join(f"{key}={data[self._input[key]]!r}" for key in self.keys())
+        data = _copy_of(self._data)  # other branches may write meanwhile
+        # A value is a secret by either of its names.
+        values = ", ".join(
+            f"{key}={masked(masked(data[name], name), key)!r}"
+            for key, name in self._input.items()
+            if name in data
+        )
         return f"Remapper({values})"
 
     def _unreadable(self, key: str) -> NoReturn:

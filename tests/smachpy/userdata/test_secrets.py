@@ -34,6 +34,7 @@ from smachpy.network.values import value_text
 from smachpy.userdata.json_text import dumps, encoded
 from smachpy.userdata.secret import holds_secret, is_secret_name, masked, masked_words
 from smachpy.userdata.shown import Room, shown
+from smachpy.userdata.user_data import Remapper, UserData
 from smachpy_viz import TerminalView
 
 PASSWORD = "hunter2"
@@ -193,6 +194,26 @@ def test_no_kind_of_value_shows_what_is_in_it(value):
         repr(masked(value)),
     ):
         assert PASSWORD not in text
+
+
+def test_the_window_of_a_state_shows_none():
+    """`print(userdata)` in a state showed what that of the machine masks."""
+    userdata = UserData()
+    userdata.update({"wifi_password": PASSWORD, "code": PASSWORD, "place": "dock"})
+    window = Remapper(
+        userdata, ["text", "token", "place"], (), [("text", "wifi_password"), ("token", "code")]
+    )
+    assert repr(window) == "Remapper(text='<secret>', token='<secret>', place='dock')"
+
+
+def test_failures_of_tests_show_none(mission):
+    machine = StateMachine(["done"], name="M")
+    machine.add("A", smachpy.CBState(lambda _: "done", outcomes=["done"]))
+    run = mission(machine, {"login": {"password": PASSWORD}, "token": PASSWORD})
+    with pytest.raises(AssertionError) as caught:
+        run.assert_userdata(login={"password": f"{PASSWORD}3"}, token=f"{PASSWORD}4")
+    assert PASSWORD not in str(caught.value)
+    assert "token: got '<secret>'; expected '<secret>'" in str(caught.value)
 
 
 def test_a_value_that_contains_itself_has_an_end():
