@@ -119,7 +119,10 @@ class Publish(State):
                     return "aborted"
             except PreemptedError:
                 return "preempted"
-            publisher.publish(message)
+            if answer_preempt(self):  # as the subscriber appeared
+                return "preempted"
+            # Made anew: a header that is "auto" tells when it was published.
+            publisher.publish(_as_message(where, self.__msg_type, given))
         return "succeeded"
 
     def __latching(self) -> Publisher:

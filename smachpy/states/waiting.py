@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core import border
 from smachpy.base import log
 from smachpy.base.context import current_path
-from smachpy.base.problems import Problems
+from smachpy.base.functions import no_coroutine
+from smachpy.base.problems import Problems, as_number
 from smachpy.engine.frame import clock_of_run
 from smachpy.engine.preempt import on_preempt
 from smachpy.machines.state import State
@@ -15,6 +16,8 @@ from smachpy.machines.state import State
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from actionlib_core.clock import Clock, Event
+    from actionlib_core.time import Duration
     from smachpy.events.introspection import Kind
     from smachpy.userdata.user_data import UserData
 
@@ -43,17 +46,17 @@ class AwaitMessage(State):
         wanted: Callable[[Any], bool] | None = None,
         *,
         key: str | None = None,
-        timeout: float | None,
+        timeout: float | Duration | None,
     ) -> None:
         problems = Problems(f"AwaitMessage {topic!r}")
-        problems.network_name("topic", topic)
+        name = problems.network_name("topic", topic)
         problems.kind_of("msg_type", msg_type, "_slot_types", "a class of messages")
         problems.function("wanted", wanted, "wanted(message)", 1)
         longest = problems.seconds("timeout", timeout)
         keys = [] if key is None else [problems.word("key", key)]
         problems.raise_all()
         super().__init__(outcomes=["came", "timeout", "preempted"], output_keys=keys)
-        self.__topic = topic
+        self.__topic = name
         self.__msg_type = msg_type
         self.__wanted = wanted
         self.__key = key
@@ -79,7 +82,7 @@ class AwaitMessage(State):
             nonlocal count
             count += 1
             try:
-                is_wanted = self.__wanted is None or bool(self.__wanted(message))
+                is_wanted = self.__wanted is None or bool(no_coroutine(self.__wanted(message)))
                 verdicts.note(message, is_wanted)
                 if is_wanted:
                     ends.append(message)
@@ -92,7 +95,7 @@ class AwaitMessage(State):
         try:
             subscriber = Subscriber(self.__topic, self.__msg_type, on_message)
             with subscriber, subscriber.telling():
-                wake.wait(self.__longest)
+                self.__wait(wake, clock, ends)
                 publishers, others = subscriber.get_num_connections(), subscriber.mismatches
         finally:
             forget()
@@ -113,6 +116,14 @@ class AwaitMessage(State):
         )
         return "timeout"
 
+    def __wait(self, wake: Event, clock: Clock, ends: list[Any]) -> None:
+        """Wait for the first of `ends`, the limit or a preempt, which may be withdrawn."""
+        until = None if self.__longest is None else clock.now() + self.__longest
+        while not (ends or self.preempt_requested()):
+            if not wake.wait(None if until is None else max(0.0, until - clock.now())):
+                return
+            wake.clear()
+
     def describe_details(self) -> tuple[Kind, tuple[tuple[str, str], ...]]:
         """Add the topic and the limit."""
         _, details = super().describe_details()
@@ -124,19 +135,19 @@ class Wait(State):
     """Waits for some time. Outcomes: 'done', 'preempted'.
 
     Args:
-        seconds: The time [s]; None for the userdata key `seconds`.
+        seconds: The time [s], a number or a `Duration`; None for the userdata key `seconds`.
 
     Raises:
         InvalidStateError: `seconds` is not a duration.
     """
 
-    def __init__(self, seconds: float | None = None) -> None:
+    def __init__(self, seconds: float | Duration | None = None) -> None:
         problems = Problems("Wait")
         problems.seconds("seconds", seconds)
         problems.raise_all()
         keys = ["seconds"] if seconds is None else []
         super().__init__(outcomes=["done", "preempted"], input_keys=keys)
-        self.__seconds = seconds
+        self.__seconds = as_number(seconds)
 
     def execute(self, userdata: UserData) -> str:
         """Wait; a preempt ends it early."""

@@ -18,6 +18,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Bool, Header
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
+from actionlib_core.time import Duration
 from smachpy import InvalidStateError, State, StateMachine
 from smachpy.places.pose import quaternion_of
 from smachpy.states import (
@@ -279,6 +280,15 @@ def test_a_preempt_ends_waits_at_once(mission):
 
 def test_a_wait_takes_its_seconds_from_the_userdata(mission):
     assert mission(alone(Wait(), seconds=3.0)).duration == 3.0
+    assert mission(alone(Wait(Duration(3.0)))).duration == 3.0
+
+
+@pytest.mark.parametrize(
+    ("given", "told"), [(Duration(3.0), "3 s"), (2, "2 s"), (math.inf, "inf s")]
+)
+def test_a_picture_tells_how_long_it_waits(given, told):
+    """A `Duration` was an error in pictures and checks."""
+    assert ("waits", told) in Wait(given).describe_details()[1]
 
 
 class Server:

@@ -15,7 +15,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from actionlib_core.interfaces.std_msgs.msg import Bool, Header, String
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.node import Node
-from actionlib_core.pubsub.topic import Subscriber
+from actionlib_core.pubsub.topic import Publisher, Subscriber
 from actionlib_core.time import Time
 from smachpy import InvalidStateError, StateMachine
 from smachpy.states import AwaitMessage, LookUpTransform, Publish, Wait, drive_to
@@ -156,6 +156,36 @@ def test_a_header_is_stamped_when_it_is_published(mission, other):
     assert heard[0].header.stamp.to_nsec() >= mission.clock.time_ns() - 2_000_000_000
 
 
+def test_a_header_is_stamped_after_the_wait_for_a_subscriber(mission, other):
+    """It had the time at which the wait began."""
+    heard = []
+
+    def listen():
+        Subscriber("pose", PoseStamped, heard.append, node=other)
+
+    mission.clock.call_later(30.0, listen)
+    mission(alone(Publish("pose", PoseStamped, {"header": "auto"}, timeout=None)))
+    mission(alone(Wait(1.0)))
+    assert heard[0].header.stamp.to_nsec() >= mission.clock.time_ns() - 2_000_000_000
+
+
+def test_nothing_is_published_if_a_preempt_comes_with_the_subscriber(mission, other, monkeypatch):
+    heard = []
+    Subscriber("word", String, heard.append, node=other)
+    state = Publish("word", String)
+    wait = Publisher.wait_for_connections
+
+    def asked_meanwhile(publisher, *given):
+        found = wait(publisher, *given)
+        state.request_preempt()
+        return found
+
+    monkeypatch.setattr(Publisher, "wait_for_connections", asked_meanwhile)
+    mission(alone(state)).assert_outcome("preempted")
+    mission(alone(Wait(1.0)))
+    assert heard == []
+
+
 # -- wait for a message ------------------------------------------------------------------------
 
 
@@ -181,6 +211,29 @@ def test_what_the_condition_raises_the_state_raises(mission):
     with pytest.raises(Exception, match="STATE") as caught:
         mission(alone(AwaitMessage("word", String, lambda m: m.dat, timeout=100.0)))
     assert isinstance(caught.value.__cause__, AttributeError)
+
+
+def test_a_condition_that_answers_a_coroutine_is_an_error(mission):
+    """A coroutine counts as true: any message ended the wait."""
+
+    async def is_wanted(message):
+        return False
+
+    mission.topic("word", String).publish_at(1.0, String("go"))
+    with pytest.raises(Exception, match="STATE") as caught:
+        mission(alone(AwaitMessage("word", String, lambda m: is_wanted(m), timeout=100.0)))
+    assert "not async" in str(caught.value.__cause__)
+
+
+@pytest.mark.parametrize("timeout", [50.0, None])
+def test_it_waits_on_if_a_request_to_stop_is_withdrawn(mission, timeout):
+    """It ended with 'timeout', or with an error about its text if it had no limit."""
+    state = AwaitMessage("word", String, timeout=timeout)
+    mission.trigger(lambda _: (state.request_preempt(), state.recall_preempt()), at=3.0)
+    mission.topic("word", String).publish_at(10.0, String("go"))
+    run = mission(alone(state))
+    run.assert_outcome("came")
+    assert run.duration == 10.0
 
 
 def test_publishers_of_another_type_are_an_error(mission):
