@@ -7,6 +7,7 @@ that returns a state, with `Args:` in its docstring.
 from __future__ import annotations
 
 import contextlib
+import copy
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from smachpy.base.problems import Problems, unknown_name
@@ -41,7 +42,7 @@ class SetKeys(State):
     def execute(self, userdata: UserData) -> str:
         """Write them."""
         for key, value in self.values.items():
-            userdata[key] = value
+            userdata[key] = copy.deepcopy(value)  # a later state may change it in place
         return "done"
 
 
@@ -186,11 +187,12 @@ def action(
     if goal is not None and goal_key is not None:
         raise InvalidStateError("action: got goal and goal_key; expected one of them.")
     spec = _interface("action", type)
-    made = None if goal is None else ActionTypes.of(spec).goal.from_dict(goal)
+    kind = ActionTypes.of(spec).goal
     return SimpleActionState(
         name,
         spec,
-        goal=made,
+        goal=None if goal is None else kind.from_dict(goal),
+        goal_cb=None if goal is None else lambda *_: kind.from_dict(goal),  # its "now" is then
         goal_key=goal_key,
         result_key=result_key,
         exec_timeout=exec_timeout,
@@ -220,15 +222,20 @@ def service(
     from smachpy.actions.service_state import ServiceState
 
     spec = _interface("service", type)
-    made = spec._request_class.from_dict(request or {})
-    response = spec._response_class
+    kind, response = spec._request_class, spec._response_class
     holds = _on_message("succeeded_if", succeeded_if, response) if succeeded_if else None
 
     def judge(_userdata: UserData, response: Any) -> str:
         return "succeeded" if holds is None or holds(response) else "aborted"
 
     return ServiceState(
-        name, spec, request=made, response_cb=judge, response_key=response_key, timeout=timeout
+        name,
+        spec,
+        request=kind.from_dict(request or {}),
+        request_cb=lambda *_: kind.from_dict(request or {}),  # its "now" is then
+        response_cb=judge,
+        response_key=response_key,
+        timeout=timeout,
     )
 
 

@@ -6,7 +6,10 @@ from typing import Any
 
 import pytest
 
+import smachpy
 from actionlib_core.exceptions import InterfaceError
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
+from actionlib_core.interfaces.nav_msgs.srv import GetPlan
 from smachpy import InvalidStateError, StateMachine
 from smachpy.states.by_name import BY_NAME, _interface
 
@@ -67,6 +70,45 @@ def test_compute_reads_and_writes_the_userdata():
     sm.userdata.b = 0
     sm.execute()
     assert (sm.userdata.b, sm.userdata.c, sm.userdata.d) == (6, 7, "x")
+
+
+def test_set_writes_the_same_value_each_time_although_states_change_it_in_place():
+    found = []
+
+    @smachpy.state(outcomes=["again", "done"], io_keys=["found"])
+    def look(userdata):
+        userdata.found.append("cup")
+        found.append(list(userdata.found))
+        return "again" if len(found) < 3 else "done"
+
+    sm = StateMachine(["done"])
+    sm.add("SET", BY_NAME["set"](found=[]), {"done": "LOOK"})
+    sm.add("LOOK", look, {"again": "SET"})
+    sm.execute()
+    assert found == [["cup"]] * 3
+
+
+def test_a_time_that_is_now_is_that_at_which_the_message_is_sent(mission):
+    """It was the time at which the file was read."""
+    header = {"frame_id": "map", "stamp": "now"}
+    place = {"x": 1.0, "y": 2.0}
+    goal = {"target_pose": {"header": header, "pose": {"position": place}}}
+    sm = StateMachine(["succeeded", "aborted", "preempted", "done"])
+    plan = BY_NAME["service"](
+        name="plan", type="nav_msgs/GetPlan", request={"goal": {"header": header}}
+    )
+    drive = BY_NAME["action"](name="move_base", type="move_base_msgs/MoveBase", goal=goal)
+    sm.add("WAIT", BY_NAME["wait"](30.0), {"done": "PLAN"})
+    sm.add("PLAN", plan, {"succeeded": "DRIVE"})
+    sm.add("DRIVE", drive)
+    planner = mission.service_server("plan", GetPlan)
+    base = mission.action_server("move_base", MoveBaseAction)
+    begin = mission.clock.time_ns()
+    mission(sm).assert_outcome("succeeded")
+    (sent,), (planned,) = base.goals, planner.requests
+    for pose in (sent.target_pose, planned.goal):
+        assert pose.header.stamp.to_nsec() >= begin + 30_000_000_000
+    assert sent.target_pose.pose.position.y == 2.0
 
 
 @pytest.mark.parametrize(
