@@ -31,6 +31,12 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("actionlib_core")
 
+_ABSENT = {
+    Kind.PUBLISHER: ("topic", "publisher"),
+    Kind.SUBSCRIBER: ("topic", "subscriber"),
+    Kind.SERVICE: ("service", "server"),
+}
+
 
 class NamedEnd:
     """Base class of publisher, subscriber, service and proxy.
@@ -217,8 +223,7 @@ class NameWatch:
             timer.cancel()
 
     def _log_absence(self, kind: Kind) -> None:
-        of_topic = kind is Kind.PUBLISHER
-        what, nobody = ("topic", "publisher") if of_topic else ("service", "server")
+        what, nobody = _ABSENT[kind]
         name = self._end.own.name
         with contextlib.suppress(TransportError):  # the session is closed: nobody waits any more
             why = self._end.explain_absence()

@@ -25,6 +25,7 @@ _WORDS = {  # kind of the missing end -> names in general, what nobody of them h
     Kind.ACTION_SERVER: ("actions", "no action has a server"),
     Kind.SERVICE: ("services", "no service has a server"),
     Kind.PUBLISHER: ("topics", "no topic has a publisher"),
+    Kind.SUBSCRIBER: ("topics", "no topic has a subscriber"),
 }
 
 
@@ -34,7 +35,7 @@ def explain_absence(node: Node, full: str, kind: Kind) -> str:
     Args:
         node: The node that looks for it.
         full: The full name.
-        kind: The kind of the missing end: ACTION_SERVER, SERVICE or PUBLISHER.
+        kind: The kind of the missing end: ACTION_SERVER, SERVICE, PUBLISHER or SUBSCRIBER.
 
     Raises:
         TransportError: the session is closed.

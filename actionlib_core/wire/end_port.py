@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
     OnEnd = Callable[[str, Endpoint, bool], None]
 
+_OTHER_SIDE = {Kind.SUBSCRIBER: Kind.PUBLISHER, Kind.PUBLISHER: Kind.SUBSCRIBER}  # of a topic
+
 
 class Sender(NamedTuple):
     """The sending end of a topic.
@@ -75,7 +77,7 @@ class EndPort(Protocol):
     def explain_absence(self) -> str:
         """Return why there may be no other side: where it was looked for, and what is there.
 
-        A service has a server at its other side, a subscriber a publisher.
+        A service has a server at its other side, a subscriber a publisher, and the reverse.
 
         Blocks: as `list_services`.
         """
@@ -192,12 +194,12 @@ class OwnEndPort:
         return list_endpoints(self._transport, kind=Kind.SERVICE, name=self.own.name)
 
     def explain_absence(self) -> str:
-        kind = Kind.PUBLISHER if self.own.kind is Kind.SUBSCRIBER else Kind.SERVICE
+        kind = _OTHER_SIDE.get(self.own.kind, Kind.SERVICE)
         return self._look_on_ros2() or explain_absence(self._node, self.own.name, kind)
 
     def _look_on_ros2(self) -> str:
         """Return that a ROS 2 robot has a service of the name; "" if none has."""
-        if not self._node.config.ros2 or self.own.kind is Kind.SUBSCRIBER:
+        if not self._node.config.ros2 or self.own.kind in _OTHER_SIDE:
             return ""
         from actionlib_core.wire.ros2.end_port import list_any_type
 

@@ -173,6 +173,18 @@ def test_missing_publisher_is_told_by_waits_only(world, caplog):
     scan.unregister()
 
 
+def test_missing_subscriber_is_told_as_one_and_not_as_a_server(world, caplog):
+    """The log told of a service without a server."""
+    Service("scan/off", Trigger, lambda _: (True, ""), node=world.robot)
+    Subscriber("scan", String, lambda _: None, node=world.robot)
+    publisher = Publisher("sacn", String, node=world.mission)
+    assert not publisher.wait_for_connections(1, 5.0)
+    expected = (
+        f"topic 'sacn': no subscriber after 3 s: {LOOKED}topics: /scan. Did you mean '/scan'?"
+    )
+    assert told(caplog) == [expected]
+
+
 @pytest.mark.parametrize(
     "state",
     [
@@ -202,7 +214,7 @@ def test_names_are_shown_the_most_similar_first_and_not_all():
     assert f" and {101 - SHOWN} more." in text
     assert "Did you mean" not in names_there("x", {"robot/arm"}, Kind.PUBLISHER)
     assert names_there("lift", {"lift"}, Kind.ACTION_SERVER) == "it is just starting."
-    for kind in (Kind.ACTION_SERVER, Kind.SERVICE, Kind.PUBLISHER):
+    for kind in (Kind.ACTION_SERVER, Kind.SERVICE, Kind.PUBLISHER, Kind.SUBSCRIBER):
         assert "in the same domain" in names_there("lift", set(), kind)
 
 
