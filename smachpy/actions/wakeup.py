@@ -81,7 +81,8 @@ def call_blocking(
         name: Name of the thread.
 
     Raises:
-        PreemptedError: the state was asked to stop before the function had returned.
+        PreemptedError: the state was asked to stop before the function had returned. It is not
+            called if the state was asked before.
         BaseException: what the function raised, unless a preempt or the shutdown was the reason.
 
     Blocks: until the function has returned or raised.
@@ -90,6 +91,8 @@ def call_blocking(
     errors: list[BaseException] = []
 
     with Wakeup(state) as wake:
+        if answer_preempt(state):
+            raise PreemptedError
 
         def run() -> None:
             try:

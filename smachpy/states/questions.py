@@ -172,7 +172,7 @@ def find_questions(node: Node | None = None) -> list[Question]:
     Args:
         node: The node to use; None for the current node.
 
-    Blocks: until the network and each question have answered, at most some seconds.
+    Blocks: until the network and each question have answered, at most 11 s for each.
     """
     node = node or get_node()
     found = []
@@ -199,7 +199,7 @@ def give_answer(service: str, answer: str, by: str, *, node: Node | None = None)
     Raises:
         AnswerRefusedError: it was refused, or the mission did not reply.
 
-    Blocks: until the mission has accepted it, at most 3 s.
+    Blocks: until the mission has accepted it, at most 11 s.
     """
     if not answer.strip():
         raise AnswerRefusedError(service, answer, "expected one of its answers.")
@@ -220,7 +220,7 @@ def give_answer(service: str, answer: str, by: str, *, node: Node | None = None)
 def fetch_picture(service: str, *, node: Node | None = None) -> tuple[str, bytes] | None:
     """Return media type and bytes of a question's picture; None if there is none any more.
 
-    Blocks: until it has arrived, at most 3 s.
+    Blocks: until it has arrived, at most 11 s.
     """
     make: Any = AnswerQuestion._request_class
     reply = _call(node or get_node(), service, make(picture=True))
