@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import threading
 from typing import TYPE_CHECKING, Any
 
 from actionlib_core.clock import current_clock
@@ -22,12 +24,17 @@ if TYPE_CHECKING:
 class FrameListener:
     """Keeps frames up to date with the transforms on the network.
 
+    When the clock is set back, it forgets what moves: the frames would take all that comes for too
+    old, and keep what they have for ever.
+
     Threads: messages arrive in the subscribers' threads; every method may be called from any.
     """
 
     def __init__(self, frames: Frames) -> None:
         self.frames = frames
         self._clock = current_clock()
+        self._lock = threading.Lock()  # guards `_last_ns`
+        self._last_ns = self._clock.time_ns()
         self._changed: list[Any] = []
         self._subscribers = [
             Subscriber("/tf", TFMessage, lambda message: self._take(message, static=False)),
@@ -40,6 +47,7 @@ class FrameListener:
             subscriber.unregister()
 
     def _take(self, message: TFMessage, *, static: bool) -> None:
+        self._check_clock()
         for stamped in message.transforms:
             try:
                 add_transform(self.frames, stamped, static=static)
@@ -48,6 +56,17 @@ class FrameListener:
 
                 logwarn_throttle(10.0, "%s", error)
         self.changed()
+
+    def _check_clock(self) -> None:
+        with self._lock:
+            now_ns = self._clock.time_ns()
+            back_s, self._last_ns = (self._last_ns - now_ns) / 1e9, now_ns
+            if back_s > 0:
+                self.frames.forget_moving()
+        if back_s > 0:
+            from smachpy.ros1.names.rospy.core import logwarn
+
+            logwarn("Detected jump back in time of %fs. Clearing TF buffer.", back_s)
 
     def changed(self) -> None:
         """Wake all calls of `wait`, to check their conditions again."""
@@ -81,14 +100,14 @@ class Broadcaster:
 
     Args:
         static: Use `/tf_static`, latched. Each message then contains all static transforms that
-            were sent so far, since a latched topic keeps only the newest message.
+            the node has sent so far, since a latched topic keeps only the newest message.
     """
 
     def __init__(self, *, static: bool = False) -> None:
         self._static = static
-        self._sent: dict[str, TransformStamped] = {}
         topic = "/tf_static" if static else "/tf"
         node = get_node()
+        self._sent: dict[str, TransformStamped] = node.shared("static transforms", dict)
         self._publisher = node.shared(
             ("broadcaster", topic), lambda: Publisher(topic, TFMessage, latch=static)
         )
@@ -99,6 +118,7 @@ class Broadcaster:
         if session().dry:
             return
         if self._static:
-            self._sent |= {one.child_frame_id: one for one in given}
+            # Copies: programs use one message for all their frames.
+            self._sent |= {one.child_frame_id: copy.deepcopy(one) for one in given}
             given = list(self._sent.values())
         self._publisher.publish(TFMessage(given))

@@ -127,7 +127,7 @@ class Frames:
     def add(
         self, parent: str, child: str, stamp_ns: int, transform: Transform, *, static: bool = False
     ) -> None:
-        """Add a transform; with another parent than before, it replaces the frame's history.
+        """Add a transform; it replaces one of the same time, or the history of another parent.
 
         Raises:
             FrameError: a frame is its own parent, or a number is not finite.
@@ -147,7 +147,10 @@ class Frames:
             edge = self._edges.get(child)
             if edge is None or edge.parent != parent or edge.static or static:
                 edge = self._edges[child] = _Edge(parent, static)
-            index = bisect.bisect_right(edge.times, stamp_ns)
+            index = bisect.bisect_left(edge.times, stamp_ns)
+            if edge.times[index : index + 1] == [stamp_ns]:
+                edge.transforms[index] = transform
+                return
             edge.times.insert(index, stamp_ns)
             edge.transforms.insert(index, transform)
             old = bisect.bisect_left(edge.times, edge.times[-1] - self._cache_ns)
@@ -157,6 +160,11 @@ class Frames:
         """Forget everything."""
         with self._lock:
             self._edges.clear()
+
+    def forget_moving(self) -> None:
+        """Forget all but static transforms."""
+        with self._lock:
+            self._edges = {name: edge for name, edge in self._edges.items() if edge.static}
 
     def names(self) -> list[str]:
         """Return the names of all frames."""

@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actionlib_core.clock import use_clock
+from actionlib_core.node import get_node
 from smachpy import ros1
+from smachpy.ros1 import session
+from smachpy.ros1.session import Session
 from smachpy.states.frames import (
     FrameError,
     Frames,
@@ -17,6 +21,7 @@ from smachpy.states.frames import (
     UnknownFrameError,
 )
 from smachpy.testing import MissionKit
+from tests.wall_clock import Computer
 
 ANGLES = st.floats(-3.1, 3.1)
 
@@ -139,6 +144,73 @@ def test_history_is_bounded_and_loops_do_not_hang():
     frames.add("b", "a", 5_000_000_000, Transform())
     with pytest.raises(FrameError):
         frames.look_up("a", "c")
+
+
+def test_the_newest_transform_of_one_time_counts_and_takes_no_more_room():
+    """A sender that never fills in its stamps filled the memory, and its first pose stayed."""
+    frames = Frames()
+    for x in range(100):
+        frames.add("map", "base", 0, Transform(x))
+    assert frames.look_up("map", "base")[0].x == 99
+    assert len(frames._edges["base"].times) == 1
+
+
+@pytest.fixture
+def world(names):
+    with MissionKit() as mission:
+        made = Session(["script.py"], make_node=lambda _name: get_node())
+        session.begin(made)
+        yield mission
+        session.end(made)
+
+
+def stamped(child, x=0.0):
+    import rospy
+    from geometry_msgs.msg import TransformStamped
+
+    made = TransformStamped()
+    made.header.stamp, made.header.frame_id, made.child_frame_id = rospy.Time.now(), "map", child
+    made.transform.translation.x, made.transform.rotation.w = x, 1.0
+    return made
+
+
+def test_a_buffer_goes_on_when_the_clock_is_set_back(world):
+    """It took all that came for too old, and the robot stood where it had been for ever."""
+    import rospy
+    import tf2_ros
+
+    rospy.init_node("script")
+    computer = Computer(world.clock)
+    with use_clock(computer):
+        buffer = tf2_ros.Buffer()
+        tf2_ros.TransformListener(buffer)
+        moving, static = tf2_ros.TransformBroadcaster(), tf2_ros.StaticTransformBroadcaster()
+        static.sendTransform(stamped("dock", 7.0))
+        for x, step in ((1.0, 0.0), (2.0, -3600.0), (3.0, -3600.0)):
+            computer.ahead = step
+            moving.sendTransform(stamped("base", x))
+            world.clock.sleep(0.1)
+        for frame, x in (("base", 3.0), ("dock", 7.0)):
+            found = buffer.lookup_transform("map", frame, rospy.Time(0))
+            assert found.transform.translation.x == x
+
+
+def test_static_transforms_of_several_broadcasters_and_of_one_message_are_all_there(world):
+    """Only those of the last broadcaster were, and of a message only its last frame."""
+    import rospy
+    import tf2_ros
+
+    rospy.init_node("script")
+    first, second = tf2_ros.StaticTransformBroadcaster(), tf2_ros.StaticTransformBroadcaster()
+    first.sendTransform(stamped("one"))
+    message = stamped("two")
+    second.sendTransform(message)
+    message.child_frame_id = "three"
+    second.sendTransform(message)
+    buffer = tf2_ros.Buffer()
+    tf2_ros.TransformListener(buffer)
+    world.clock.sleep(1.0)
+    assert buffer.get_frame_strings() == ["map", "one", "three", "two"]
 
 
 def test_over_the_network(names):
