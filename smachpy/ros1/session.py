@@ -63,6 +63,8 @@ class Session:
         shows_transitions: The command shows transitions, so SMACH's log need not.
         loaded: Its machine was built by `load`, and may be run by other code.
         rosout: Publishes the program's log; None before it has a node.
+        logged: Level and line of the program -> when and what it has logged, for `throttle` and
+            `once`.
         on_action: Called with name and type of each action for which the program makes a client.
     """
 
@@ -87,6 +89,7 @@ class Session:
         self.shows_transitions = False
         self.loaded = False
         self.rosout: Any = None
+        self.logged: dict[tuple[Any, ...], Any] = {}
         self.on_action: Callable[[str, str], object] = lambda _name, _type: None
         self._make_node = make_node or make_default
         self._handling = contextlib.ExitStack()
@@ -133,6 +136,7 @@ class Session:
         self.executed = self.stopped is not None and self.stopped.machine is not None
         self.dry, self.stopped, self.loaded = False, None, True
         self.hooks.clear()
+        self.logged.clear()
 
     def add_hook(self, hook: Callable[[str], object]) -> None:
         """Call `hook(reason)` once, when the program is asked to end or at its end."""

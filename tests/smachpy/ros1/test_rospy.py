@@ -4,11 +4,13 @@ import warnings
 
 import pytest
 
+from actionlib_core.clock import current_clock, use_clock
 from actionlib_core.node import get_node
 from smachpy import ros1
 from smachpy.ros1 import session
 from smachpy.ros1.session import Session
 from smachpy.testing import MissionKit
+from tests.wall_clock import Computer
 
 WORDS = ["_a/b:=3", "_c-d:= [1, x]", "_empty:=", "__log:=x", "_1:=true"]
 
@@ -73,6 +75,54 @@ def test_log_messages_are_formatted_as_logging_does(rospy, capsys):
         "{}",
         "%(what)s {'speed': 2}",
     ]
+
+
+def test_a_later_program_logs_once_again(rospy, capsys):
+    """What one program of a process had logged, the next one did not."""
+    for _ in range(2):
+        made = Session(["script.py"])
+        session.begin(made)
+        for _ in range(2):
+            rospy.loginfo_once("once")
+            rospy.loginfo_throttle(10.0, "throttled")
+            rospy.loginfo_throttle_identical(10.0, "identical")
+        session.end(made)
+    words = [line.rpartition(" ")[2] for line in capsys.readouterr().out.splitlines()]
+    assert words == ["once", "throttled", "identical"] * 2
+
+
+@pytest.mark.parametrize("step", [-3600.0, -0.05, 3600.0])
+def test_a_rate_goes_on_when_the_clock_is_set(rospy, step):
+    """It slept for an hour after the clock had been set back by one."""
+    clock = current_clock()
+    computer = Computer(clock)
+    with use_clock(computer):
+        rate = rospy.Rate(10)
+        rate.sleep()
+        computer.ahead = step
+        before = clock.now()
+        for _ in range(3):
+            rate.sleep()
+    assert clock.now() - before <= 0.41
+
+
+def test_a_client_of_dynamic_reconfigure_converts_values_to_the_types_of_the_node(tmp_path):
+    """The node ignored them without a word, such as 1 for a float."""
+    made = Session(["script.py"], make_node=lambda _name: get_node())
+    with ros1.installed(tmp_path / "script.py"), MissionKit() as mission:
+        from dynamic_reconfigure.client import Client
+
+        session.begin(made)
+        node = mission.ros1_node("planner", {"speed": 0.5, "samples": 3, "on": False, "frame": "a"})
+        client = Client("planner", timeout=5)
+        wanted = {"speed": 1, "samples": 4.0, "on": "true", "frame": 7, "groups": {}}
+        assert client.update_configuration(wanted) == node.parameters
+        assert repr(node.parameters["speed"]) == "1.0"
+        assert node.changes == [{"speed": 1.0, "samples": 4, "on": True, "frame": "7"}]
+        for change, problem in (({"sped": 1.0}, "don't know"), ({"speed": "fast"}, "can't set")):
+            with pytest.raises(Exception, match=problem):
+                client.update_configuration(change)
+        session.end(made)
 
 
 def test_published_headers_are_numbered(rospy):

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from smachpy.ros1.names.dynamic_reconfigure import Config, Reconfigure
+from smachpy.ros1.names.dynamic_reconfigure import (
+    Config,
+    DynamicReconfigureParameterException,
+    Reconfigure,
+)
 from smachpy.ros1.names.dynamic_reconfigure.encoding import decode_config, encode_config
 from smachpy.ros1.names.rospy.exceptions import ROSException
 from smachpy.ros1.names.rospy.service import ServiceProxy
 from smachpy.ros1.names.rospy.topics import Subscriber
 from smachpy.ros1.session import session
+from smachpy.ros1.stubs import Anything
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,13 +63,22 @@ class Client:
     def update_configuration(self, changes: dict[str, Any]) -> dict[str, Any]:
         """Change parameters, and return the node's new configuration.
 
+        Values are converted to the types that the node has: it ignores any other.
+
         Raises:
-            DynamicReconfigureParameterException: a value is not a bool, number or text.
+            DynamicReconfigureParameterException: the node does not have one of them, or a value
+                cannot be converted.
             ServiceException: the node did not answer.
 
         Blocks: until the answer.
         """
-        self._config = decode_config(self._proxy(encode_config(changes)).config)
+        known = self.get_configuration()
+        values = {
+            name: _as_known(name, value, known)
+            for name, value in changes.items()
+            if name != "groups"  # of the descriptions, which are not read
+        }
+        self._config = decode_config(self._proxy(encode_config(values)).config)
         return dict(self._config)
 
     def set_config_callback(self, value: Callable[[dict[str, Any]], object] | None) -> None:
@@ -81,6 +95,22 @@ class Client:
         self._config = decode_config(message)
         if self._callback is not None:
             self._callback(dict(self._config))
+
+
+def _as_known(name: str, value: Any, known: dict[str, Any]) -> Any:
+    """Return a value as dynamic_reconfigure's client converts it."""
+    if not known or isinstance(value, Anything):  # in a dry program nobody has answered
+        return value
+    if name not in known:
+        raise DynamicReconfigureParameterException(f"don't know parameter: {name}")
+    kind = type(known[name])
+    if kind is bool and isinstance(value, str):
+        return value.lower() in {"yes", "true", "t", "1"}
+    try:
+        return kind(value)
+    except (TypeError, ValueError) as error:
+        problem = f"can't set parameter '{name}' of type {kind.__name__}: {error}"
+        raise DynamicReconfigureParameterException(problem) from error
 
 
 __all__ = ["Client", "ROSException"]

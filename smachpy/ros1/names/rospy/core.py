@@ -261,9 +261,6 @@ if not logger.handlers:
     logger.setLevel(logging.INFO)
 """The logger of all messages; programs that use `logging` may get it by its name."""
 
-_logged: dict[tuple[Any, ...], Any] = {}
-"""Level and line of the program -> when and what it has logged, for `throttle` and `once`."""
-
 
 def _text(msg: Any, args: Any) -> str:
     if not args:
@@ -316,9 +313,9 @@ def _functions(level: int) -> tuple[Callable[..., None], ...]:
     def throttle(period: float, msg: Any, *args: Any, logger_name: str | None = None) -> None:
         """Log a message from this line of the program at most once per `period` [s]."""
         key = (level, *_place())
-        now = current_clock().now()
-        if key not in _logged or now - _logged[key] >= float(period) or now < _logged[key]:
-            _logged[key] = now
+        now, logged = current_clock().now(), session().logged
+        if key not in logged or not 0 <= now - logged[key] < float(period):
+            logged[key] = now
             _log(level, msg, args, logger_name)
 
     def throttle_identical(
@@ -327,16 +324,18 @@ def _functions(level: int) -> tuple[Callable[..., None], ...]:
         """Log as `throttle`, but a different text at once."""
         key = (level, "identical", *_place())
         now, text = current_clock().now(), _text(msg, args)
-        before = _logged.get(key)
-        if before is None or before[1] != text or now - before[0] >= float(period):
-            _logged[key] = now, text
+        logged = session().logged
+        before = logged.get(key)
+        if before is None or before[1] != text or not 0 <= now - before[0] < float(period):
+            logged[key] = now, text
             _log(level, text, (), logger_name)
 
     def once(msg: Any, *args: Any, logger_name: str | None = None) -> None:
         """Log a message from this line of the program only the first time."""
         key = (level, "once", *_place())
-        if key not in _logged:
-            _logged[key] = True
+        logged = session().logged
+        if key not in logged:
+            logged[key] = True
             _log(level, msg, args, logger_name)
 
     return log, throttle, throttle_identical, once

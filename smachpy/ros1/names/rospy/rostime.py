@@ -104,7 +104,7 @@ class Rate:
 
     Args:
         hz: Iterations per second, above 0.
-        reset: Ignored; time does not jump here.
+        reset: Ignored; if the clock is set back, the iteration begins anew in any case.
 
     Raises:
         ValueError: `hz` is not above 0.
@@ -119,7 +119,9 @@ class Rate:
 
     def remaining(self) -> Duration:
         """Return the remaining time of this iteration."""
-        return self.sleep_dur - (Time.now() - self.last_time)
+        now = Time.now()
+        self.last_time = min(self.last_time, now)  # the clock may have been set back by hours
+        return self.sleep_dur - (now - self.last_time)
 
     def sleep(self) -> None:
         """Wait for the end of this iteration; after one that took far too long, start afresh.
