@@ -209,6 +209,16 @@ class Publisher(_TopicEnd):
             raise self._ends.mismatches[0]
 
 
+class NewsPublisher(Publisher):
+    """A publisher whose program goes on if all subscribers have another type: that is only logged.
+
+    For what a program tells of itself, to whoever listens: a stranger's mistake must not end it.
+    """
+
+    def _raise_if_nobody_fits(self) -> None:
+        pass
+
+
 class Subscriber(_TopicEnd, Generic[M]):
     """Calls back with every message of a topic, in order, one at a time.
 

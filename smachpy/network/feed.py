@@ -27,7 +27,7 @@ from actionlib_core.clock import SerialExecutor, current_clock
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import Trigger
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher
+from actionlib_core.pubsub.topic import NewsPublisher
 from actionlib_core.transport.tokens import Kind, token_pattern
 from smachpy.events import Recovered, Started, record_text
 from smachpy.events.introspection import describe
@@ -109,7 +109,7 @@ class Feed:
         self._executor = SerialExecutor(node.clock, f"events of {server_name}")
         self._description = ""
         self._problems: list[dict[str, str]] = []
-        self._descriptions = Publisher(
+        self._descriptions = NewsPublisher(
             server_name + DESCRIPTION_TOPIC, String, latch=True, node=node
         )
         self._describe()
@@ -123,7 +123,7 @@ class Feed:
         self._robot = RobotTopics(node) if robot is None else robot
         self._stop_listening: Callable[[], None] | None = None  # to the robot's topics
         self._watchers: set[str] = set()
-        self._observed = Publisher(server_name + OBSERVED_TOPIC, String, node=node)
+        self._observed = NewsPublisher(server_name + OBSERVED_TOPIC, String, node=node)
         self._presence = node.transport.watch_alive(
             token_pattern(Kind.SUBSCRIBER, self._observed.resolved_name), self._on_watcher
         )
@@ -131,7 +131,7 @@ class Feed:
             server_name + HISTORY_SERVICE, Trigger, self._answer, node=node, alone=False
         )
         # Last, because viewers find machines by this topic.
-        self._events = Publisher(server_name + EVENTS_TOPIC, String, node=node)
+        self._events = NewsPublisher(server_name + EVENTS_TOPIC, String, node=node)
         self._is_open = True
 
     def close(self) -> None:

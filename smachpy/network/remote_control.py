@@ -32,7 +32,7 @@ from actionlib_core.interfaces import define_service
 from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.pubsub.service import Service
 from actionlib_core.pubsub.service_proxy import ServiceProxy
-from actionlib_core.pubsub.topic import Publisher
+from actionlib_core.pubsub.topic import NewsPublisher
 from smachpy.base import log
 from smachpy.engine.preempt import asking
 from smachpy.exceptions import SmachError
@@ -100,7 +100,7 @@ class ControlServer:
         self._path = path
         self._lock = threading.Lock()
         self._executor = SerialExecutor(node.clock, f"control of {server_name}")
-        self._states = Publisher(server_name + STATE_TOPIC, String, latch=True, node=node)
+        self._states = NewsPublisher(server_name + STATE_TOPIC, String, latch=True, node=node)
         self._service = Service(
             server_name + CONTROL_SERVICE, Command, self._answer, node=node, alone=False
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from actionlib_core.clock import current_clock
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.node import get_node
-from actionlib_core.pubsub.topic import Publisher, Subscriber
+from actionlib_core.pubsub.topic import NewsPublisher, Subscriber
 from actionlib_core.shutdown import on_shutdown
 from smachpy.ros1.session import session
 from smachpy.states.frames import FrameError, Frames
@@ -109,7 +109,7 @@ class Broadcaster:
         node = get_node()
         self._sent: dict[str, TransformStamped] = node.shared("static transforms", dict)
         self._publisher = node.shared(
-            ("broadcaster", topic), lambda: Publisher(topic, TFMessage, latch=static)
+            ("broadcaster", topic), lambda: NewsPublisher(topic, TFMessage, latch=static)
         )
 
     def send(self, transforms: Iterable[TransformStamped]) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actionlib_core.interfaces import ros2
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher, WatchingSubscriber
+from actionlib_core.pubsub.topic import NewsPublisher, WatchingSubscriber
 from smachpy.places.pose import ORIGIN, Pose2D, quaternion_of
 from smachpy.sim.scanner import Scanner
 from smachpy.sim.server import BASE_FRAME, MAP_FRAME, ODOM_FRAME
@@ -62,15 +62,15 @@ class Nav2Topics:
         self._transform = message("geometry_msgs/TransformStamped")
         self._odometry = message("nav_msgs/Odometry")
         self._laser_scan = message("sensor_msgs/LaserScan")
-        self._odom = Publisher("odom", self._odometry, node=node)
-        self._tf = Publisher("tf", message("tf2_msgs/TFMessage"), node=node)
-        self._scan = Publisher("scan", self._laser_scan, node=node)
+        self._odom = NewsPublisher("odom", self._odometry, node=node)
+        self._tf = NewsPublisher("tf", message("tf2_msgs/TFMessage"), node=node)
+        self._scan = NewsPublisher("scan", self._laser_scan, node=node)
         self._path = message("nav_msgs/Path")
         self._stamped = message("geometry_msgs/PoseStamped")
-        self._plan = Publisher("plan", self._path, node=node)
+        self._plan = NewsPublisher("plan", self._path, node=node)
         self._way: tuple[tuple[float, float], ...] = ()  # the plan that was published last
         grid = message("nav_msgs/OccupancyGrid")
-        self._map = Publisher("map", grid, latch=True, node=node)
+        self._map = NewsPublisher("map", grid, latch=True, node=node)
         self._publish_map(grid())
         self._speeds = WatchingSubscriber(
             "cmd_vel",

@@ -150,14 +150,17 @@ class Pilot:
         It stops where a goal could be, too: at the margin of goals and two cells more, because
         bodies and goals are measured in cells.
         """
+        robot, limits = self.robot, self.robot.config.robot
+        # What it will do: of a command beyond its limits, the way to look along could be endless.
         speed, turn_rate = self._override
-        robot = self.robot
+        speed = max(-limits.max_reverse_speed, min(limits.max_speed, speed))
+        turn_rate = max(-limits.max_turn_rate, min(limits.max_turn_rate, turn_rate))
         if not robot.battery.charge(now):
             return STOP
         if speed == 0.0:
-            return self._override
-        braking = _SHARE * robot.config.robot.braking
+            return speed, turn_rate
+        braking = _SHARE * limits.braking
         kept_away = robot.config.planner.margin + 2.0 * robot.world.map.resolution
-        room = max(0.0, robot.room(self._override, kept_away + _LOOKED_AHEAD) - kept_away)
+        room = max(0.0, robot.room((speed, turn_rate), kept_away + _LOOKED_AHEAD) - kept_away)
         most = math.sqrt(2.0 * braking * room)
         return math.copysign(min(abs(speed), most), speed), turn_rate

@@ -27,7 +27,7 @@ from actionlib_core.interfaces.std_srvs.srv import Empty, EmptyResponse
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher, WatchingSubscriber
+from actionlib_core.pubsub.topic import NewsPublisher, WatchingSubscriber
 from actionlib_core.time import Time
 from smachpy.places.exceptions import NavigationError
 from smachpy.places.pose import Pose2D, quaternion_of, yaw_of
@@ -89,12 +89,12 @@ class RobotServer:
         self._closing = self._clock.event("the robot closes")
         self._wake = self._clock.event("the end of the drive")
         self._charge_wake = self._clock.event("the charge")
-        self._parts: list[Publisher | WatchingSubscriber[Twist] | Service] = []
-        self._odom = Publisher("odom", Odometry, latch=True, node=self._node)
-        self._frames = Publisher("tf_static", TFMessage, latch=True, node=self._node)
-        self._battery = Publisher("battery", BatteryState, latch=True, node=self._node)
-        self._scan = Publisher("scan", LaserScan, node=self._node)
-        self._plan = Publisher("plan", Path, latch=True, node=self._node)
+        self._parts: list[NewsPublisher | WatchingSubscriber[Twist] | Service] = []
+        self._odom = NewsPublisher("odom", Odometry, latch=True, node=self._node)
+        self._frames = NewsPublisher("tf_static", TFMessage, latch=True, node=self._node)
+        self._battery = NewsPublisher("battery", BatteryState, latch=True, node=self._node)
+        self._scan = NewsPublisher("scan", LaserScan, node=self._node)
+        self._plan = NewsPublisher("plan", Path, latch=True, node=self._node)
         self._way: tuple[tuple[float, float], ...] = ()  # the plan that was published last
         self._move = SimpleActionServer(
             "move_base", MoveBaseAction, self._drive, auto_start=False, node=self._node
@@ -165,7 +165,9 @@ class RobotServer:
         if self._owns_stepper:
             self._stepper.close()
         for part in self._parts:
-            part.unregister() if isinstance(part, (Publisher, WatchingSubscriber)) else part.close()
+            part.unregister() if isinstance(
+                part, (NewsPublisher, WatchingSubscriber)
+            ) else part.close()
 
     # -- steps: in the stepper's thread --------------------------------------------------------
 
@@ -420,10 +422,10 @@ class RobotServer:
         return Header(stamp=stamp, frame_id=frame)
 
 
-def map_publisher(floor: OccupancyMap, node: Node) -> Publisher:
+def map_publisher(floor: OccupancyMap, node: Node) -> NewsPublisher:
     """Publish a map on the latched topic `map`; return the publisher."""
     stamp = Time(0, node.clock.time_ns())
-    publisher = Publisher("map", OccupancyGrid, latch=True, node=node)
+    publisher = NewsPublisher("map", OccupancyGrid, latch=True, node=node)
     publisher.publish(
         header=Header(stamp=stamp, frame_id=MAP_FRAME),
         info=MapMetaData(

@@ -10,7 +10,7 @@ from actionlib_core.interfaces.std_msgs.msg import Bool
 from actionlib_core.interfaces.std_srvs.srv import SetBool, SetBoolResponse
 from actionlib_core.node import Node, get_node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import Publisher
+from actionlib_core.pubsub.topic import NewsPublisher
 from smachpy.exceptions import MissionError
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
 from smachpy.places.occupancy import load_map
@@ -169,7 +169,7 @@ class _Surroundings:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._doors: list[_DoorServer] = []
-        self._map: Publisher | None = None
+        self._map: NewsPublisher | None = None
 
     def start(self) -> None:
         self._map = map_publisher(self._simulation.world.map, self._simulation.node)
@@ -205,7 +205,7 @@ class _DoorServer:
         self._stepper = simulation.stepper
         node = simulation.node
         self._told: bool | None = None
-        self._open = Publisher(f"doors/{door.name}/open", Bool, latch=True, node=node)
+        self._open = NewsPublisher(f"doors/{door.name}/open", Bool, latch=True, node=node)
         self._set = Service(f"doors/{door.name}/set", SetBool, self._on_set, node=node)
         self.report()
 

@@ -21,7 +21,7 @@ from actionlib_core.interfaces.std_msgs.msg import String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import get_node
 from actionlib_core.pubsub.service import Service
-from actionlib_core.pubsub.topic import FreshSubscriber, Publisher
+from actionlib_core.pubsub.topic import FreshSubscriber, NewsPublisher
 from smachpy.base.functions import name_of
 from smachpy.base.log import logwarn
 from smachpy.base.problems import Problems
@@ -154,7 +154,7 @@ class AskOperator(State):
         with contextlib.ExitStack() as open_ends:
             open_ends.callback(on_preempt(self, asking.wake.set))
             ask = open_ends.enter_context(
-                Publisher(f"{self.__channel}/question", String, latch=True, node=node)
+                NewsPublisher(f"{self.__channel}/question", String, latch=True, node=node)
             )
             # A latched answer is that to an earlier question.
             open_ends.enter_context(

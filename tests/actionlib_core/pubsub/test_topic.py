@@ -20,7 +20,7 @@ from actionlib_core.goal.bounded import BYTES
 from actionlib_core.interfaces.geometry_msgs.msg import Point
 from actionlib_core.interfaces.std_msgs.msg import Int32, String
 from actionlib_core.node import Node, use_node
-from actionlib_core.pubsub.topic import Publisher, Subscriber, wait_for_message
+from actionlib_core.pubsub.topic import NewsPublisher, Publisher, Subscriber, wait_for_message
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.tokens import Endpoint, Kind
 from actionlib_core.wire.arrivals import REPORTED
@@ -245,6 +245,15 @@ def test_wrong_type_is_told_on_both_sides(nodes, clock, caplog):
     clock.sleep(1)
     assert publisher.mismatches == []
     fitting.unregister()
+
+
+def test_news_are_published_although_their_listeners_have_another_type(nodes, clock, caplog):
+    talker, listener = nodes
+    Subscriber("chatter", Int32, print, node=listener)
+    publisher = NewsPublisher("chatter", String, node=talker)
+    clock.sleep(1)
+    publisher.publish("x")
+    assert "chatter: types differ" in caplog.text
 
 
 def test_message_of_another_encoding_without_token_is_noted(nodes, clock):

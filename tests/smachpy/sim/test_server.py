@@ -348,6 +348,21 @@ def test_it_is_driven_by_hand_on_a_coarse_map_too(speed):
     assert robot.body.speed == pytest.approx(speed)
 
 
+@pytest.mark.parametrize("command", [(100.0, 1000.0), (1e200, 1e201), (-1e200, 1e201)])
+def test_a_command_beyond_its_limits_is_looked_at_within_them(monkeypatch, command):
+    """It looked ahead on a circle for as long as the braking distance, and the world stood."""
+    hall = OccupancyMap(np.zeros((100, 100), np.int8), 0.1, Pose2D(0, 0, 0))
+    robot = Robot(World(hall), load_config(OFFICE_ROBOT), Pose2D(5, 5, 0), 0.0)
+    looks = iter(range(1000))
+    monkeypatch.setattr(robot, "_hits", lambda *_: next(looks) < 0)
+    pilot = Pilot(robot)
+    pilot.override(0.0, command)
+    for i in range(10):
+        pilot.step(0.05 * i, 0.05)
+    assert math.copysign(1.0, robot.body.speed) == math.copysign(1.0, command[0])
+    assert not robot.body.standing
+
+
 @pytest.mark.parametrize("cell", [0.05, 0.1])
 @pytest.mark.parametrize("ahead", [i / 90 for i in range(10)])
 def test_where_it_was_driven_by_hand_it_can_be_sent_again(cell, ahead):
@@ -385,6 +400,14 @@ def test_a_cancel_does_not_wait_for_the_hand(clock, simulation, client, teleop):
     clock.sleep(0.2)
     assert client.get_state() == GoalStatus.PREEMPTED
     assert simulation.robot.body.speed == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("topic", ["odom", "battery", "tf_static", "map", "scan", "plan"])
+def test_a_listener_of_another_type_does_not_stop_the_robot(clock, simulation, client, topic):
+    """The thread that moves all robots ended, and so did no goal."""
+    Subscriber(topic, Twist, lambda _: None)
+    clock.sleep(20.0)
+    assert drive(client, OFFICE_1) == (GoalStatus.SUCCEEDED, "arrived")
 
 
 def test_a_speed_that_is_no_number_stops_it(clock, simulation, teleop, caplog):

@@ -6,10 +6,11 @@ import math
 import pytest
 
 import smachpy
-from actionlib_core.interfaces.std_msgs.msg import String
+from actionlib_core.interfaces.std_msgs.msg import Bool, String
 from actionlib_core.interfaces.std_srvs.srv import SetBool
 from actionlib_core.node import Node
 from actionlib_core.pubsub.service_proxy import ServiceProxy
+from actionlib_core.pubsub.topic import Subscriber
 from smachpy.exceptions import MissionError
 from smachpy.states.ask_operator import AskOperator
 
@@ -64,6 +65,13 @@ def test_the_question_is_there_while_it_waits_and_gone_after(mission, answer):
     mission(asking()).assert_outcome("no")
     mission.clock.sleep(0.1)
     assert [message.data for message in question.received] == ["Go on? (yes, no)", ""]
+
+
+def test_a_listener_of_another_type_does_not_end_the_mission(mission, answer):
+    """The answer was lost, and the mission with it."""
+    Subscriber("operator/question", Bool, lambda _: None, node=mission.node)
+    answer(5.0, "yes")
+    mission(asking()).assert_outcome("yes")
 
 
 def test_nobody_answers(mission):
