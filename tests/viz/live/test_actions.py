@@ -286,6 +286,31 @@ def test_actions_of_two_networks_are_told_apart(world):
     world.clock.sleep(60.0)
 
 
+def test_an_action_of_two_networks_keeps_its_name_until_its_own_server_goes(world):
+    elsewhere = MemoryNetwork(world.clock)
+    viewer, robot = (
+        Node(name, transport=elsewhere.session(), clock=world.clock) for name in ("viewer", "robot")
+    )
+    first = world.serve()
+    world.actions.join(viewer)
+    server = SimpleActionServer("count", msg.TestAction, auto_start=False, node=robot)
+    server.start()
+    world.clock.sleep(0.5)
+    first.action_server.stop()
+    world.clock.sleep(0.5)
+    assert [one["name"] for one in world.actions.summary()["actions"]] == ["count (2)"]
+    server.action_server.stop()
+    world.clock.sleep(0.5)
+    assert world.actions.summary()["actions"] == []
+    with pytest.raises(GoalRefusedError, match="got no server"):
+        world.actions.send("count (2)", "goal: 7")
+    world.serve()
+    assert [one["name"] for one in world.actions.summary()["actions"]] == ["count"]
+    viewer.close()
+    robot.close()
+    world.clock.sleep(60.0)
+
+
 def test_actions_of_a_ros2_robot(clock):
     network = MemoryNetwork(clock)
     sessions = network.session(), network.session()

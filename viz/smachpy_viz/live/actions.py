@@ -131,6 +131,7 @@ class Actions:
         self._used: set[str] = set()
         self._servers: dict[str, dict[str, Endpoint]] = {}
         self._nodes: dict[str, Node] = {}
+        self._shown: dict[tuple[Node, str], str] = {}  # by network and name there
         self._goals: dict[str, SentAction] = {}
         self._clients: dict[tuple[Node, str, str], ActionClient[Any]] = {}
         self._searched = False
@@ -161,6 +162,7 @@ class Actions:
         with self._lock:
             for name in [name for name, owner in self._nodes.items() if owner is node]:
                 del self._nodes[name], self._servers[name]
+            self._shown = {key: name for key, name in self._shown.items() if key[0] is not node}
             clients = [self._clients.pop(key) for key in list(self._clients) if key[0] is node]
         # Outside the lock, which the clients' callbacks need.
         for client in clients:
@@ -350,12 +352,14 @@ class Actions:
         if end.kind is not Kind.ACTION_SERVER:
             return
         with self._lock:
-            # The first of "name", "name (2)", ... that is free or belongs to this network.
+            # An action keeps the first of "name", "name (2)", ... that was free when it came.
             names = (f"{end.name} ({i})" if i > 1 else end.name for i in itertools.count(1))
-            shown = next(name for name in names if self._nodes.get(name, node) is node)
+            shown = self._shown.get((node, end.name)) or next(
+                name for name in names if name not in self._nodes
+            )
             full = shown not in self._servers and len(self._servers) >= MAX_ACTIONS
             if alive and not full:
-                self._nodes[shown] = node
+                self._nodes[shown], self._shown[node, end.name] = node, shown
                 self._servers.setdefault(shown, {})[key] = end
             elif alive:
                 logger.log(
@@ -368,7 +372,7 @@ class Actions:
             elif (servers := self._servers.get(shown)) is not None:
                 servers.pop(key, None)
                 if not servers and shown not in self._used:
-                    del self._nodes[shown], self._servers[shown]
+                    del self._nodes[shown], self._servers[shown], self._shown[node, end.name]
         self._changed()
 
     def _changed(self) -> None:
