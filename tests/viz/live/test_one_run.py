@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from actionlib_core.clock import RealClock
 from smachpy.command import main
 from smachpy.durable.opening import open_store
 from smachpy.exceptions import SmachError
@@ -100,6 +102,37 @@ def test_a_mission_is_resumed_by_a_process_of_its_own(interrupted, monkeypatch, 
     for command in ("resume", "cancel"):
         with pytest.raises(SmachError):
             runs.command({"journal": "j.db", "id": "m", "command": command})
+    journals.close()
+
+
+def test_a_failed_resume_is_told_until_the_mission_goes_on(interrupted, tmp_path, monkeypatch):
+    tasks = []
+
+    class Clock(RealClock):
+        def spawn(self, function, *, name):
+            tasks.append(super().spawn(function, name=name))
+
+    monkeypatch.setattr(journals_module, "RealClock", Clock)
+    Path("errand.py").rename("elsewhere.py")
+    journals = Journals([interrupted], allow=[str(tmp_path)])
+    runs = Runs(Machines(), [], journals)
+    journals.command("j.db", "m", "resume")
+    tasks[0].join(60.0)
+    assert listed(runs)["reason"].startswith("not resumed: ")
+    Path("elsewhere.py").rename("errand.py")
+    Path("go").touch()
+    assert main(["missions", "resume", "m", "--durable", "j.db", "--allow", ".", "--plain"]) == 0
+    assert (listed(runs)["outcome"], listed(runs)["reason"]) == ("done", "")
+    journals.close()
+
+
+def test_a_mission_in_the_queue_is_cancelled_at_once(interrupted):
+    Path("go").touch()
+    assert main(["submit", "errand.py", "--db", interrupted, "--mission", "later"]) == 0
+    journals = Journals([interrupted])
+    assert journals.command("j.db", "later", "cancel") == "it is cancelled"
+    with contextlib.closing(open_store(interrupted)) as store:
+        assert store.mission("later").status == "cancelled"
     journals.close()
 
 

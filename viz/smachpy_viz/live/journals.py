@@ -138,8 +138,10 @@ class Journals:
             self._known.pop((found.where, mission), None)
             if command == "cancel":
                 store.request_cancel(mission)
-                running = row.status not in {INTERRUPTED, *OVER} and row.status != QUEUED
-                return "it is preempted" if running else "it is preempted when it is resumed"
+                if row.status == QUEUED:
+                    return "it is cancelled"
+                later = row.status == INTERRUPTED
+                return "it is preempted when it is resumed" if later else "it is preempted"
             if row.status in OVER:
                 raise MissionOverError(journal, mission, row.status)
             if "resume" not in _can(overview(store, row)):
@@ -206,6 +208,8 @@ class Journals:
         if known is None or known[0] != stamp or row.status not in OVER:
             known = self._known[key] = stamp, mission_row(overview(store, row), _name(where))
         listed = known[1]
+        if row.status != INTERRUPTED:  # it goes on since, or another process has it
+            self._failures.pop(key, None)
         failure = self._failures.get(key)
         return listed if failure is None else {**listed, "reason": f"not resumed: {failure}"}
 
