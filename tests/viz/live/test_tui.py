@@ -110,6 +110,28 @@ def test_a_preempt_says_who_asked_and_who_holds_it_up(tmp_path, clock):
     assert "asked to stop by operator ann" in found["log"]
 
 
+def test_the_next_machine_is_shown_though_the_present_one_was_forgotten(tmp_path, clock):
+    machines = Machines()
+    for name in ("one", "two"):
+        machines.obtain(name).reset(recorded(tmp_path / name).history())
+    shown = []
+
+    async def look():
+        app = MissionApp(machines, None)
+        async with app.run_test(size=(120, 40)) as pilot:
+            app.refresh_view()
+            machines.forget("one")
+            for _ in range(2):
+                await pilot.press("n")
+                shown.append(app._machine.name)
+            machines.forget("two")
+            await pilot.press("n")
+            shown.append(app._machine.name)
+
+    asyncio.run(look())
+    assert shown == ["two", "two", "two"]
+
+
 def test_a_frame_that_comes_after_the_widgets_have_gone_is_none(tmp_path, clock):
     machines = Machines()
     machines.obtain("job").reset(recorded(tmp_path).history())

@@ -392,8 +392,9 @@ class MissionApp(App[None]):
         """Show the next machine."""
         names = [one["name"] for one in self._machines.summaries()]
         if names and self._machine is not None:
-            after = (names.index(self._machine.name) + 1) % len(names)
-            self._machine = self._machines.get(names[after])
+            # The one that is shown may be an earlier run that is no longer kept.
+            here = names.index(self._machine.name) if self._machine.name in names else -1
+            self._machine = self._machines.get(names[(here + 1) % len(names)])
 
     def action_go_by(self, step: int) -> None:
         """Show the instant one event back or forward."""
