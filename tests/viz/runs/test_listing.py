@@ -12,7 +12,12 @@ import pytest
 import smachpy
 from smachpy import CBState, Concurrence, StateMachine, describe
 from smachpy.durable.opening import open_store
-from smachpy.events.recording import RecordingError, header_line, recording_lines
+from smachpy.events.recording import (
+    RecordingError,
+    header_line,
+    read_recording,
+    recording_lines,
+)
 from smachpy.exceptions import SmachError
 from smachpy_viz.live import runs as runs_module
 from smachpy_viz.live.journals import Journals
@@ -282,6 +287,71 @@ def test_a_run_in_virtual_time_has_its_real_date_and_is_one_row_with_its_file(tm
     machine.behind = BEGAN
     [row] = Runs(machines, [tmp_path]).rows()["runs"]
     assert (row["began"], row["stamp"]) == (BEGAN + S, S)
+
+
+def test_runs_in_virtual_time_which_all_begin_at_one_instant_are_told_apart(tmp_path):
+    def virtual(path, made, events):
+        lines = list(recording_lines(chain(), events, None))
+        text = header_line(chain(), S, made_ns=BEGAN + made * S) + "".join(lines[1:])
+        path.write_text(text, encoding="utf-8")
+        os.utime(path, ns=(BEGAN + made * S, BEGAN + made * S))
+
+    def begin(epoch):
+        history = {"epoch": epoch, "description": chain(), "events": failed(began=S)}
+        machines.obtain("job").reset(history)
+
+    virtual(tmp_path / "oldest.jsonl", 1, failed(began=S)[:3])
+    virtual(tmp_path / "older.jsonl", 2, failed(began=S))
+    machines = Machines()
+    runs = Runs(machines, [tmp_path])
+    begin("2")
+    ids = {row["id"].rpartition("/")[2] for row in runs.rows()["runs"]}
+    assert ids == {"machine job", "oldest.jsonl"}
+    assert runs.file_of("job") == tmp_path / "older.jsonl"
+    virtual(tmp_path / "newest.jsonl", 3, failed(began=S))
+    begin("3")
+    kept = machines.get("job").before
+    assert runs.file_of("job") == tmp_path / "newest.jsonl"
+    assert runs.file_of(kept) == tmp_path / "older.jsonl"
+    ids = {row["id"].rpartition("/")[2] for row in runs.rows()["runs"]}
+    assert ids == {"machine job", f"machine {kept}", "oldest.jsonl"}
+    (tmp_path / "older.jsonl").unlink()
+    (tmp_path / "oldest.jsonl").unlink()
+    assert runs.file_of(kept) is None
+    virtual(tmp_path / "oldest.jsonl", 1, failed(began=S)[:3])
+    machines.obtain("by name").load(read_recording(tmp_path / "oldest.jsonl"))
+    assert runs.file_of("by name") == tmp_path / "oldest.jsonl"
+    ids = {row["id"].rpartition("/")[2] for row in runs.rows()["runs"]}
+    assert ids == {"machine job", f"machine {kept}", "machine by name"}
+
+
+def test_files_of_one_name_in_two_folders_are_two_machines(tmp_path):
+    for name, events in (("one", failed()), ("two", failed()[:3])):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name / "run.jsonl", events)
+    machines = Machines()
+    runs = Runs(machines, [tmp_path / "one", tmp_path / "two"])
+    names = [runs.open(f"file {tmp_path / name / 'run.jsonl'}") for name in ("one", "two")]
+    assert [machines.get(name).summary()["outcome"] for name in names] == ["aborted", None]
+    other = tmp_path / "three"
+    other.mkdir()
+    write(other / "alone.jsonl", failed())
+    runs = Runs(machines, [other])
+    assert runs.open(f"file {other / 'alone.jsonl'}") == "run alone.jsonl"
+
+
+def test_a_file_that_has_grown_since_it_was_opened_is_shown_with_all(folder):
+    machines = Machines()
+    runs = Runs(machines, [folder])
+    write(folder / "one.jsonl", failed()[:3])
+    name = runs.open(f"file {folder / 'one.jsonl'}")
+    assert machines.get(name).summary()["outcome"] is None
+    write(folder / "one.jsonl", failed())
+    assert runs.open(f"file {folder / 'one.jsonl'}") == name
+    assert machines.get(name).summary()["outcome"] == "aborted"
+    with pytest.raises(RecordingError):
+        runs.open(f"file {folder / 'bad.jsonl'}")
+    assert machines.get("run bad.jsonl") is None
 
 
 def test_a_fleet_of_a_thousand_is_sent_in_parts():

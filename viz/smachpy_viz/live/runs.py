@@ -79,7 +79,8 @@ class Runs:
         self._lock = threading.Lock()
         # Rows of files, with the time and size by which a change is noticed.
         self._rows: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
-        self._opened: dict[str, None] = {}  # names of machines, in the order of their opening
+        # Names of machines with the same of their files, in the order of their opening.
+        self._opened: dict[str, tuple[int, int]] = {}
 
     def rows(self) -> dict[str, Any]:
         """Return `runs`, newest first, `folders`, and `journals` (`Journals.places`).
@@ -102,7 +103,8 @@ class Runs:
             self._rows = {path: self._rows[path] for path in files if path in self._rows}
             recorded = [self._row_of_file(path) for path in files]
             # A live run is usually recorded as well: the live row stays.
-            rows += [row for row in recorded if not any(_is_same(row, one) for one in rows)]
+            known = {file["id"] for row in rows for file in self._files_of(row, recorded)}
+            rows += [row for row in recorded if row["id"] not in known]
             rows = with_missions(rows, missions)
         rows.sort(key=lambda row: (row["live"], row["began"] or 0), reverse=True)
         return {
@@ -174,19 +176,26 @@ class Runs:
             return name
         path = Path(name)
         with self._lock:
+            files = self._files()
             # Only files that are listed: a page must not read any other file of this computer.
-            if kind != "file" or path not in self._files():
+            if kind != "file" or path not in files:
                 raise RecordingError(name, "no such run; expected one in the list.")
-            machine = self.machines.obtain(f"run {path.name}")
-            if machine.name not in self._opened or machine.file != str(path):
-                machine.load(read_recording(path))
-            self._opened.pop(machine.name, None)  # moved to the end: the most recently used
-            self._opened[machine.name] = None
+            shown = f"run {path.name}"
+            other = self.machines.get(shown)
+            twice = sum(one.name == path.name for one in files) > 1
+            if twice or (other is not None and other.file != str(path)):
+                shown = f"run {path}"
+            stamp = _stamp_of(path)
+            if self.machines.get(shown) is None or self._opened.get(shown) != stamp:
+                recording = read_recording(path)
+                self.machines.obtain(shown).load(recording)
+            self._opened.pop(shown, None)  # moved to the end: the most recently used
+            self._opened[shown] = stamp
             while len(self._opened) > MAX_OPEN_RECORDINGS:
                 oldest = next(iter(self._opened))
                 del self._opened[oldest]
                 self.machines.forget(oldest)
-        return machine.name
+        return shown
 
     def file_of(self, name: str) -> Path | None:
         """Return the recording of a machine's newest run; None without one.
@@ -201,8 +210,8 @@ class Runs:
             return Path(machine.file).absolute()
         row = self._row_of(name)
         with self._lock:
-            recorded = map(self._row_of_file, self._files())
-            return next((Path(one["file"]) for one in recorded if _is_same(one, row)), None)
+            recorded = [self._row_of_file(path) for path in self._files()]
+            return next((Path(one["file"]) for one in self._files_of(row, recorded)), None)
 
     def good(self, name: str) -> Iterator[tuple[StateRecord, Sequence[dict[str, Any]]]]:
         """Yield the newest good runs of a machine in files: structure and events, 25 at most."""
@@ -259,16 +268,51 @@ class Runs:
             "mission": None,
         }
 
+    def _files_of(
+        self, row: dict[str, Any], recorded: Iterable[dict[str, Any]]
+    ) -> list[dict[str, Any]]:
+        """Return the rows of the files that have a machine's run.
+
+        Args:
+            row: The machine's.
+            recorded: Those of all files, the newest first.
+        """
+        found = [one for one in recorded if _is_same(one, row)]
+        if not any(map(_is_virtual, found)):
+            return found
+        # All runs in virtual time begin at the same instant.
+        if row["file"]:
+            own = Path(row["file"]).absolute()
+            return [one for one in found if Path(one["file"]).absolute() == own]
+        newer = self._newer_runs(row)
+        return found[newer : newer + 1]
+
+    def _newer_runs(self, row: dict[str, Any]) -> int:
+        """Return how many newer programs of a machine had a run that began at the same instant."""
+        machine = self.machines.get(row["name"])
+        later = None if machine is None else self.machines.get(machine.after or row["name"])
+        count = 0
+        while later is not None and later is not machine:
+            began = self._row_of(later.name)["stamp"]
+            count += began is not None and abs(began - row["stamp"]) < SAME_NS
+            later = self.machines.get(later.before or "")
+        return count
+
     def _row_of_file(self, path: Path) -> dict[str, Any]:
-        try:
-            facts = path.stat()
-            stamp = facts.st_mtime_ns, facts.st_size
-        except OSError:
-            stamp = (0, 0)
+        stamp = _stamp_of(path)
         known = self._rows.get(path)
         if known is None or known[0] != stamp:
             known = self._rows[path] = stamp, _read_row(path, stamp[1])
         return known[1]
+
+
+def _stamp_of(path: Path) -> tuple[int, int]:
+    """Return time of change and size of a file, by which a change is noticed."""
+    try:
+        facts = path.stat()
+    except OSError:
+        return 0, 0
+    return facts.st_mtime_ns, facts.st_size
 
 
 def with_missions(
@@ -306,6 +350,11 @@ def _is_same(file: dict[str, Any], row: dict[str, Any]) -> bool:
     if file["stamp"] is None or row["stamp"] is None or file["machine"] != row["machine"]:
         return False
     return bool(abs(file["stamp"] - row["stamp"]) < SAME_NS)
+
+
+def _is_virtual(file: dict[str, Any]) -> bool:
+    """Return whether the time of a file's run was virtual."""
+    return file["stamp"] is not None and abs(file["began"] - file["stamp"]) > DAY_NS
 
 
 def _dated(row: dict[str, Any], shift: int) -> dict[str, Any]:
