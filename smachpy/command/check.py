@@ -14,6 +14,7 @@ from smachpy.command.queued import add_allow_packages
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.ros1_options import load_any
 from smachpy.command.run import add_input, built_to_look
+from smachpy.command.targets import prints_aside
 from smachpy.exceptions import did_you_mean
 
 if TYPE_CHECKING:
@@ -58,7 +59,8 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(args: argparse.Namespace) -> int:
     """Check the targets; return 1 if there are problems."""
     settings = read_settings(Path.cwd())
-    reports = [_check(text, args, settings) for text in args.targets]
+    with prints_aside(data=args.format != "text"):
+        reports = [_check(text, args, settings) for text in args.targets]
     print(printable(FORMATS[args.format](reports)))
     _tell_unused(settings, [report.record.path[1:] for report in reports])
     if args.pictures:

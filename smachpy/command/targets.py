@@ -229,6 +229,15 @@ def _mission_line(path: Path, sign: bytes) -> Iterator[str]:
         yield f"not available: {str(error).splitlines()[0]}"
 
 
+def prints_aside(*, data: bool) -> contextlib.AbstractContextManager[object]:
+    """Load machines in a `with` block; what their code prints goes to standard error.
+
+    Args:
+        data: Whether standard output is data for programs; otherwise prints go there.
+    """
+    return contextlib.redirect_stdout(sys.stderr) if data else contextlib.nullcontext()
+
+
 def load_target(text: str, *, imports: bool = True, allow: Sequence[str] | None = None) -> Target:
     """Load the machine that a user names.
 

@@ -113,3 +113,32 @@ def test_output_of_another_kind_stays_as_it_is(capsys):
 )
 def test_no_text_moves_the_cursor(text, shown):
     assert printable(text) == shown
+
+
+TALKS = """
+print("imported")
+from smachpy import CBState, StateMachine
+
+def mission():
+    print("built")
+    sm = StateMachine(["done"])
+    with sm:
+        sm.add("A", CBState(lambda _: "done", outcomes=["done"]))
+    return sm
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "begins"),
+    [
+        ("check m.py --format json", "["),
+        ("check m.py --format sarif", "{"),
+        ("simulate m.py --runs 1 --jobs 1 --json", '{"run": 1'),
+        ("render m.py -o -", "<?xml"),
+    ],
+)
+def test_what_a_mission_prints_is_not_in_the_data(words, begins, tmp_path):
+    (tmp_path / "m.py").write_text(TALKS)
+    done = python(SMACHPY, *words.split(), stdout=subprocess.PIPE, cwd=tmp_path)
+    assert (done.returncode, done.stdout[: len(begins)]) == (0, begins)
+    assert {"imported", "built"} <= {*done.stderr.splitlines()}

@@ -13,6 +13,7 @@ from actionlib_core.process.output import printable
 from smachpy.command import UsageError
 from smachpy.command.ros1_options import add_options as add_ros1_options
 from smachpy.command.run import add_input, built_to_look
+from smachpy.command.targets import prints_aside
 
 if TYPE_CHECKING:
     from smachpy.events.introspection import StateRecord
@@ -95,7 +96,8 @@ def _run(args: argparse.Namespace) -> int:
             f"Try -o {Path(args.target).stem or 'machine'}.svg"
         )
     # Atlas and picture can be asked for together; they share the record and the statistics.
-    record = read_record(args.target, args)
+    with prints_aside(data=args.output == "-"):
+        record = read_record(args.target, args)
     looks: dict[str, Any] = {"theme": args.theme, "show_implicit": args.show_implicit}
     if args.runs:
         from smachpy_viz.runs.statistics import marks_of

@@ -19,6 +19,7 @@ from smachpy.command.durable import whole_target
 from smachpy.command.on import ProgressLine, add_jobs_and_on, opened_cluster, workers_text
 from smachpy.command.queued import add_allow_packages
 from smachpy.command.run import time_span
+from smachpy.command.targets import prints_aside
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -158,7 +159,8 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
         raise UsageError("smachpy simulate: got --on and --executor; expected one of them.")
     mission = args.mission if args.on is None else whole_target(args.mission)
     plan = SimulationPlan(mission, args.runs, folder, args.vary, args.seed, args.limit, args.allow)
-    plan.tasks()  # a mistake is to be told before the workers are asked
+    with prints_aside(data=args.json):
+        plan.tasks()  # a mistake is to be told before the workers are asked
     with (
         opened_cluster(args.on, mission, args.allow) as cluster,
         _executor(args.executor) as executor,
@@ -166,7 +168,8 @@ def _simulate(args: argparse.Namespace, folder: Path) -> int:
         who = "" if args.executor else workers_text(cluster, args.jobs, args.runs)
         progress = _RunCounter(args.runs, who, as_json=args.json)
         try:
-            results = simulate(plan, cluster or executor, progress.on_result, jobs=args.jobs)
+            with prints_aside(data=args.json):
+                results = simulate(plan, cluster or executor, progress.on_result, jobs=args.jobs)
         finally:
             progress.end()
     failed = [result for result in results if result.outcome is None]
@@ -251,6 +254,7 @@ class _RunCounter:
     def __init__(self, runs: int, who: str, *, as_json: bool) -> None:
         self._done = 0
         self._json = as_json
+        self._out = sys.stdout  # also while what missions print goes elsewhere
         self._waiting: dict[int, Result] = {}
         self._printed = 0
         shown = sys.stderr.isatty() and not as_json
@@ -272,5 +276,5 @@ class _RunCounter:
                 "values": dict(task.values),
                 "seed": task.seed,
             }
-            print(json.dumps(facts), flush=True)
+            print(json.dumps(facts), file=self._out, flush=True)
         self._progress.show(self._done)
