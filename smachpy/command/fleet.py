@@ -477,6 +477,8 @@ class Runner:
             self._store.release(lease, None, note=f"{this_runner()}: {problem}"[:MAX_NOTE_LENGTH])
         else:
             self._start(row)
+        if row.id not in self._processes:
+            del self._leases[row.id]
         return True
 
     def _start(self, row: MissionRow) -> None:
@@ -559,7 +561,7 @@ class Runner:
             else:
                 self._rests.pop(mission, None)
             print(printable(f"mission {mission}: {how} ({code})"), flush=True)
-            del self._processes[mission]
+            del self._processes[mission], self._leases[mission]
 
     def _note_failure(self, row: MissionRow, why: str, *, begun: bool) -> None:
         """Put a mission back into the queue, and let it rest here."""

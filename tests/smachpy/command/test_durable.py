@@ -13,9 +13,11 @@ from typing import Any
 
 import pytest
 
+from actionlib_core.clock import RealClock
 from smachpy.command import main
 from smachpy.command.fleet import Runner
 from smachpy.command.pruning import size_text
+from smachpy.command.warm import MissionProcess
 from smachpy.durable.opening import open_store
 from smachpy.durable.processes import this_runner
 from smachpy.durable.store import PAGE
@@ -404,6 +406,27 @@ def test_a_mission_is_not_begun_again_before_its_process_has_ended() -> None:
         runner._processes["m1"] = None
         assert not runner._take()
         assert store.mission("m1").owner is None
+
+
+def test_a_runner_keeps_nothing_of_missions_that_it_runs_no_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It kept the lease of each mission that it had ever taken."""
+    clock = RealClock()
+    over = clock.event("end of a process")
+    over.set()
+    for name in ("m1", "m2"):
+        assert main(["submit", "errand.py", "--db", "q.db", f"--mission={name}"]) == 0
+    with contextlib.closing(open_store("q.db")) as store:
+        refuses = Runner(store, "q.db", robots=[], at_once=2, lease_s=15.0)
+        refuses.look()
+        assert (refuses._processes, refuses._leases) == ({}, {})
+        runner = Runner(store, "q.db", robots=[], at_once=2, lease_s=15.0, allow=["."])
+        monkeypatch.setattr(runner._starter, "start", lambda _words: MissionProcess(0, over, 2))
+        runner.look()
+        assert {*runner._leases} == {*runner._processes} == {"m1", "m2"}
+        runner.look()
+        assert (runner._processes, runner._leases) == ({}, {})
 
 
 def test_an_empty_queue_is_not_one_whose_newest_missions_are_of_other_robots() -> None:
