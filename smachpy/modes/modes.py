@@ -20,10 +20,12 @@ from smachpy.machines.guards import when
 from smachpy.machines.history import forget, places, remember
 from smachpy.machines.state import State, get_options, set_options
 from smachpy.machines.state_machine import StateMachine
+from smachpy.modes.sources import Signal
 from smachpy.modes.table import ModesError, Table, name_of, rows_of, states_of
 from smachpy.userdata.user_data import data_of
 
 if TYPE_CHECKING:
+    import signal
     from collections.abc import Callable, Iterable, Iterator, Mapping
     from typing import Self, Unpack
 
@@ -390,7 +392,15 @@ def _check_sources(sources: Iterable[Any], events: Iterable[str]) -> None:
     """
     problems = []
     known = {*events}
+    of_signals: dict[signal.Signals, str] = {}
     for source in sources:
+        if isinstance(source, Signal):
+            first = of_signals.setdefault(source.number, source.event)
+            if first != source.event:
+                problems.append(
+                    f"listen: got {source.number.name} for {first!r} and for {source.event!r}; "
+                    "expected one event, with a way from each mode where it means something."
+                )
         event = getattr(source, "event", None)  # others may have several
         if not callable(getattr(source, "open", None)):
             expected = "expected on_topic(...), on_service(...) or on_signal(...)"

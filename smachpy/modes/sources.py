@@ -75,11 +75,14 @@ class _Service:
 
 
 @dataclass(frozen=True, slots=True)
-class _Signal:
+class Signal:
+    """A signal of the process."""
+
     number: signal.Signals
     event: str
 
     def open(self, trigger: Callable[[str], bool]) -> Callable[[], object]:
+        """Trigger the event with each signal until the returned function is called."""
         if threading.current_thread() is not threading.main_thread():
             log.logwarn(
                 f"modes: {self.number.name} triggers nothing: they do not run in the main thread."
@@ -143,4 +146,4 @@ def on_signal(number: signal.Signals | int, event: str) -> Source:
     if known in {signal.SIGKILL, signal.SIGSTOP}:
         expected = "expected a signal that a program gets, such as signal.SIGUSR1"
         raise ModesError([f"on_signal: got {number!r}; {expected}."])
-    return _Signal(known, event)
+    return Signal(known, event)

@@ -669,6 +669,13 @@ def test_what_is_no_source_of_an_event_is_refused(make, problem):
         Modes(["a", "b"], [["start", "a", "b"]], listen=[make()])
 
 
+def test_a_signal_of_two_events_is_refused():
+    """The first one was never triggered."""
+    listen = [on_signal(signal.SIGUSR1, "start"), on_signal(signal.SIGUSR1, "stop")]
+    with pytest.raises(ModesError, match=r"listen: got SIGUSR1 for 'start' and for 'stop'; expect"):
+        Modes(["a", "b"], [["start", "a", "b"], ["stop", "b", "a"]], listen=listen)
+
+
 def test_a_misspelt_field_in_the_condition_of_a_topic_is_refused():
     """It was an error in each message's callback."""
     with pytest.raises(ModesError, match=r"on_topic: when: field: got 'percentge'.*'percentage'"):
