@@ -84,6 +84,10 @@ def _words(args: argparse.Namespace) -> tuple[str, str]:
     words = list(args.words)
     type_name = words.pop(0) if words and "{" not in words[0] and ":" not in words[0] else ""
     text = words.pop(0) if words else ""
+    if text and args.stdin:
+        raise UsageError(
+            f"service call: got {text!r} beside --stdin; expected one of the two requests."
+        )
     if words:
         raise UsageError(
             f"service call: got {words[0]!r} beyond type and request; expected at most two words. "

@@ -86,7 +86,7 @@ def _register_pub(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME")
     parser.add_argument("type", metavar="TYPE")
     parser.add_argument("values", metavar="YAML", nargs="?", default="", help="'{data: hello}'")
-    parser.add_argument("-r", "--rate", type=rate, default=1.0, metavar="HZ", help="default: 1 Hz")
+    parser.add_argument("-r", "--rate", type=rate, metavar="HZ", help="default: 1 Hz")
     parser.add_argument("-1", "--once", action="store_true", help="one message, then end")
     parser.add_argument("-t", "--times", type=count, metavar="N", help="N messages, then end")
     parser.add_argument(
@@ -241,6 +241,9 @@ def _pub(args: argparse.Namespace) -> int:
     from actionlib_core.pubsub.topic import Publisher
 
     times = 1 if args.once else args.times
+    if args.stdin and (args.values or args.rate):
+        got = "--rate" if args.rate else repr(args.values)
+        raise UsageError(f"topic pub: got {got} beside --stdin; expected one of the two.")
     wanted = args.wait_matching_subscriptions
     if wanted is None:
         wanted = 1 if times or args.stdin else 0
@@ -256,10 +259,12 @@ def _pub(args: argparse.Namespace) -> int:
                 f"{publisher.get_num_connections()}."
             )
         if args.stdin:
-            messages: Iterator[Message] = map(message_class.from_yaml, _documents())
+            messages: Iterator[Message] = map(
+                message_class.from_yaml, itertools.islice(_documents(), times)
+            )
         else:
             print_progress(args, "publisher: beginning loop")
-            messages = _at_rate(node.clock, args.rate, message, times)
+            messages = _at_rate(node.clock, args.rate or 1.0, message, times)
         for number, each in enumerate(messages, 1):
             publisher.publish(each)
             shown = json_text(each.to_dict()) if args.json else f"publishing #{number}: {each!r}\n"

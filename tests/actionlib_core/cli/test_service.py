@@ -72,6 +72,7 @@ def test_bad_input_is_told_with_exit_code_2(cli, grip, capsys):
         (("call", "grip", "std_srvs/Trigger"), "types differ"),
         (("call", "grip", "{date: 1}"), "date"),
         (("call", "grip", "std_srvs/SetBool", "{}", "more"), "at most two words"),
+        (("call", "grip", "{}", "--stdin"), "got '{}' beside --stdin"),
         (("type", "nope"), "not there"),
     ):
         assert cli(*words) == 2, words

@@ -246,6 +246,23 @@ def test_pub_from_standard_input(cli, robot, clock, monkeypatch):
     assert heard == [String("a"), String("b")]
 
 
+def test_pub_from_standard_input_takes_no_more_than_it_is_told(cli, robot, clock, monkeypatch):
+    heard = []
+    Subscriber("chatter", String, heard.append, node=robot)
+    for words, count in ((("-1",), 1), (("-t", "2"), 2)):
+        monkeypatch.setattr(sys, "stdin", io.StringIO("data: a\n---\n" * 3))
+        assert cli("pub", "chatter", "std_msgs/String", "--stdin", *words) == 0
+        clock.sleep(1)
+        assert heard == [String("a")] * count
+        heard.clear()
+
+
+@pytest.mark.parametrize("words", [["data: b"], ["--rate", "5"]])
+def test_pub_refuses_what_standard_input_makes_void(cli, capsys, words):
+    assert cli("pub", "chatter", "std_msgs/String", *words, "--stdin") == 2
+    assert "beside --stdin; expected one of the two" in capsys.readouterr().err
+
+
 def test_pub_tells_what_is_wrong(cli, capsys):
     assert cli("pub", "chatter", "std_msgs/String", "{date: x}", "-1") == 2
     assert "date" in capsys.readouterr().err
