@@ -44,7 +44,10 @@ def register(subparsers: Any) -> None:
         "answer", nargs="?", help="one of the answers; without it, show the questions"
     )
     parser.add_argument(
-        "--state", metavar="PATH", help="the state that asks, or the end of its path"
+        "--state",
+        metavar="PATH",
+        help="the state that asks, or the end of its path; or its service, if states of one path "
+        "ask",
     )
     parser.add_argument(
         "--by", metavar="NAME", help="your name, for the record (default: login name)"
@@ -59,7 +62,7 @@ def _run(args: argparse.Namespace) -> int:
     with _nodes() as nodes:
         found = [(one, node) for node in nodes for one in find_questions(node)]
         if args.answer is None:
-            return _show([one for one, _ in found], as_json=args.json)
+            return show([one for one, _ in found], as_json=args.json)
         question = choose([one for one, _ in found], args.state)
         node = next(node for one, node in found if one is question)
         give_answer(question.service, args.answer, args.by or _user(), node=node)
@@ -72,7 +75,8 @@ def choose(questions: Sequence[Question], state: str | None) -> Question:
 
     Args:
         questions: All open questions.
-        state: Path of the state that asks, or the end of it; None if there is only one.
+        state: Path of the state that asks, or the end of it, or its service; None if there is only
+            one.
 
     Raises:
         MissionError: there is none, or several match.
@@ -80,23 +84,28 @@ def choose(questions: Sequence[Question], state: str | None) -> Question:
     paths = [one.path for one in questions]
     if not questions:
         raise MissionError("answer: got no question on the network; expected one.")
-    fits = [
-        one
-        for one in questions
-        if state is None or one.path == state or one.path.endswith("/" + state.strip("/"))
-    ]
+    fits = list(questions)
+    if state is not None:
+        word = state.strip("/")
+        whole = [one for one in questions if one.path == state or one.service.strip("/") == word]
+        fits = whole or [one for one in questions if one.path.endswith(f"/{word}")]
     if not fits:
         hint = did_you_mean(state or "", paths)
         raise MissionError(f"state: got {state!r}; expected one of {paths}.{hint}")
     if len(fits) > 1:
+        names = [one.path for one in fits]
+        if len(set(names)) < len(names):  # of several robots, for example
+            names = [one.service for one in fits]
         raise MissionError(
             f"state: got {'none' if state is None else repr(state)}, and {len(fits)} questions are "
-            f"asked; expected one of {[one.path for one in fits]}. Try --state."
+            f"asked; expected one of {names}. Try --state."
         )
     return fits[0]
 
 
-def _show(questions: Sequence[Question], *, as_json: bool) -> int:
+def show(questions: Sequence[Question], *, as_json: bool) -> int:
+    """Print the questions, and return the exit code."""
+    paths = [one.path for one in questions]
     if as_json:
         print(json.dumps([asdict(one) for one in questions]))
     elif not questions:
@@ -106,7 +115,8 @@ def _show(questions: Sequence[Question], *, as_json: bool) -> int:
             f"{answer} ({words})" if words else answer
             for answer, words in zip(one.answers, one.words, strict=True)
         ]
-        print(printable(f"{one.path}: {one.text}"))
+        where = f"{one.path} ({one.service})" if paths.count(one.path) > 1 else one.path
+        print(printable(f"{where}: {one.text}"))
         limit = f"; without an answer {one.default} in {one.left:.0f} s" if one.default else ""
         print(printable(f"    {', '.join(answers)}{limit}"))
     return 0 if questions else EXIT_NOTHING

@@ -9,7 +9,7 @@ import textwrap
 
 import pytest
 
-from smachpy.command.answer import choose
+from smachpy.command.answer import choose, show
 from smachpy.exceptions import MissionError
 from smachpy.states.questions import Question
 
@@ -39,10 +39,8 @@ MISSION = """
 """
 
 
-def question(path):
-    return Question(
-        path, "Go on?", ("yes", "no"), ("", ""), "no", 60.0, 30.0, "operator/questions/q"
-    )
+def question(path, service="operator/questions/q"):
+    return Question(path, "Go on?", ("yes", "no"), ("", ""), "no", 60.0, 30.0, service)
 
 
 @pytest.mark.slow
@@ -98,3 +96,22 @@ def test_a_question_is_chosen_by_the_end_of_its_path():
         choose([one], "SK")
     with pytest.raises(MissionError, match="no question"):
         choose([], None)
+    inner = question("/X/A/ASK")
+    assert choose([one, inner], "/A/ASK") is one
+    assert choose([one, inner], "/X/A/ASK") is inner
+
+
+def test_questions_of_one_path_are_chosen_by_their_services(capsys):
+    """Two robots run the same mission."""
+    one, other = (question("/A/ASK", f"r{n}/operator/questions/q") for n in (1, 2))
+    with pytest.raises(MissionError, match=r"one of \['r1/operator/questions/q', 'r2/op.*--state"):
+        choose([one, other], "/A/ASK")
+    assert choose([one, other], "r2/operator/questions/q") is other
+    assert choose([one, other], "/r1/operator/questions/q") is one
+    assert show([one, other, question("/B/ASK")], as_json=False) == 0
+    shown = capsys.readouterr().out.splitlines()[::2]
+    assert shown == [
+        "/A/ASK (r1/operator/questions/q): Go on?",
+        "/A/ASK (r2/operator/questions/q): Go on?",
+        "/B/ASK: Go on?",
+    ]
