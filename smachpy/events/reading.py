@@ -37,7 +37,7 @@ from actionlib_core.inputs.checked_data import (
 )
 from actionlib_core.inputs.checked_file import Limits
 from smachpy.events import EVENT_KINDS
-from smachpy.events.run_state import RunFacts
+from smachpy.events.run_state import ProgressFacts, RunFacts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -150,17 +150,19 @@ _OBSERVATIONS: Final[dict[str, Any]] = {
 def read_event(data: Any) -> dict[str, Any]:
     """Return the record of an event, with the defaults of fields that an older program left out.
 
+    Of a known kind it has no other fields than those that are checked.
+
     Raises:
         DataError: it is none, with the place of the first mistake.
     """
     kind = _read_common(data)
     if kind not in EVENT_KINDS:
         return dict(data)
-    defaults, checks = _checks(kind)
+    defaults, checks, names = _checks(kind)
     # A run has a million records with the same few names, paths and outcomes: each is kept once.
     record = {
         **defaults,
-        **{intern(k): intern(v) if type(v) is str else v for k, v in data.items()},
+        **{intern(k): intern(v) if type(v) is str else v for k, v in data.items() if k in names},
     }
     for name, (usual, check) in checks.items():
         if name not in record:
@@ -170,6 +172,11 @@ def read_event(data: Any) -> dict[str, Any]:
                 check(record[name])
             except DataError as error:
                 raise error.inside(f".{name}") from None
+    if "progress" in record:
+        try:
+            checked(ProgressFacts, record["progress"])
+        except DataError as error:
+            raise error.inside(".progress") from None
     return record
 
 
@@ -195,8 +202,13 @@ def _read_common(data: Any) -> str:
 @cache
 def _checks(
     kind: str,
-) -> tuple[dict[str, Any], dict[str, tuple[tuple[type, ...], Callable[[Any], Any]]]]:
-    """The defaults of an event's fields; the types that need no further look, and the check."""
+) -> tuple[
+    dict[str, Any], dict[str, tuple[tuple[type, ...], Callable[[Any], Any]]], frozenset[str]
+]:
+    """The defaults of an event's fields; the types that need no further look, and the check.
+
+    And the names of all fields that a record may have.
+    """
     hints: dict[str, Any] = get_type_hints(EVENT_KINDS[kind])
     special = {
         "t": MissionTime,
@@ -214,7 +226,9 @@ def _checks(
         for name, hint in hints.items()
         if name not in {"path", "stamp_ns"}
     }
-    return EVENT_KINDS[kind]._field_defaults, checks
+    added = {"progress"} if kind == "GoalFeedback" else set()  # by a viewer
+    names = frozenset({*CommonFields.__annotations__, *hints, *added})
+    return EVENT_KINDS[kind]._field_defaults, checks, names
 
 
 def read_observed(data: Any) -> dict[str, Any]:

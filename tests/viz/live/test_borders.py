@@ -191,6 +191,22 @@ def test_event_with_any_field_replaced_is_refused_or_harms_nothing(kind):
     assert 0 < len(odd) < len(list(variants(event(kind, 5))))
 
 
+@pytest.mark.parametrize("kind", EVENT_KINDS)
+def test_event_with_a_field_of_another_kind_harms_nothing(kind):
+    foreign = sorted({*FIELDS, "progress"} - {*EVENT_KINDS[kind]._fields})
+    odd = [{**event(kind, 5), name: value} for name in foreign for value in (5, "x", [1], {"a": 1})]
+    taken = list(accepted(odd, read_numbered_event))
+    first = [] if kind == "Started" else [event("Started"), event("Entered"), event("GoalSent")]
+    events = [{**one, "seq": seq} for seq, one in enumerate([*first, *taken], 1)]
+    assert shown(history(events=events)) == []
+    state = RunState()
+    for one in events:
+        state.fold(read_event(one))
+        assert all(
+            goal.get("progress", {}).keys() != {"a"} for goal in state.data["goals"].values()
+        )
+
+
 @pytest.mark.parametrize("what", OBSERVED)
 def test_data_of_topics_with_any_field_replaced_is_refused_or_harms_nothing(what):
     odd = list(variants({**HEAD, "what": what, **OBSERVED[what]}))
