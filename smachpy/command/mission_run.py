@@ -132,7 +132,8 @@ def run_mission(target: Target, options: RunOptions) -> int:
         _check_success(target, record, options)
         out = None
         if options.out is not None:
-            out = OutFolder(options.out, target.name, machine, options.robot)
+            name = target.shown_name or target.name
+            out = OutFolder(options.out, name, machine, options.robot)
         needed = needed_servers(record)
         others = {name: needed[name] for name in needed.keys() - set(needs.serves)}
         surroundings.start(machine, others)

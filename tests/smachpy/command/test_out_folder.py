@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import pytest
 
 import smachpy
 from smachpy import events as ev
+from smachpy.command import main
 from smachpy.command.out_folder import OutFolder
 from smachpy.command.surroundings import RobotOptions
 from smachpy.places.maps import OFFICE_MAP, OFFICE_ROBOT
@@ -43,3 +45,20 @@ def test_without_pillow_all_but_the_track_is_written_and_the_extra_is_named(
     assert sorted(path.name for path in written) == ["m.jsonl", "m.svg", "m_summary.json"]
     told = "m_track.png: not drawn: package 'PIL' is missing. Try: pip install 'smachpy[sim]'"
     assert (told in caplog.text) == drives
+
+
+def test_two_missions_of_one_file_do_not_replace_each_others_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("two.py").write_text(
+        "from smachpy import CBState, StateMachine\n\n"
+        "def inspect():\n"
+        "    sm = StateMachine(['done'])\n"
+        "    sm.add('ONE', CBState(lambda _: 'done', outcomes=['done']))\n"
+        "    return sm\n\n"
+        "patrol = two = inspect\n",
+        encoding="utf-8",
+    )
+    for target in ("two.py:inspect", "two.py:patrol", "two.py:two"):
+        assert main(["run", target, "--plain", "--time", "virtual", "--out", "out"]) == 0
+    written = {path.name for path in Path("out").glob("*.jsonl")}
+    assert written == {"two_inspect.jsonl", "two_patrol.jsonl", "two.jsonl"}
