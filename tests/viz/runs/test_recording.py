@@ -1040,6 +1040,15 @@ def test_an_export_of_an_unknown_kind_names_the_kinds_that_there_are(
     assert "expected html, mcap, or one of dot" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("name", "begins"), [("A.HTML", b"<!doctype"), ("A.Mcap", b"\x89MCAP")])
+def test_an_export_knows_extensions_in_capitals(record, tmp_path, name, begins):
+    from smachpy.command import main
+
+    path = str(record("run.jsonl"))
+    assert main(["runs", "export", path, "-o", str(tmp_path / name)]) == 0
+    assert (tmp_path / name).read_bytes().startswith(begins)
+
+
 @pytest.mark.parametrize("name", ["x.html", "x.mcap"])
 def test_an_export_to_nowhere_is_told(record, tmp_path, capsys, name):
     from smachpy.command import main

@@ -312,6 +312,15 @@ def test_bad_requests_end_with_2(job, tmp_path, monkeypatch, capsys, arguments, 
     assert not list(tmp_path.glob("new/*"))  # nothing has run
 
 
+@pytest.mark.slow
+def test_a_report_may_have_its_extension_in_capitals(job, tmp_path, capsys):
+    words = ["simulate", job, "--runs", "1", "--jobs", "1", "--record", str(tmp_path / "runs")]
+    for command in (words, ["runs", "export", str(tmp_path / "runs")]):
+        assert main([*command, "-o", str(tmp_path / "A.HTML")]) == 0
+        assert (tmp_path / "A.HTML").read_text().startswith("<!doctype html>")
+        (tmp_path / "A.HTML").unlink()
+
+
 @pytest.mark.parametrize("ending", ["run.mcap", "run"])
 def test_a_folder_is_exported_as_a_page_only(job, tmp_path, capsys, ending):
     simulate(plan(job, tmp_path, 1), Here())

@@ -358,7 +358,7 @@ def _export(args: argparse.Namespace) -> int:
         return _export_all(args.file, Path(args.output))
     output = Path(args.output)
     # A page needs the events at once, the others one after the other.
-    newest = html.MOST_EVENTS if output.suffix == ".html" else None
+    newest = html.MOST_EVENTS if output.suffix.lower() == ".html" else None
     recording = read_recording(args.file, stream=newest is None, newest=newest)
     try:
         _write(recording, output, args.runs, args.map)
@@ -382,7 +382,7 @@ def _export_all(folder: str, output: Path) -> int:
     from smachpy_viz.pictures.drawing import write
     from smachpy_viz.runs.report import report
 
-    if output.suffix != ".html":
+    if output.suffix.lower() != ".html":
         raise UsageError(
             f"smachpy runs export: {str(output)!r}: got {output.suffix or 'no extension'} for a "
             f"folder of runs; expected .html, or one recording. Try -o {output.stem}.html"
@@ -410,8 +410,8 @@ def collect_one(place: str, command: str) -> MachineRuns:
     return runs
 
 
-def check_extension(command: str, output: Path, *forms: str) -> None:
-    """Check that the extension of a file is one of `forms`, or that of a picture.
+def check_extension(command: str, output: Path, *forms: str) -> str:
+    """Return the extension of a file, which is one of `forms`, or that of a picture.
 
     Raises:
         UsageError: it is not.
@@ -425,16 +425,17 @@ def check_extension(command: str, output: Path, *forms: str) -> None:
             f"{', '.join(forms)}, or one of {', '.join(FORMATS)} for a picture. "
             f"Try -o {output.stem or 'run'}.html"
         )
+    return form
 
 
 def _write(recording: Recording, output: Path, runs: list[str], floor: Path | None) -> None:
-    check_extension("runs export", output, "html", "mcap")
-    if output.suffix == ".html":
+    form = check_extension("runs export", output, "html", "mcap")
+    if form == "html":
         from smachpy_viz.runs.html import standalone_page
 
         page = standalone_page(recording, runs, floor)
         output.write_text(page, encoding="utf-8", errors="replace")
-    elif output.suffix == ".mcap":
+    elif form == "mcap":
         from smachpy_viz.runs.mcap import write_mcap
 
         write_mcap(recording, output)

@@ -213,7 +213,7 @@ def _write(output: Path, runs: MachineRuns, before: MachineRuns | None, values: 
     from smachpy_viz.runs.report import report
     from smachpy_viz.runs.statistics import marks_of
 
-    if output.suffix != ".html":
+    if output.suffix.lower() != ".html":
         return render(runs.record, output, run=marks_of(runs.statistics, runs.record))
     page = report(runs, before=before, values=values if any(values.values()) else None)
     return write(page.encode("utf-8", "replace"), output)
