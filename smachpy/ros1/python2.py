@@ -311,9 +311,10 @@ class _GoneNames(ast.NodeTransformer):
     """Replaces names, functions and arguments that no longer exist.
 
     Functions of the module `string` become methods of str. `reload(sys)` and
-    `sys.setdefaultencoding("utf-8")` are removed, since Python 3's strings need no encoding. `cmp`
-    and `apply` are replaced, unless the module defines them, and `cmp` also as an argument of
-    `sorted` and `sort`.
+    `sys.setdefaultencoding("utf-8")` are removed, since Python 3's strings need no encoding. `cmp`,
+    `apply` and `file` are replaced, unless the module defines them, and `cmp` also as an argument
+    of `sorted` and `sort`. The `message` of a caught error is its only argument, unless the error
+    has its own.
 
     Attributes:
         changes: Place of each change, (line, column, end line, end column), and the new nodes.
@@ -327,9 +328,11 @@ class _GoneNames(ast.NodeTransformer):
     _CONVERSIONS: ClassVar = {"atof": "float", "atoi": "int", "atol": "int"}
 
     _COMPARE: Final = "lambda a, b: (a > b) - (a < b)"
+    _MESSAGE: Final = "getattr({0}, 'message', {0}.args[0] if len({0}.args) == 1 else '')"
 
     def __init__(self, tree: ast.AST) -> None:
         self.changes: list[tuple[tuple[int, int, int, int], list[ast.AST]]] = []
+        self._caught: list[str | None] = []  # names of the errors of the handlers around
         self._read = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
         self._own = {
             getattr(n, "id", getattr(n, "name", getattr(n, "arg", "")))
@@ -382,9 +385,17 @@ class _GoneNames(ast.NodeTransformer):
             made.append(ast.Assign([name], _at(node, _MOVED[f"{node.module}.{alias.name}"])))
         return [ast.fix_missing_locations(ast.copy_location(each, node)) for each in made]
 
+    def visit_ExceptHandler(self, node: ast.ExceptHandler) -> ast.AST:
+        self._caught.append(node.name)
+        self.generic_visit(node)
+        self._caught.pop()
+        return node
+
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         self.generic_visit(node)
         if isinstance(node.value, ast.Name) and isinstance(node.ctx, ast.Load):
+            if node.attr == "message" and node.value.id in self._caught:
+                return _at(node, self._MESSAGE.format(node.value.id))
             moved = _MOVED.get(f"{node.value.id}.{node.attr}")
             if moved is not None:
                 return _at(node, moved)
@@ -410,6 +421,8 @@ class _GoneNames(ast.NodeTransformer):
             node.args = [ast.Starred(each, ast.Load()) for each in rest[:1]]
             node.keywords = [*named, *node.keywords]
             return ast.fix_missing_locations(node)
+        if name == "file" and "file" not in self._own:
+            function.id = "open"
         if not isinstance(function, ast.Attribute):
             return node
         if isinstance(function.value, ast.Name) and function.value.id == "string" and node.args:

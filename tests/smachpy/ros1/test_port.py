@@ -10,6 +10,7 @@ import pytest
 
 from smachpy.command.targets import load_target
 from smachpy.ros1.port import port
+from smachpy.ros1.python2 import to_code
 from tests.places import ROOT
 
 SCRIPTS = ROOT / "tests" / "ros1_scripts"
@@ -167,6 +168,11 @@ words = ['b', 'a']
 words.sort(lambda a, b: cmp(a, b))
 assert words == ['a', 'b'] and isinstance({}, Mapping) and isinstance(sys.maxint, int)
 assert {'k': yaml.load('1')}.keys()[0] == 'k' and not threading.Thread().isAlive()
+assert file(__file__).read().startswith('import')
+try:
+    raise ValueError('bad')
+except ValueError as error:
+    assert error.message == 'bad'
 print >>sys.stdout, 'done', isinstance(lambda: 0, FunctionType)
 """
     ported = port(source.encode(), "old.py")
@@ -175,6 +181,27 @@ print >>sys.stdout, 'done', isinstance(lambda: 0, FunctionType)
     script.write_text(ported.text)
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
     assert done.stdout == "done True\n"
+
+
+def test_an_error_with_a_message_of_its_own_keeps_it():
+    """`error.message` was an AttributeError in the handler, where a robot is to stop."""
+    source = b"""
+class Own(Exception):
+    def __init__(self):
+        self.message = "own"
+found = []
+for error in (Own(), ValueError("one"), ValueError(), IOError(2, "two")):
+    try:
+        raise error
+    except Exception, e:
+        found.append(e.message)
+class Message:
+    message = "else"
+found.append(Message.message)
+"""
+    made = {}
+    exec(to_code(source, "old.py"), made)
+    assert made["found"] == ["own", "one", "", "", "else"]
 
 
 def test_a_script_that_still_uses_rospy_keeps_its_node():
