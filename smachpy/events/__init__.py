@@ -515,6 +515,10 @@ def _listed(value: Any) -> Any:
     return [_listed(item) for item in value] if isinstance(value, tuple) else value
 
 
+def _tupled(value: Any) -> Any:
+    return tuple(map(_tupled, value)) if isinstance(value, list) else value
+
+
 def _fact(value: Any, room: Room) -> Any:
     """Return another field: a text or texts, a number, ..."""
     if isinstance(value, tuple | list):
@@ -548,8 +552,8 @@ def from_record(record: dict[str, Any]) -> Event:
         raise ValueError(
             f"event record: kind: got {name!r}; expected one of {sorted(EVENT_KINDS)}."
         )
-    # JSON has lists where events have tuples.
-    fields = {key: tuple(v) if isinstance(v, list) else v for key, v in fields.items()}
+    # JSON has lists where events have tuples; those in values are of users.
+    fields = {key: v if key in _VALUES else _tupled(v) for key, v in fields.items()}
     try:
         return kind(**fields)
     except TypeError as error:

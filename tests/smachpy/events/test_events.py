@@ -201,6 +201,19 @@ def test_events_survive_a_record(kind, data):
     assert type(from_record(record)) is kind
 
 
+@pytest.mark.parametrize(
+    "event",
+    [
+        events.UserdataWritten("/P/A", 0.0, 0, "k", [1, [2]]),
+        events.GoalDone("/P/A", 0.0, 0, "dock", "1", "SUCCEEDED", "", [1]),
+        events.Recovered("/P", 0.0, 0, "m", 1, ((1, 2), (3, 4)), (("/P", 1), ("/P/A", 2))),
+    ],
+)
+def test_lists_and_pairs_survive_a_record(event):
+    """Lists of users became tuples, and pairs became lists."""
+    assert from_record(json.loads(json.dumps(to_record(event)))) == event
+
+
 @given(anything)
 def test_records_are_plain_whatever_the_value(value):
     import json
