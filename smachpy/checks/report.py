@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from smachpy.checks.model import RULES
 from smachpy.events.pictures import draw_moments
@@ -124,12 +125,17 @@ def as_github(reports: Iterable[Report]) -> str:
     """Return reports as GitHub workflow commands."""
     lines = []
     for problem in (problem for report in reports for problem in report.problems):
-        names = ("file", "line")[: len(_where(problem))]
-        fields = [f"{name}={value}," for name, value in zip(names, _where(problem), strict=True)]
-        text = " ".join([problem.message, problem.hint, *problem.steps]).strip()
-        text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+        where = _where(problem)
+        names = ("file", "line")[: len(where)]
+        values = [_escaped(str(one)).replace(":", "%3A").replace(",", "%2C") for one in where]
+        fields = [f"{name}={value}," for name, value in zip(names, values, strict=True)]
+        text = _escaped(" ".join([problem.message, problem.hint, *problem.steps]).strip())
         lines.append(f"::{_LEVELS[problem.severity]} {''.join(fields)}title={problem.rule}::{text}")
     return "\n".join(lines)
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def as_sarif(reports: Iterable[Report]) -> str:
@@ -158,7 +164,7 @@ def _result(problem: Problem) -> dict[str, Any]:
     where = _where(problem)
     if where:
         location["physicalLocation"] = {
-            "artifactLocation": {"uri": where[0]},
+            "artifactLocation": {"uri": quote(where[0])},
             "region": {"startLine": max(1, where[1])},
         }
     result: dict[str, Any] = {

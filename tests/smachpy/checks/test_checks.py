@@ -22,13 +22,17 @@ from smachpy import (
     StateMachine,
     any_of,
     cb_interface,
+    describe,
     when,
 )
 from smachpy.checks import (
     RULES,
     Ignore,
     IgnoreError,
+    Place,
+    Problem,
     PropertyError,
+    Report,
     after_preempt,
     always_reaches,
     before,
@@ -1012,3 +1016,15 @@ def test_resources_in_different_orders(orders, found):
         both.add(f"N{number}", nested(*names))
     problems = [p for p in smachpy.check(both) if p.rule == "resource-order"]
     assert [problem.path for problem in problems] == found
+
+
+def test_files_are_named_as_the_formats_of_ci_want_them():
+    """A space made the SARIF invalid; GitHub took what follows a comma for another field."""
+    place = Place("/robot/my missions/50 %, a:b.py", 3)
+    problem = Problem("unset-key", "error", "/M/A", "A reads x.", place=place)
+    report = Report(describe(StateMachine(["done"], name="M")), (problem,))
+    (result,) = json.loads(FORMATS["sarif"]([report]))["runs"][0]["results"]
+    where = result["locations"][0]["physicalLocation"]["artifactLocation"]
+    assert where["uri"] == "/robot/my%20missions/50%20%25%2C%20a%3Ab.py"
+    line = FORMATS["github"]([report])
+    assert line.startswith("::error file=/robot/my missions/50 %25%2C a%3Ab.py,line=3,title=unset")
