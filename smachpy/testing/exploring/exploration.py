@@ -199,8 +199,8 @@ def explore(
 
     Raises:
         TypeError: `machine` is neither a container nor a function, or there is no such option.
-        InvalidStateError: an invariant is no plain function of the run, or `limit` or `steps` is
-            none.
+        InvalidStateError: an invariant is no plain function of the run, `limit` or `steps` is none,
+            or `faults` or `keep` is no list.
         ValueError: there is no such fault, or `jobs` is less than 1.
         UnknownStateError: `keep` or `writes` names a state that does not exist; or a name in
             `writes` is ambiguous.
@@ -383,7 +383,7 @@ class RepeatedRun:
     Raises:
         TypeError: there is no such option.
         ValueError: there is no such fault.
-        InvalidStateError: `limit` or `steps` is none.
+        InvalidStateError: `limit` or `steps` is none, or `faults` or `keep` is no list.
     """
 
     def __init__(
@@ -395,7 +395,10 @@ class RepeatedRun:
             raise TypeError(f"{call}: {unknown}")
         options: RunOptions = {**DEFAULTS, **given}
         # These may be iterators, which can be read only once.
-        options["faults"], options["keep"] = tuple(options["faults"]), tuple(options["keep"])
+        problems = Problems(call)
+        options["faults"] = problems.values("faults", options["faults"])
+        options["keep"] = problems.values("keep", options["keep"])
+        problems.raise_all()
         faults = sorted(set(options["faults"]) - FAULTS)
         if faults:
             raise ValueError(f"{call}: faults: got {faults}; expected some of {sorted(FAULTS)}.")

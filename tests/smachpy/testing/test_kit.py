@@ -245,12 +245,14 @@ NAN = float("nan")
         (lambda m: m(two_waits(), limit=NAN), "mission: limit: got nan"),
         (lambda m: m(two_waits(), steps=0), "mission: steps: got 0"),
         (lambda m: m.explore(two_waits(), limit=NAN), "explore: limit: got nan"),
+        (lambda m: m.explore(two_waits(), keep="A"), r"explore: keep: got 'A'; .* Try \['A'\]."),
+        (lambda m: m.explore(two_waits(), faults="hang"), "explore: faults: got 'hang'"),
         (lambda m: m.replay(two_waits(), [], steps="x"), "replay: steps: got 'x'"),
         (lambda m: m.topic("a", Bool).publish_at(-1, data=True), "a: publish_at: at: got -1"),
         (lambda m: m.topic("a", Bool).delay("x"), "a: delay: seconds: got 'x'"),
     ],
 )
-def test_times_and_counts_that_are_none_are_refused(mission, call, said):
+def test_times_counts_and_lists_that_are_none_are_refused(mission, call, said):
     """NaN was no limit, no time, or a preempt that never came; the run itself refused a text."""
     with pytest.raises(InvalidStateError, match=said):
         call(mission)
