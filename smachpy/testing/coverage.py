@@ -12,8 +12,9 @@ from smachpy.events.introspection import StateRecord
 from smachpy.testing.runs import own_timeouts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
+    from smachpy.events import Event
     from smachpy.testing.runs import Run
 
 KINDS = ("states", "outcomes", "edges", "preempts", "timeouts")
@@ -86,6 +87,8 @@ class Coverage:
         leaves = {state.path for state in record.walk() if not state.is_container}
         for path in run.timeouts():
             measured.count("timeouts", path)
+        for item in _followed(record, run.events):
+            measured.count("edges", item)
         for event in run.events:
             if isinstance(event, Entered):
                 active[event.path] = None
@@ -188,6 +191,42 @@ def _bare(record: StateRecord) -> StateRecord:
     return replace(record, type_name="", doc="", details=(), children=children)
 
 
+def _ends(record: StateRecord) -> dict[str, list[str]]:
+    """Return the ends of children from which transitions lead on, and where to, each once."""
+    found: dict[str, list[str]] = {}
+    for state in record.walk():
+        for edge in state.transitions:
+            targets = found.setdefault(f"{state.path}/{edge.source} -{edge.outcome}->", [])
+            if edge.target not in targets:
+                targets.append(edge.target)
+    return found
+
+
+def _forks(record: StateRecord) -> dict[str, list[str]]:
+    """Return the ends after which conditions decide where to go on."""
+    return {end: targets for end, targets in _ends(record).items() if len(targets) > 1}
+
+
+def _followed(record: StateRecord, events: Iterable[Event]) -> Iterator[str]:
+    """Yield the edges that a run takes where conditions decide."""
+    forks = _forks(record)
+    cleanups = {f"{state.path}/{state.cleanup}" for state in record.walk() if state.cleanup}
+    at: dict[str, str] = {}  # path of a container -> the end of a child, until it is followed
+    for event in events if forks else ():
+        above, _, label = event.path.rpartition("/")
+        if isinstance(event, Entered) and event.path not in cleanups:
+            container, target = above, label
+        elif isinstance(event, Left | Finished):
+            container, target = event.path, str(event.outcome)
+        else:
+            continue
+        end = at.pop(container, "")
+        if target in forks.get(end, ()):
+            yield f"{end} {target}"
+        if isinstance(event, Left) and (end := f"{event.path} -{event.outcome}->") in forks:
+            at[above] = end
+
+
 def _list(items: Iterable[str]) -> str:
     shown = list(items)
     most = 8
@@ -204,10 +243,11 @@ def _items(record: StateRecord, kind: str) -> list[str]:
     if kind == "outcomes":
         return [f"{state.path} -{outcome}->" for state in states for outcome in state.outcomes]
     if kind == "edges":
+        forks = _forks(record)
         return [
-            f"{state.path}/{edge.source} -{edge.outcome}->"
-            for state in states
-            for edge in state.transitions
+            item
+            for end in _ends(record)
+            for item in ([f"{end} {target}" for target in forks[end]] if end in forks else [end])
         ]
     if kind == "preempts":  # a leaf without the outcome 'preempted' takes no time
         return [s.path for s in states if not s.is_container and "preempted" in s.outcomes]

@@ -26,6 +26,7 @@ from smachpy import (
     State,
     StateMachine,
     set_options,
+    when,
 )
 from smachpy.testing import (
     DoubleError,
@@ -597,6 +598,34 @@ def test_a_double_of_a_sub_machine_is_no_machine_of_its_own_in_the_coverage():
     assert machine.taken["states"] == {"/TWO": 3, "/TWO/IN": 3, "/TWO/IN/A": 1, "/TWO/IN/B": 1}
     assert machine.missed("states") == []
     assert "/TWO/IN -failed->" in machine.taken["outcomes"]
+
+
+def test_each_case_of_a_transition_is_covered_by_itself():
+    """All of them counted as taken with the first."""
+
+    def quick():
+        return CBState(lambda _: "done", outcomes=["done"])
+
+    inner = StateMachine(["done", "low"], name="IN", input_keys=["x"])
+    inner.add("A", quick(), {"done": [when("x > 1", "B"), when("x < 0", "low"), "done"]})
+    inner.add("B", quick())
+    inner.add_cleanup("TIDY", quick())
+    sm = StateMachine(["done", "low"], name="M")
+    sm.add("IN", inner)
+    coverage = Coverage()
+    with mission_kit() as mission:
+        mission.on_run = coverage.add
+        for x, left in (
+            (0, ["/M/IN/A -done-> B", "/M/IN/A -done-> low"]),
+            (2, ["/M/IN/A -done-> low"]),
+            (-1, []),
+        ):
+            mission(sm, {"x": x})
+            (machine,) = coverage.machines
+            assert [item for item in machine.missed("edges") if "/A " in item] == left
+    assert machine.counts("edges") == (6, 6)
+    other = Coverage.from_json(coverage.to_json())
+    assert other.machines[0].missed("edges") == []
 
 
 def test_the_same_seed_gives_the_same_run_to_the_last_event():
