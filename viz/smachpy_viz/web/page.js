@@ -7329,6 +7329,7 @@ var THINNEST = 0.5;
 var FAILED = 3;
 var LATER = 0.35;
 var NAME = 11;
+var TRACK = 2;
 var LEAST_LETTERS = 2;
 var MOST_WIDTHS = 4e3;
 var Bars = class {
@@ -7417,7 +7418,8 @@ var Bars = class {
     if (span.abandoned !== null && span.abandoned <= now)
       this.#mark(Math.min(x3(span.abandoned), right), bar, "failure");
     const words2 = wordsOf(node.name, span, now === Infinity ? span.to ?? store.playback.nowMs() : now);
-    this.#text(words2, `${kind}-text`, bar);
+    const above = store.data.scene.colourOf(span.path) < 0 ? bottom : bottom - TRACK;
+    this.#text(words2, `${kind}-text`, { ...bar, bottom: above });
   }
   /** @param asked where the hatch of a request to stop begins [px] */
   #body({ span, ...bar }, kind, asked2) {
@@ -7440,7 +7442,7 @@ var Bars = class {
     const driver = store.data.scene.colourOf(span.path);
     if (driver < 0) return;
     g5.fillStyle = this.colours.of(`s${1 + driver % COLOURS}`);
-    g5.fillRect(left + 2, bottom - 4, Math.max(0, right - left - 4), 2.5);
+    g5.fillRect(left + 2, bottom - TRACK - 0.5, Math.max(0, right - left - 4), TRACK);
   }
   /** Draw the times in which the lane's states were paused before they began, or asked. */
   #waits(lane, y5, lanes, model, axis) {
@@ -11624,7 +11626,7 @@ function Problems({ page: page2 }) {
 
 // src/panels/map.tsx
 var NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the topic map.";
-var MOST_ROBOTS = 5;
+var MOST_ROBOTS = 2;
 function MapPanel({ page: page2, children }) {
   store.playback.watch();
   const { map } = page2;
@@ -11635,31 +11637,48 @@ function MapPanel({ page: page2, children }) {
       /* @__PURE__ */ a4("h2", { children: "Map" }),
       noMap && /* @__PURE__ */ a4("span", { class: "hint", title: NO_MAP, children: "No map: try --map FILE" }),
       /* @__PURE__ */ a4("span", { class: "spread" }),
-      /* @__PURE__ */ a4("span", { class: "group", children: [
-        /* @__PURE__ */ a4(
-          "button",
-          {
-            class: map.followed === null ? "on small" : "small",
-            title: "the whole map (double-click)",
-            onClick: () => map.show(null),
-            children: "Whole"
-          }
-        ),
-        names.slice(0, MOST_ROBOTS).map((name) => /* @__PURE__ */ a4(
-          "button",
-          {
-            class: map.followed === name ? "on small" : "small",
-            title: "keep it in the middle",
-            onClick: () => map.show(name),
-            children: shorten(name || "Robot", 16)
-          }
-        ))
-      ] })
+      /* @__PURE__ */ a4(Choice2, { map, names })
     ] }),
     /* @__PURE__ */ a4("div", { class: "map-view", children: [
       children,
       /* @__PURE__ */ a4(Tip, {})
     ] })
+  ] });
+}
+function Choice2({ map, names }) {
+  if (names.length > MOST_ROBOTS)
+    return /* @__PURE__ */ a4(
+      "select",
+      {
+        class: "small",
+        "aria-label": "robot in the middle",
+        value: map.followed === null ? -1 : names.indexOf(map.followed),
+        onChange: (e4) => map.show(names[Number(e4.currentTarget.value)] ?? null),
+        children: [
+          /* @__PURE__ */ a4("option", { value: -1, children: "Whole" }),
+          names.map((name, i4) => /* @__PURE__ */ a4("option", { value: i4, children: shorten(name || "Robot", 40) }))
+        ]
+      }
+    );
+  return /* @__PURE__ */ a4("span", { class: "group", children: [
+    /* @__PURE__ */ a4(
+      "button",
+      {
+        class: map.followed === null ? "on small" : "small",
+        title: "the whole map (double-click)",
+        onClick: () => map.show(null),
+        children: "Whole"
+      }
+    ),
+    names.map((name) => /* @__PURE__ */ a4(
+      "button",
+      {
+        class: map.followed === name ? "on small" : "small",
+        title: "keep it in the middle",
+        onClick: () => map.show(name),
+        children: shorten(name || "Robot", 16)
+      }
+    ))
   ] });
 }
 function Tip() {

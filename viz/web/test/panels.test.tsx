@@ -5,12 +5,13 @@ import type { VNode } from "preact";
 import { renderToString } from "preact-render-to-string";
 import { setToken } from "#core/requests.ts";
 import { store } from "#core/store.ts";
-import type { Cause } from "#core/types.ts";
+import type { Cause, Observed } from "#core/types.ts";
 import type { Page } from "#drawing/page.ts";
 import { Goals } from "#panels/goals.tsx";
 import { HomePage } from "#panels/home.tsx";
 import { Inspector } from "#panels/inspector.tsx";
 import { Log } from "#panels/log.tsx";
+import { MapPanel } from "#panels/map.tsx";
 import { PlayBar } from "#panels/play.tsx";
 import { Preempts } from "#panels/preempts.tsx";
 import { SimulatePage } from "#panels/simulate.tsx";
@@ -187,4 +188,21 @@ test("the bar says what evidence the run has, and whether it did what nobody has
     store.addEvents([event("Noted", "/PATROL", { text })]);
     assert.equal(chip(), word);
   }
+});
+
+test("each robot can be kept in the middle of the map, however many they are", () => {
+  const shown = (count: number) => {
+    const at = [0, 0, 0];
+    const names = Array.from({ length: count }, (_, i) => `robot_${i}`);
+    const poses = names.map((robot, i) => ({
+      ...{ kind: "Observed", path: "", n: i + 1, stamp_ns: 1e18, what: "pose", robot, at },
+    }));
+    store.startRun(null, []);
+    store.data.addObserved(poses as Observed[]);
+    return lines(<MapPanel page={{ map: { followed: null } } as Page} />);
+  };
+  assert.deepEqual(shown(2).slice(-3), ["Whole", "robot_0", "robot_1"]);
+  assert.ok(!renderToString(<MapPanel page={{ map: { followed: null } } as Page} />).includes("<select"));
+  assert.deepEqual(shown(3).slice(-4), ["Whole", "robot_0", "robot_1", "robot_2"]);
+  assert.match(renderToString(<MapPanel page={{ map: { followed: "robot_1" } } as Page} />), /selected[^>]*>robot_1/);
 });

@@ -16,6 +16,7 @@ const THINNEST = 0.5;
 const FAILED = 3; // narrowest bar of a failure
 const LATER = 0.35; // opacity of what is after the instant shown
 const NAME = 11; // of a lane
+const TRACK = 2; // height of the line in the colour of a track
 const LEAST_LETTERS = 2; // of a name that is cut
 const MOST_WIDTHS = 4000; // texts whose widths are kept
 
@@ -112,7 +113,8 @@ export class Bars {
     if (span.abandoned !== null && span.abandoned <= now)
       this.#mark(Math.min(x(span.abandoned), right), bar, "failure");
     const words = wordsOf(node.name, span, now === Infinity ? (span.to ?? store.playback.nowMs()) : now);
-    this.#text(words, `${kind}-text`, bar);
+    const above = store.data.scene.colourOf(span.path) < 0 ? bottom : bottom - TRACK;
+    this.#text(words, `${kind}-text`, { ...bar, bottom: above });
   }
 
   /** @param asked where the hatch of a request to stop begins [px] */
@@ -137,7 +139,7 @@ export class Bars {
     const driver = store.data.scene.colourOf(span.path);
     if (driver < 0) return;
     g.fillStyle = this.colours.of(`s${1 + (driver % COLOURS)}`); // of its track on the map
-    g.fillRect(left + 2, bottom - 4, Math.max(0, right - left - 4), 2.5);
+    g.fillRect(left + 2, bottom - TRACK - 0.5, Math.max(0, right - left - 4), TRACK);
   }
 
   /** Draw the times in which the lane's states were paused before they began, or asked. */

@@ -3,10 +3,11 @@
 import type { ComponentChildren } from "preact";
 import { store } from "#core/store.ts";
 import { shorten } from "#core/text.ts";
+import type { MapView } from "#drawing/map.ts";
 import type { Page } from "#drawing/page.ts";
 
 const NO_MAP = "No map: a grid of 1 m. Name a file with --map, or publish the topic map.";
-const MOST_ROBOTS = 5; // robots with a button of their own
+const MOST_ROBOTS = 2; // with a button each; more do not fit into a line
 
 export function MapPanel({ page, children }: { page: Page; children?: ComponentChildren }) {
   store.playback.watch();
@@ -26,30 +27,51 @@ export function MapPanel({ page, children }: { page: Page; children?: ComponentC
           </span>
         )}
         <span class="spread" />
-        <span class="group">
-          <button
-            class={map.followed === null ? "on small" : "small"}
-            title="the whole map (double-click)"
-            onClick={() => map.show(null)}
-          >
-            Whole
-          </button>
-          {names.slice(0, MOST_ROBOTS).map((name) => (
-            <button
-              class={map.followed === name ? "on small" : "small"}
-              title="keep it in the middle"
-              onClick={() => map.show(name)}
-            >
-              {shorten(name || "Robot", 16)}
-            </button>
-          ))}
-        </span>
+        <Choice map={map} names={names} />
       </header>
       <div class="map-view">
         {children}
         <Tip />
       </div>
     </section>
+  );
+}
+
+/** Chooses between the whole map and one robot. */
+function Choice({ map, names }: { map: MapView; names: string[] }) {
+  if (names.length > MOST_ROBOTS)
+    return (
+      <select
+        class="small"
+        aria-label="robot in the middle"
+        value={map.followed === null ? -1 : names.indexOf(map.followed)}
+        onChange={(e) => map.show(names[Number(e.currentTarget.value)] ?? null)}
+      >
+        <option value={-1}>Whole</option>
+        {names.map((name, i) => (
+          <option value={i}>{shorten(name || "Robot", 40)}</option>
+        ))}
+      </select>
+    );
+  return (
+    <span class="group">
+      <button
+        class={map.followed === null ? "on small" : "small"}
+        title="the whole map (double-click)"
+        onClick={() => map.show(null)}
+      >
+        Whole
+      </button>
+      {names.map((name) => (
+        <button
+          class={map.followed === name ? "on small" : "small"}
+          title="keep it in the middle"
+          onClick={() => map.show(name)}
+        >
+          {shorten(name || "Robot", 16)}
+        </button>
+      ))}
+    </span>
   );
 }
 
