@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
+from smachpy.machines.state import CommonOptions
 from smachpy.machines.util import has_smach_interface
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from smachpy.machines.state import Grace, RetrySpec, State
+    from smachpy.machines.state import Grace, State
 
 
-class UntimedOptions(TypedDict, total=False):
+class UntimedOptions(CommonOptions, total=False):
     """`smachpy.machines.state.StateOptions` for states with their own argument `timeout`."""
 
     preempt_timeout: Grace
-    retry: RetrySpec
-    on_exception: Mapping[type[BaseException], str] | None
-    on_enter: Callable[[Any], object] | None
-    on_exit: Callable[[Any, Any], object] | None
 
 
 def adopt_interface(state: State, callback: object, *, outcomes: bool = True) -> None:

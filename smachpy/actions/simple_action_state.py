@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 from actionlib_core.action.client import ActionClient
 from actionlib_core.interfaces.actionlib_msgs.msg import GoalStatus
@@ -20,7 +20,7 @@ from smachpy.engine.frame import current_scope
 from smachpy.engine.interrupt import Interruption
 from smachpy.engine.preempt import inherited_grace, on_preempt
 from smachpy.engine.step import Timeout
-from smachpy.machines.state import Shown, State, get_options
+from smachpy.machines.state import CommonOptions, Shown, State, get_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from smachpy.base.names import Names
     from smachpy.engine.frame import Frame
     from smachpy.events.introspection import Kind
-    from smachpy.machines.state import Grace, RetrySpec
+    from smachpy.machines.state import Grace
 
 __all__ = ["ActionStateOptions", "SimpleActionState"]
 
@@ -58,19 +58,11 @@ DEFAULT_PREEMPT_S = 60.0
 """The longest time that a cancelled goal has to end if nobody has said more [s], as in SMACH."""
 
 
-class ActionStateOptions(TypedDict, total=False):
+class ActionStateOptions(CommonOptions, total=False):
     """`StateOptions` without `preempt_timeout`, which is an argument of its own here."""
 
     timeout: float | None
     timeout_outcome: str
-    retry: RetrySpec
-    on_exception: Mapping[type[BaseException], str] | None
-    on_enter: Callable[[Any], object] | None
-    on_exit: Callable[[Any, Any], object] | None
-    resume: str | Callable[[Any], str | None] | None
-    on_resume: Callable[[Any], object] | None
-    idempotent: bool
-    success: Iterable[str] | None
 
 
 class SimpleActionState(State):

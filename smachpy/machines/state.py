@@ -77,7 +77,22 @@ LONGEST_NOTE = 200
 """Characters of a note that are kept."""
 
 
-class StateOptions(TypedDict, total=False):
+class CommonOptions(TypedDict, total=False):
+    """The options that no state has as an argument of its own; see `StateOptions`."""
+
+    retry: RetrySpec
+    on_exception: Mapping[type[BaseException], str] | None
+    on_enter: Callable[[Any], object] | None
+    on_exit: Callable[[Any, Any], object] | None
+    resume: str | Callable[[Any], str | None] | None
+    on_resume: Callable[[Any], object] | None
+    idempotent: bool
+    transient: Iterable[str]
+    success: Iterable[str] | None
+    resource: ResourceSpec
+
+
+class StateOptions(CommonOptions, total=False):
     """The options of any state that SMACH does not have; all are off by default.
 
     Keys:
@@ -108,16 +123,6 @@ class StateOptions(TypedDict, total=False):
     timeout: float | None
     timeout_outcome: str
     preempt_timeout: Grace
-    retry: RetrySpec
-    on_exception: Mapping[type[BaseException], str] | None
-    on_enter: Callable[[Any], object] | None
-    on_exit: Callable[[Any, Any], object] | None
-    resume: str | Callable[[Any], str | None] | None
-    on_resume: Callable[[Any], object] | None
-    idempotent: bool
-    transient: Iterable[str]
-    success: Iterable[str] | None
-    resource: ResourceSpec
 
 
 class DataOf(Generic[Data_co]):

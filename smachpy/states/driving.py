@@ -21,7 +21,10 @@ from smachpy.places.pose import Pose2D, quaternion_of
 from smachpy.states.localising import MAP_FRAME, Localiser, pose_of, pose_problem
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     from smachpy.events.introspection import Kind
+    from smachpy.machines.state import StateOptions
     from smachpy.userdata.user_data import UserData
 
 SIGNAL_TIMEOUT: Final = 5.0  # [s] a robot's own topic that is silent for this long is not there
@@ -134,7 +137,7 @@ def turn(degrees: float, **options: Any) -> SimpleActionState:
     return SimpleActionState("move_base", MoveBaseAction, goal=goal, **options)
 
 
-def locate(key: str = "here", topic: str = "odom") -> Locate:
+def locate(key: str = "here", topic: str = "odom", **options: Unpack[StateOptions]) -> Locate:
     """Return a state that writes the robot's pose in the map frame to a userdata key.
 
     Outcomes: 'valid', 'invalid', 'preempted', 'aborted'; see `Locate`.
@@ -143,8 +146,9 @@ def locate(key: str = "here", topic: str = "odom") -> Locate:
         key: The userdata key that gets the pose, a `Pose2D` [m, m, rad].
         topic: A topic of `nav_msgs/Odometry`. Its frame need not be the map: the transforms on
             `/tf` and `/tf_static`, which a localisation sends, are applied.
+        **options: See `smachpy.machines.state.StateOptions`.
     """
-    return Locate(key, topic)
+    return Locate(key, topic, **options)
 
 
 class Locate(State):
@@ -156,6 +160,7 @@ class Locate(State):
     Args:
         key: The userdata key that gets the pose, a `Pose2D` [m, m, rad].
         topic: A topic of `nav_msgs/Odometry`.
+        **options: See `smachpy.machines.state.StateOptions`.
 
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
@@ -163,12 +168,15 @@ class Locate(State):
 
     _smachpy_kind: ClassVar[Kind] = "monitor"
 
-    def __init__(self, key: str = "here", topic: str = "odom") -> None:
+    def __init__(
+        self, key: str = "here", topic: str = "odom", **options: Unpack[StateOptions]
+    ) -> None:
         problems = Problems("Locate")
         self.__key = problems.word("key", key)
         self.__topic = problems.network_name("topic", topic)
+        with problems:
+            super().__init__(("valid", "invalid", "preempted", "aborted"), (), [key], **options)
         problems.raise_all()
-        super().__init__(["valid", "invalid", "preempted", "aborted"], output_keys=[key])
 
     def execute(self, userdata: UserData) -> str:
         """Wait for the pose.

@@ -11,8 +11,10 @@ from smachpy.machines.state_machine import StateMachine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from typing import Unpack
 
     from smachpy.machines.container import Container
+    from smachpy.machines.state import StateOptions
     from smachpy.userdata.user_data import UserData
 
 
@@ -85,11 +87,19 @@ def _open(stack: ExitStack, makers: Iterable[Callable[[], Server]]) -> None:
 
 
 class Serve(State):
-    """Keeps servers on the network until the state is preempted, by Ctrl-C for example."""
+    """Keeps servers on the network until the state is preempted, by Ctrl-C for example.
 
-    def __init__(self, *makers: Callable[[], Server]) -> None:
+    Args:
+        *makers: Functions that make one server each.
+        **options: See `smachpy.machines.state.StateOptions`.
+
+    Raises:
+        InvalidStateError: one of them cannot be called without arguments, or an option is wrong.
+    """
+
+    def __init__(self, *makers: Callable[[], Server], **options: Unpack[StateOptions]) -> None:
         _check("Serve", makers)
-        super().__init__(outcomes=["preempted"])
+        super().__init__(outcomes=["preempted"], **options)
         self.__makers = makers
 
     def execute(self, userdata: UserData) -> str:

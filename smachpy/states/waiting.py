@@ -15,10 +15,13 @@ from smachpy.machines.state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Unpack
 
     from actionlib_core.clock import Clock, Event
     from actionlib_core.time import Duration
+    from smachpy.actions.interface import UntimedOptions
     from smachpy.events.introspection import Kind
+    from smachpy.machines.state import StateOptions
     from smachpy.userdata.user_data import UserData
 
 
@@ -34,6 +37,7 @@ class AwaitMessage(State):
             What it raises, the state raises. None: any message is wanted.
         key: The userdata key that gets the message; None: none does.
         timeout: Longest wait [s]; None: no limit, 0: it looks once.
+        **options: See `smachpy.machines.state.StateOptions`.
 
     Raises:
         InvalidStateError: an argument is wrong; all problems at once.
@@ -47,6 +51,7 @@ class AwaitMessage(State):
         *,
         key: str | None = None,
         timeout: float | Duration | None,
+        **options: Unpack[UntimedOptions],
     ) -> None:
         problems = Problems(f"AwaitMessage {topic!r}")
         name = problems.network_name("topic", topic)
@@ -54,8 +59,9 @@ class AwaitMessage(State):
         problems.function("wanted", wanted, "wanted(message)", 1)
         longest = problems.seconds("timeout", timeout)
         keys = [] if key is None else [problems.word("key", key)]
+        with problems:
+            super().__init__(("came", "timeout", "preempted"), (), keys, **options)
         problems.raise_all()
-        super().__init__(outcomes=["came", "timeout", "preempted"], output_keys=keys)
         self.__topic = name
         self.__msg_type = msg_type
         self.__wanted = wanted
@@ -137,16 +143,21 @@ class Wait(State):
     Args:
         seconds: The time [s], a number or a `Duration`; None for the userdata key `seconds`.
 
+        **options: See `smachpy.machines.state.StateOptions`.
+
     Raises:
-        InvalidStateError: `seconds` is not a duration.
+        InvalidStateError: an argument is wrong; all problems at once.
     """
 
-    def __init__(self, seconds: float | Duration | None = None) -> None:
+    def __init__(
+        self, seconds: float | Duration | None = None, **options: Unpack[StateOptions]
+    ) -> None:
         problems = Problems("Wait")
         problems.seconds("seconds", seconds)
-        problems.raise_all()
         keys = ["seconds"] if seconds is None else []
-        super().__init__(outcomes=["done", "preempted"], input_keys=keys)
+        with problems:
+            super().__init__(("done", "preempted"), keys, **options)
+        problems.raise_all()
         self.__seconds = as_number(seconds)
 
     def execute(self, userdata: UserData) -> str:

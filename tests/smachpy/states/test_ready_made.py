@@ -19,7 +19,7 @@ from actionlib_core.interfaces.nav_msgs.msg import Odometry
 from actionlib_core.interfaces.std_msgs.msg import Bool, Header
 from actionlib_core.interfaces.tf2_msgs.msg import TFMessage
 from actionlib_core.time import Duration
-from smachpy import InvalidStateError, State, StateMachine
+from smachpy import InvalidStateError, State, StateMachine, get_options
 from smachpy.places.pose import quaternion_of
 from smachpy.states import (
     AwaitMessage,
@@ -281,6 +281,26 @@ def test_a_preempt_ends_waits_at_once(mission):
 def test_a_wait_takes_its_seconds_from_the_userdata(mission):
     assert mission(alone(Wait(), seconds=3.0)).duration == 3.0
     assert mission(alone(Wait(Duration(3.0)))).duration == 3.0
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda **options: Wait(100.0, **options),
+        lambda **options: AwaitMessage("button", Bool, timeout=100.0, **options),
+        lambda **options: locate(**options),
+        lambda **options: Serve(**options),
+    ],
+)
+def test_the_options_of_any_state_are_arguments_of_these_too(mission, make):
+    left = []
+    state = make(on_exit=lambda userdata, outcome: left.append(outcome), resource="base")
+    assert get_options(state).resource.name == "base"
+    mission.preempt(on="STATE")
+    mission(alone(state)).assert_outcome("preempted")
+    assert left == ["preempted"]
+    with pytest.raises(InvalidStateError, match="on_exit: got 3"):
+        make(on_exit=3)
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,19 @@ from dataclasses import dataclass, field
 from typing import TypedDict
 
 import smachpy
+from actionlib_core.interfaces.actionlib.msg import TestAction
+from actionlib_core.interfaces.std_msgs.msg import Bool
+from actionlib_core.interfaces.std_srvs.srv import SetBool
 from smachpy import (
     CBState,
     Concurrence,
+    ConditionState,
     Iterator,
+    MonitorState,
     Retry,
     Sequence,
+    ServiceState,
+    SimpleActionState,
     State,
     StateMachine,
     UserData,
@@ -20,6 +27,7 @@ from smachpy import (
 )
 from smachpy.events import Entered, Event, Left
 from smachpy.events.introspection import StateRecord, describe
+from smachpy.states import AwaitMessage, Publish, Wait
 
 
 @dataclass
@@ -108,6 +116,13 @@ def with_options() -> smachpy.Options:
     State(["ok"], retry=(3, 1.0, ("aborted", "failed")), preempt_timeout=None)
     State(["ok"], retry=(3, 1.0), on_exception={OSError: "failed"})
     State(["ok"], retry=3)
+    SimpleActionState("count", TestAction, resource="base", success=["succeeded"])
+    ServiceState("lamp", SetBool, resource="lamp", resume="skip:succeeded", success=["succeeded"])
+    MonitorState("battery", Bool, lambda userdata, message: True, resource="battery")
+    ConditionState(lambda userdata: True, success=["true"], on_resume=print)
+    AwaitMessage("start", Bool, timeout=None, resource="button", retry=2)
+    Publish("horn", Bool, resource="horn")
+    Wait(1.0, resource="lift", timeout=5.0)
     smachpy.set_options(state, retry=again)
     smachpy.set_options(Named(["ok"]), retry=None)
     return smachpy.get_options(state)
