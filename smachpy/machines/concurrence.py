@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from smachpy.base import log
@@ -28,7 +30,7 @@ from smachpy.machines.rules import Rule, all_of, any_of, as_rules, decide, n_of
 from smachpy.machines.state import DataOf, State
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
     from collections.abc import Sequence as SequenceOf
     from typing import Unpack
 
@@ -431,9 +433,10 @@ def _labels(path: str, answer: Any) -> list[Any] | bool:
     """
     if isinstance(answer, str):
         return [answer]
-    if isinstance(answer, (list, tuple, set, frozenset)):
-        return list(answer)
     try:
+        # A generator is always true, also one that yields no label.
+        if isinstance(answer, (list, tuple, AbstractSet, Iterator)):
+            return list(answer)
         return bool(answer)
     except Exception as error:
         raise InvalidUserCodeError(

@@ -325,7 +325,7 @@ class Iterator(Container):
         data, is_used_up = self._smachpy, False
         try:
             items = data.items
-            if callable(items):
+            if _is_function(items):
                 items = call(items)
             if type(items) in _PLAIN:
                 yield from items
@@ -352,8 +352,13 @@ class Iterator(Container):
                 raise InvalidUserCodeError(problem, path=frame.path)
 
 
+def _is_function(items: Any) -> bool:
+    """Return whether a call returns the items; an `Enum` can be called, too, but has items."""
+    return callable(items) and not (isinstance(items, type) and hasattr(type(items), "__iter__"))
+
+
 def _describe_items(items: Any) -> str:
-    if callable(items):
+    if _is_function(items):
         return f"{name_of(items)}()"
     if isinstance(items, range):
         return str(items)

@@ -484,3 +484,33 @@ def test_an_outcome_callback_may_return_a_member_of_an_enumeration(clock):
         both.add("A", smachpy.CBState(lambda _userdata: Ends.DONE, outcomes=[Ends.DONE]))
     assert machine.execute() == "end"
     assert clock.now() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("answer", "ran"),
+    [
+        (lambda outcomes: (label for label in outcomes if label == "S1"), 4.0),
+        (lambda outcomes: filter(None, []), 4.0),
+        (lambda outcomes: dict.fromkeys(["S1", "S2"]).keys(), 1.0),
+    ],
+)
+def test_labels_to_preempt_may_come_from_any_iterable(clock, answer, ran):
+    """A generator counted as true: it ended all branches, also if it yielded no label."""
+    both = both_of(Work(1.0), Work(2.0), Work(4.0), child_termination_cb=answer)
+    begun = clock.now()
+    with use_clock(clock):
+        assert both.execute() == "done"
+    assert clock.now() - begun == ran
+
+
+def test_the_items_of_an_iterator_may_be_an_enumeration(clock):
+    """The class of the enumeration was called, as it can be."""
+
+    class Room(enum.Enum):
+        KITCHEN = "kitchen"
+        LAB = "lab"
+
+    state = Work()
+    with use_clock(clock):
+        assert iterator_of(Room, state).execute() == "done"
+    assert state.ran == 2
