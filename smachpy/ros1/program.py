@@ -130,7 +130,8 @@ def load(
 
     It ends where it calls `execute`, `run_server` or `spin`. Until then it waits for nothing, sends
     nothing, writes nothing and starts no process: servers seem to be there, goals succeed at once,
-    messages, results and responses are empty. ROS 1's names stay installed, as the states of the
+    messages, results and responses are empty. What it does by sockets or devices of its own is
+    done. ROS 1's names stay installed, as the states of the
     machine may need them; `uninstall` removes them.
 
     Args:
