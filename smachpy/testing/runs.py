@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import EllipsisType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from smachpy.events import (
     Abandoned,
@@ -17,6 +18,7 @@ from smachpy.events import (
     GoalSent,
     Left,
     PreemptRequested,
+    Retried,
     Started,
     TimedOut,
 )
@@ -161,13 +163,16 @@ class Run:
         for event in self.events:
             if isinstance(event, TimedOut):
                 found.append(event.path)
-            elif isinstance(event, Entered):
+            elif isinstance(event, Entered | GoalSent):
                 begun[event.path] = event.t
-            elif isinstance(event, Left) and event.path in own:
-                seconds, outcome = own[event.path]
+            elif isinstance(event, Left | Retried) and event.path in own:
+                limit = own[event.path]
                 lasted = event.t - begun.get(event.path, event.t)
-                if lasted >= seconds * (1 - _ROUNDED) and outcome == event.outcome:
+                ended = event.outcome if isinstance(event, Left) else event.reason
+                if lasted >= limit.seconds * (1 - _ROUNDED) and limit.outcome == ended:
                     found.append(event.path)
+                if isinstance(event, Retried):
+                    begun[event.path] = event.t + limit.backoff * 2.0 ** min(event.attempt - 1, 60)
         return tuple(found)
 
     def abandoned(self) -> tuple[str, ...]:
@@ -311,17 +316,30 @@ _SHOWN = frozenset(
 )
 
 
-def own_timeouts(record: StateRecord) -> dict[str, tuple[float, str]]:
-    """Return, for leaves with their own timeout, its seconds and outcome."""
-    found: dict[str, tuple[float, str]] = {}
+class OwnTimeout(NamedTuple):
+    """The timeout of a goal, call or wait: its seconds and outcome, and the backoff of `retry`."""
+
+    seconds: float
+    outcome: str
+    backoff: float
+
+
+def own_timeouts(record: StateRecord) -> dict[str, OwnTimeout]:
+    """Return, for leaves with their own timeout, what is known of it."""
+    found: dict[str, OwnTimeout] = {}
     for state in record.walk():
-        text = dict(state.details).get(_OWN_TIMEOUTS.get(state.kind, ""), "")
-        seconds, _, outcome = text.partition(" s")
+        details = dict(state.details)
+        seconds, _, text = details.get(_OWN_TIMEOUTS.get(state.kind, ""), "").partition(" s")
         if seconds:
-            found[state.path] = (float(seconds), outcome.removeprefix(" -> ") or "aborted")
+            outcome = text.removeprefix(" -> ") or "aborted"
+            backoff = _BACKOFF.search(details.get("retry", ""))
+            found[state.path] = OwnTimeout(
+                float(seconds), outcome, float(backoff[1]) if backoff else 0.0
+            )
     return found
 
 
+_BACKOFF = re.compile(r"attempts, (\S+) s apart")
 _OWN_TIMEOUTS = {
     "service": "timeout",
     "monitor": "timeout",

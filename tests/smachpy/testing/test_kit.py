@@ -575,6 +575,36 @@ def test_the_timeouts_of_calls_waits_and_goals_are_told_and_covered(mission):
     assert coverage.machines[0].counts("timeouts") == (3, 3)
 
 
+def test_the_timeout_of_each_attempt_is_told_by_itself(mission):
+    """Some quick failures counted as one timeout, and that of an attempt before the last as none."""
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    sm.add("DRIVE", SimpleActionState("move_base", MoveBaseAction, exec_timeout=60.0))
+    set_options(sm["DRIVE"], retry=(3, 50.0))
+    robot = mission.action_server("move_base", MoveBaseAction)
+    for _ in range(3):
+        robot.reply(status="aborted", duration=25.0)
+    run = mission(sm)
+    assert run.duration == 25 + 50 + 25 + 100 + 25
+    assert run.timeouts() == ()
+    robot.never_finish()
+    robot.reply()
+    run = mission(sm)
+    assert (run.outcome, run.timeouts()) == ("succeeded", ("/M/DRIVE",))
+
+
+def test_a_backoff_is_no_part_of_an_attempt(mission):
+    sm = StateMachine(["succeeded", "aborted", "preempted"], name="M")
+    sm.add("ASK", ServiceState("ask", SetBool, timeout=5.0))
+    set_options(sm["ASK"], retry=(4, 3.0))
+    service = mission.service_server("ask", SetBool)
+    for _ in range(3):
+        service.fail(duration=1.0)
+    service.never_answer()
+    run = mission(sm)
+    assert run.duration == 1 + 3 + 1 + 6 + 1 + 12 + 5
+    assert run.timeouts() == ("/M/ASK",)
+
+
 def test_a_double_of_a_sub_machine_is_no_machine_of_its_own_in_the_coverage():
     sm = StateMachine(["done", "failed", "preempted"], name="TWO")
     with sm:
