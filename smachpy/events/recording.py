@@ -194,7 +194,8 @@ class Recorder:
         earlier: The records that were already in the file.
 
     Raises:
-        RecordingError: the file exists, cannot be made, or its content cannot be read.
+        RecordingError: the file exists, cannot be made, or its content cannot be read; or `origin`
+            is no `smachpy.events.inputs.MissionFacts`.
 
     Threads: another thread writes; the machine waits for it only if 100,000 events wait.
     """
@@ -227,10 +228,6 @@ class Recorder:
             if run and run_of(self.path) == run:
                 self._file = self._continued()
             else:
-                # "x": an existing file is never overwritten, even if two processes begin at once.
-                make_private_folder(self.path.parent)
-                self._file = open_private(self.path, "x")
-                notes_file(self.path).unlink(missing_ok=True)  # on an earlier file of that name
                 made_ns = RealClock().time_ns()
                 record = describe(machine)
                 facts = None
@@ -238,11 +235,12 @@ class Recorder:
                     userdata = {key: machine.userdata[key] for key in machine.userdata.keys()}  # noqa: SIM118
                     space = "" if node is None else node.namespace
                     facts = origin_facts(clock, space, origin or {}, userdata, inputs)
-                header = header_line(
-                    record, clock.time_ns(), made_ns=made_ns, run=run, origin=facts
+                    checked(OriginFacts, facts, known_only=True)  # else nobody could read the file
+                self._file = self._begun(
+                    header_line(record, clock.time_ns(), made_ns=made_ns, run=run, origin=facts)
                 )
-                self._file.write(header)
-                self._file.flush()  # readable from now on, also if the process is killed
+        except DataError as error:
+            raise RecordingError(path, f"origin: {error}.") from error
         except FileExistsError as error:
             raise RecordingError(
                 path, "the file exists; expected a new name, runs are never overwritten."
@@ -257,6 +255,22 @@ class Recorder:
             self._inputs = Inputs(inputs, clock, name, self._on_news)
         self._buffer = machine.event_buffer(self._on_news, limit=WAITING_EVENTS)
         self._buffer.on_full = self._make_room
+
+    def _begun(self, header: str) -> IO[str]:
+        """Open a new file with this header; none is left if that cannot be written."""
+        make_private_folder(self.path.parent)
+        # "x": an existing file is never overwritten, even if two processes begin at once.
+        file = open_private(self.path, "x")
+        try:
+            file.write(header)
+            file.flush()  # readable from now on, also if the process is killed
+        except BaseException:
+            self.path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                file.close()
+            raise
+        notes_file(self.path).unlink(missing_ok=True)  # on an earlier file of that name
+        return file
 
     def _continued(self) -> IO[str]:
         """Open the file to append after its last complete event; the rest is removed."""

@@ -764,6 +764,36 @@ def test_runs_are_found_in_folders(record, tmp_path):
         find_recordings([tmp_path / "none"])
 
 
+def test_a_recording_that_cannot_begin_leaves_no_file(tmp_path):
+    """It left an empty one, beside which the next run could not be recorded either."""
+
+    class Odd(State):
+        def __init__(self):
+            super().__init__(["done"])
+
+        def describe_details(self):
+            raise ZeroDivisionError
+
+    machine = StateMachine(["done"], name="M")
+    machine.add("ODD", Odd())
+    with pytest.raises(ZeroDivisionError):
+        Recorder(tmp_path / "run.jsonl", machine)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_wrong_origin_is_refused_before_the_run(tmp_path):
+    """The file was written, and nobody could read it."""
+    path = tmp_path / "run.jsonl"
+    with pytest.raises(
+        RecordingError, match=r"origin: .*inputs\['speed'\]: got 0.5; expected a text"
+    ):
+        Recorder(path, make_machine(), origin={"inputs": {"speed": 0.5}})
+    assert not path.exists()
+    with Recorder(path, make_machine(), origin={"inputs": {"speed": "0.5"}}):
+        pass
+    assert read_recording(path).origin["mission"] == {"inputs": {"speed": "0.5"}}
+
+
 def test_the_command_line(record, tmp_path, capsys):
     from smachpy.command import main
 
