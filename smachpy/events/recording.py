@@ -928,26 +928,33 @@ def _unreadable(path: Path, error: OSError) -> RecordingError:
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[Path]:
-    """Return the given files, and the recordings in the given folders, sorted.
+    """Return the given files, and the recordings in the given folders, sorted; each file once.
 
     Raises:
         RecordingError: there is no such file or folder.
     """
-    found: list[Path] = []
+    found: dict[Path, Path] = {}
     for place in map(Path, places):
         if place.is_dir():
-            found += sorted(place.glob("*.jsonl"))
+            some = sorted(place.glob("*.jsonl"))
         elif place.is_file():
-            found.append(place)
+            some = [place]
         else:
             got = "got a device or a pipe" if place.exists() else "no such file or folder"
             raise RecordingError(place, f"{got}; expected recorded runs.")
-    return found
+        for path in some:
+            found.setdefault(_whole_path(path), path)
+    return list(found.values())
+
+
+def _whole_path(path: Path) -> Path:
+    return path.parent.resolve() / path.name
 
 
 def notes_file(recording: Path) -> Path:
     """Return the file with people's notes on a recording, beside it; it need not exist."""
-    return recording.with_suffix(".notes.json")
+    # Another dot is a part of the name: "run.1" and "run.2" are two recordings.
+    return recording.with_name(f"{recording.name.removesuffix('.jsonl')}.notes.json")
 
 
 def delete_recording(recording: Path) -> None:
@@ -1008,9 +1015,11 @@ def each_recording(places: Iterable[str | Path], *, stream: bool = False) -> Ite
     Raises:
         RecordingError: there is no such file or folder, or a given file cannot be read.
     """
+    seen: set[Path] = set()
     for place in places:
         # Headers first: only files of the same durable run must be held in memory together.
-        paths = find_recordings([place])
+        paths = [path for path in find_recordings([place]) if _whole_path(path) not in seen]
+        seen.update(map(_whole_path, paths))
         runs = [run_of(path) for path in paths]
         parts: dict[str, list[Recording]] = {}
         for path, run in zip(paths, runs, strict=True):

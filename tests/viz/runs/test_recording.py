@@ -30,6 +30,7 @@ from smachpy.events.recording import (
     RecordingError,
     each_recording,
     find_recordings,
+    notes_file,
     read_recording,
     read_summary,
     recording_lines,
@@ -764,6 +765,15 @@ def test_runs_are_found_in_folders(record, tmp_path):
         find_recordings([tmp_path / "none"])
 
 
+def test_a_recording_that_is_named_twice_is_one(record, tmp_path, monkeypatch):
+    """Lists had it twice, and statistics counted its run twice."""
+    path = record("a.jsonl")
+    monkeypatch.chdir(tmp_path)
+    places = [tmp_path, path, "a.jsonl", ".", f"../{tmp_path.name}/a.jsonl"]
+    assert find_recordings(places) == [path]
+    assert [recording.path for recording in each_recording(places)] == [path]
+
+
 def test_a_recording_that_cannot_begin_leaves_no_file(tmp_path):
     """It left an empty one, beside which the next run could not be recorded either."""
 
@@ -792,6 +802,18 @@ def test_a_wrong_origin_is_refused_before_the_run(tmp_path):
     with Recorder(path, make_machine(), origin={"inputs": {"speed": "0.5"}}):
         pass
     assert read_recording(path).origin["mission"] == {"inputs": {"speed": "0.5"}}
+
+
+def test_notes_on_a_recording_outlive_one_of_a_name_like_it(tmp_path):
+    """The notes on "run.1" were deleted by the recording of "run.2"."""
+    for name in ("run.1", "run.2"):
+        with Recorder(tmp_path / name, make_machine()):
+            pass
+        notes_file(tmp_path / name).write_text("{}")
+    assert sorted(path.name for path in tmp_path.glob("*.json")) == [
+        "run.1.notes.json",
+        "run.2.notes.json",
+    ]
 
 
 def test_the_command_line(record, tmp_path, capsys):
