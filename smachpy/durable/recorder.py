@@ -298,7 +298,7 @@ class Recorder(RunJournal):
         self._noted = self._note(None, None, kind, path, facts) or self._noted
 
     def commit(self) -> None:
-        if self._noted and self.broken is None:
+        if self._noted and self.broken is None and not self._is_suspended:
             self._commit(self._noted)
 
     @property
@@ -991,6 +991,7 @@ class Recorder(RunJournal):
         """Let the process end without an end of the mission, because of the signal `by`."""
         if self._is_suspended:
             return
+        self.commit()  # a request that has been told just now
         self._is_suspended = True  # before the lease is released, so that its loss is no error
         self._journal.freeze()
         if self.on_suspend is not None:

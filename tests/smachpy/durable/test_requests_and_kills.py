@@ -11,6 +11,8 @@ import pytest
 import smachpy
 from actionlib_core.clock import VirtualClock, current_clock, use_clock
 from smachpy import Concurrence, Iterator, State, StateMachine
+from smachpy.engine.preempt import asking, request_soon
+from smachpy.engine.visit import Origin
 from tests.smachpy.durable.killing_store import Kill, KillingStore
 
 ENDS = ["done", "cleaned", "preempted"]
@@ -664,3 +666,27 @@ def test_a_stop_is_in_the_journal_when_its_request_returns():
         clock.call_later(REQUEST_S, ask)
         assert smachpy.run_durable(sm, store, mission="m") == "preempted"
     assert "PreemptRequested" in kinds
+
+
+def test_a_suspension_comes_after_the_stops_that_were_told_and_waits_for_no_journal(monkeypatch):
+    """The thread that suspended the mission waited for ever for the journal that it had closed."""
+    done = []
+
+    def suspend():
+        recorder = sm._smachpy.live.journal
+        journal, commit = recorder._journal, recorder._journal.commit
+        monkeypatch.setattr(journal, "commit", lambda n: (done.append("commit"), commit(n)))
+        monkeypatch.setattr(journal, "freeze", lambda: done.append("freeze"))
+        recorder.on_suspend = None  # it would end the process
+        with recorder._top.run.lock:
+            recorder.asked(recorder._top, Origin("operator", "ann"))  # not in the journal yet
+        with asking("signal", "SIGTERM"):
+            request_soon(sm)
+        done.append("returned")
+
+    sm = StateMachine(ENDS, name="M")
+    sm.add("DRIVE", Work([], "DRIVE"))
+    with VirtualClock() as clock, use_clock(clock):
+        clock.call_later(REQUEST_S, suspend)
+        smachpy.run_durable(sm, KillingStore(), mission="m")
+    assert done[:3] == ["commit", "freeze", "returned"]
