@@ -84,6 +84,10 @@ def _stubs(args: argparse.Namespace) -> int:
     from actionlib_core.interfaces import _cli
 
     load_packages()
-    written = [str(path) for path in _cli.write_stubs(args.folder, args.packages)]
+    try:
+        written = [str(path) for path in _cli.write_stubs(args.folder, args.packages)]
+    except OSError as error:
+        problem = f"interface stubs: {args.folder!r}: cannot be written: {error.strerror}"
+        raise UsageError(problem) from error
     print(json.dumps(written) if args.json else "\n".join(written))
     return 0

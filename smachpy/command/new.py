@@ -6,6 +6,8 @@ import inspect
 import keyword
 import re
 import shutil
+import sys
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,26 +179,46 @@ def _new(args: argparse.Namespace) -> int:
     if args.name and args.name.endswith((".yaml", ".yml")):
         return _new_file(Path(args.name))
     name = args.name or (args.source or "").replace(".", "_")
+    if args.source and not args.name and _is_taken(name):  # such as `inspect`
+        name = f"my_{name}"
     if not name:
         raise UsageError("new: got no name. Try: smachpy new my_mission")
     if not name.isidentifier() or keyword.iskeyword(name):
-        way_out = re.sub(r"\W", "_", name.lstrip("0123456789-")) or "my_mission"
+        way_out = re.sub(r"\W", "_", name.lstrip("0123456789-")) or "mission"
+        way_out = f"my_{way_out}" if keyword.iskeyword(way_out) else way_out
         raise UsageError(
             f"new: name: got {name!r}; expected a name of Python. Try: smachpy new {way_out}"
+        )
+    if _is_taken(name):
+        source = f" --from {args.source}" if args.source else ""
+        raise UsageError(
+            f"new: name: got {name!r}, a module that is installed; expected another name, as the "
+            f"mission would hide it. Try: smachpy new my_{name}{source}"
         )
     folder = Path(name)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"new: {name!r} is there already. Try another name.")
     files = _copied(args.source, name) if args.source else _begun(name, args.robot)
-    folder.mkdir(exist_ok=True)
-    for file, content in files.items():
-        if isinstance(content, Path):
-            shutil.copyfile(content, folder / file)
-        else:
-            (folder / file).write_text(content, encoding="utf-8")
+    try:
+        folder.mkdir(exist_ok=True)
+        for file, content in files.items():
+            if isinstance(content, Path):
+                shutil.copyfile(content, folder / file)
+            else:
+                (folder / file).write_text(content, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"new: {name!r} cannot be written: {error.strerror}") from error
     print(printable(f"{name}/: {', '.join(files)}"))
     print(printable(f"Try: cd {name} && smachpy test"))
     return 0
+
+
+def _is_taken(name: str) -> bool:
+    """Return whether Python has a module of that name, besides those of this folder."""
+    if name in sys.stdlib_module_names:
+        return True
+    spec = PathFinder.find_spec(name, [place for place in sys.path if place])
+    return spec is not None and spec.origin is not None  # else it is a folder without code
 
 
 def _new_file(path: Path) -> int:

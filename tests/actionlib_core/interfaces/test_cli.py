@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from actionlib_core import interfaces
-from actionlib_core.cli import interface
+from actionlib_core.cli import UsageError, interface
 from actionlib_core.exceptions import InterfaceError
 from actionlib_core.interfaces import _cli
 from actionlib_core.interfaces._registry import registry
@@ -89,6 +89,9 @@ def test_stubs(
     assert "class Note(_Message):" in (tmp_path / "test_cli_pkg/msg.pyi").read_text()
     with pytest.raises(InterfaceError, match="got package 'gone'"):
         run("stubs", str(tmp_path), "gone")
+    (tmp_path / "file").touch()
+    with pytest.raises(UsageError, match="/file': cannot be written: "):
+        run("stubs", str(tmp_path / "file"), "std_srvs")
 
 
 def test_show_what_only_ros2_has() -> None:

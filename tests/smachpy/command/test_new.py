@@ -7,6 +7,7 @@ import importlib.util
 import subprocess
 import sys
 from importlib.metadata import entry_points
+from pathlib import Path
 
 import pytest
 
@@ -75,6 +76,25 @@ def test_a_copy_of_a_mission_can_be_loaded(empty_folder, source):
 def test_a_name_that_python_cannot_import_is_refused(name, capsys):
     assert main(["new", name]) == 2
     assert "Try: smachpy new" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["random", "smachpy", "rich"])
+def test_a_name_that_would_hide_a_module_is_refused(name, empty_folder, capsys):
+    """Its own test could not run."""
+    assert main(["new", name]) == 2
+    assert f"Try: smachpy new my_{name}" in capsys.readouterr().err
+    assert not list(empty_folder.iterdir())
+    assert main(["new", "--from", "inspect"]) == 0
+    assert (empty_folder / "my_inspect" / "my_inspect.py").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_told(monkeypatch, capsys):
+    def refuse(_path, **_how):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert main(["new", "fetch"]) == 2
+    assert "new: 'fetch' cannot be written: Permission denied" in capsys.readouterr().err
 
 
 def test_a_folder_with_files_is_left_alone(empty_folder, capsys):
