@@ -11,6 +11,7 @@ The annotations give the types; the first line and the `Args:` of the docstring 
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 import enum
 import inspect
@@ -253,7 +254,8 @@ def _convert(value: object, kind: Any, text: Text | None = None) -> Any:
     if choices:
         return choices.get(str(value))
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
+        with contextlib.suppress(OverflowError):
+            return float(value)
     if kind is str and isinstance(value, int | float | PurePath):
         return str(value)
     if kind is Path and isinstance(value, str | PurePath):

@@ -205,6 +205,8 @@ def test_what_fits(value, hint, fitted):
         (Text("true"), float, "a number"),
         (True, int, "a whole number"),
         (Text(".inf"), float, "a number"),
+        (Text("1" * 400), float, "a number"),
+        (Text(f"[{'1' * 400}]"), list[float] | None, "a list, each a number or null"),
         (Text("yes"), bool, "true or false"),
         (Text("[a]"), list[int], "a list, each a whole number"),
         (Text("1"), Speed, "one of ['SLOW', 'FAST']"),
