@@ -93,7 +93,7 @@ def port(source: bytes, filename: str) -> Ported:
     """
     cst = import_extra("libcst", "port")
     metadata = import_extra("libcst.metadata", "port")
-    text = python2.read(source)
+    text = python2.in_utf8(python2.read(source))
     notes: list[tuple[int, str]] = []
     converted = python2.to_text(text, filename)
     if converted != text:

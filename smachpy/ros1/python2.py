@@ -53,6 +53,9 @@ _LOOKS_OLD: Final = re.compile(
     "|invalid decimal literal|inconsistent use of tabs"
 )
 _CODING: Final = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)")
+_CODING_OF_TEXT: Final = re.compile(  # in the first line or the second one
+    r"\A((?:[ \t\f]*(?:#[^\n]*)?\n)?[ \t\f]*#[^\n]*?coding[:=][ \t]*)(?!utf[-_]?8\b)[-\w.]+"
+)
 
 
 class Python2Error(ActionlibError, SyntaxError):
@@ -187,6 +190,11 @@ def read(source: bytes) -> str:
     except (UnicodeDecodeError, LookupError):
         text = source.decode("latin-1")  # this never fails
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def in_utf8(text: str) -> str:
+    """Return a source that declares the encoding in which it is written: UTF-8."""
+    return _CODING_OF_TEXT.sub(r"\1utf-8", text, count=1)
 
 
 def straight(text: str) -> str:

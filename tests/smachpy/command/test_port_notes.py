@@ -37,3 +37,14 @@ def test_a_change_of_an_input_is_listed_with_its_line(tmp_path, capsys):
         f"{tmp_path}/old.py:{line}: {key}: its value is changed, but {key.split('.')[1]!r} is an input key only: declare it as output, too"
         for line, key in [(5, "ud.nums"), (19, "userdata.seen")]
     ]
+
+
+def test_a_script_in_another_encoding_is_declared_as_what_is_written(tmp_path):
+    old, new = tmp_path / "old.py", tmp_path / "new.py"
+    for header in ("# -*- coding: latin-1 -*-", "#!/usr/bin/env python\n# vim: set coding=latin1:"):
+        old.write_text(f'{header}\nimport rospy\nWORD = "café"\n', encoding="latin-1")
+        assert main(["port", str(old), "-o", str(new)]) == 0
+        found: dict[str, str] = {}
+        exec(compile(new.read_bytes(), str(new), "exec"), found)
+        assert found["WORD"] == "café"
+        new.unlink()
