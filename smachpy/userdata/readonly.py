@@ -289,9 +289,17 @@ def _view_maker(kind: type, base: type | None) -> Callable[[Any, str], Any] | No
 def _view_class(kind: type, base: type | None) -> Any:
     """Return the class of the views of `kind`; None if it cannot be subclassed."""
     getter: Any = kind.__getattribute__
+    # What is computed once stays in the attributes, which the object and its views share: it is
+    # made of the object's own parts, not of views.
+    once = frozenset(
+        name
+        for cls in kind.__mro__
+        for name, what in vars(cls).items()
+        if isinstance(what, functools.cached_property)
+    )
 
     def __getattribute__(self: Any, name: str) -> Any:  # noqa: N807
-        value = getter(self, name)
+        value = getter(self._smachpy_original if name in once else self, name)
         if type(value) in ATOMS or name[:2] == "__" or name == "_smachpy_original":
             return value
         return read_only(value, self._smach_key)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import pickle
 import threading
 from collections import Counter, OrderedDict, defaultdict, deque
@@ -306,6 +307,27 @@ def test_a_value_read_and_written_on_is_the_original_again():
     sm.execute()
     assert sm.userdata.out is original
     assert original[0].x == 5.0
+
+
+class Route:
+    def __init__(self):
+        self.places = [["shelf"]]
+
+    @functools.cached_property
+    def stops(self):
+        return [self.places[0]]
+
+
+def test_what_a_view_computes_once_is_of_the_object_itself():
+    """A state that may change the value got what the view of another one had computed."""
+    userdata = UserData()
+    userdata.route = Route()
+    view = Remapper(userdata, ["route"]).route
+    assert view.stops == [["shelf"]]
+    with pytest.raises(smachpy.ReadOnlyError):
+        view.stops[0].append("dock")
+    Remapper(userdata, ["route"], ["route"]).route.stops[0].append("dock")
+    assert view.places == view.stops == [["shelf", "dock"]]
 
 
 def test_io_keys_may_be_changed_in_place():
