@@ -100,8 +100,9 @@ class ScriptedNode(ScriptedEnd):
         return {name: (ros2.get_service(SERVICES[name]), each) for name, each in answers.items()}
 
     def copy_to(self, kit: Test) -> Self:
-        """Make the same node in another test."""
+        """Make the same node in another test, with its parameters and its state now."""
         made = type(self)(kit, self.name, *self._first)
+        made.parameters, made.state = copy.deepcopy(self.parameters), self.state
         made.refused, made.takes = dict(self.refused), dict(self.takes)
         made.highest = dict(self.highest)
         return made

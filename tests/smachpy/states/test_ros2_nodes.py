@@ -8,7 +8,7 @@ import pytest
 
 from smachpy import Concurrence, InvalidStateError, State, StateMachine
 from smachpy.states import RestoreParameters, SetLifecycle, SetParameters, Wait
-from smachpy.testing import explore
+from smachpy.testing import explore, mission_kit
 
 ENDS = ["succeeded", "aborted", "preempted"]
 FAST, SLOW = {"max_vel_x": 0.5, "plugins": ["a"]}, {"max_vel_x": 0.2}
@@ -482,6 +482,19 @@ def test_a_preempt_ends_the_wait_between_two_states(mission):
     run = mission(alone(SetLifecycle("map_server")))
     run.assert_outcome("preempted")
     assert run.duration == 1.2
+
+
+def test_an_exploration_has_the_node_as_the_test_has_made_it(mission):
+    """Its runs began with the first parameters and the first state."""
+    node = mission.ros2_node("controller", FAST, state="unconfigured")
+    node.parameters["max_vel_x"] = 0.4
+    node.state = "inactive"
+    with mission_kit() as other:
+        copy = node.copy_to(other)
+        assert (copy.parameters, copy.state) == ({**FAST, "max_vel_x": 0.4}, "inactive")
+        copy.kill()
+        copy.come_back()
+        assert (copy.parameters, copy.state) == (FAST, "unconfigured")
 
 
 def test_a_machine_explored_with_them_is_sound():
