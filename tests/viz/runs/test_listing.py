@@ -81,6 +81,16 @@ def test_a_run_that_goes_on_says_what_its_state_notes():
     assert row["reason"] == "B: aisle 7"
 
 
+@pytest.mark.parametrize("asking", ["/JOB/B", "/JOB/B/CONFIRM"])
+def test_a_run_that_asks_a_person_waits_in_its_strip(asking):
+    asked = (3.0, "QuestionAsked", asking, {"text": "may I?"})
+    answered = (4.0, "QuestionAnswered", asking, {"answer": "yes", "by": "ann"})
+    row = run_row(chain(), [*failed()[:4], *told(asked)])
+    assert row["strip"] == [(0, "A", 0.0, 2.0, "success"), (0, "B", 2.0, None, "waiting")]
+    row = run_row(chain(), [*failed()[:4], *told(asked, answered)])
+    assert row["strip"][-1] == (0, "B", 2.0, None, "active")
+
+
 def test_only_the_newest_run_counts_and_none_is_no_run():
     events = [*failed(), *failed(began=BEGAN + 100 * S)[:2]]
     row = run_row(chain(), events)

@@ -213,8 +213,11 @@ class Comparison(TypedDict("_With", {"with": str})):
 
 # -- runs -----------------------------------------------------------------------------------------
 
-StripPiece: TypeAlias = tuple[int, str, float, float | None, OutcomeClass | Literal["active"]]
-"""Row, label of the state, begin and end [s since the run began; null: still running], class."""
+StripPiece: TypeAlias = tuple[
+    int, str, float, float | None, OutcomeClass | Literal["active", "waiting"]
+]
+"""Row, label of the state, begin and end [s since the run began; null: still running], class;
+"waiting" while it asks a person."""
 
 
 class MissionFacts(TypedDict):

@@ -70,6 +70,7 @@ class RowFold:
         self._outages: list[tuple[float, float]] = []
         self._active: dict[str, str] = {}  # running states in the order of their begin -> note
         self._since: dict[str, float] = {}  # start of each running child of the root
+        self._asking: set[str] = set()  # states whose question is open
         self._pieces: list[_Piece] = []
 
     def add(self, event: dict[str, Any]) -> None:
@@ -82,22 +83,30 @@ class RowFold:
             self._active[path] = ""
         elif kind in {"Noted", "ResourceUse"} and path in self._active:
             self._active[path] = _note(event)
+        elif kind in {"QuestionAsked", "QuestionAnswered"}:
+            change = self._asking.add if kind == "QuestionAsked" else self._asking.discard
+            change(path)
         elif kind == "Recovered":
             self._recover(event)
         elif kind in _ENDS:
             self._active.pop(path, None)
+            self._asking.discard(path)
             if path == self._record.path and kind == "Finished":
                 self._outcome, self._ended = event.get("outcome") or RAISED, stamp_ns
         elif kind == "GoalSent":
-            space = str(event.get("action") or "").lstrip("/").rpartition("/")[0]
-            if space and space not in self._robots:
-                self._robots = sorted([*self._robots, space])[:MAX_ROBOTS]
+            self._add_robot(str(event.get("action") or ""))
         if path in self._children:
             self._add_visit(kind, path, round((stamp_ns - self._began) / 1e9, 3), event)
+
+    def _add_robot(self, action: str) -> None:
+        space = action.lstrip("/").rpartition("/")[0]
+        if space and space not in self._robots:
+            self._robots = sorted([*self._robots, space])[:MAX_ROBOTS]
 
     def _recover(self, event: dict[str, Any]) -> None:
         began = self._began or 0
         self._active = {path: self._active.get(path, "") for path, _ in event["active"]}
+        self._asking &= self._active.keys()
         # The visits that the resumed mission runs; others that were cut off have no end.
         self._since = {
             one: self._since.get(one, (start - began) / 1e9)
@@ -122,6 +131,11 @@ class RowFold:
         since = self._since[path] if to is None else self._since.pop(path)
         return row, path.rpartition("/")[2], since, to, kind
 
+    def _kind(self, path: str) -> str:
+        """Return "waiting" if a running state, or one in it, asks a person, else "active"."""
+        asks = any(f"{one}/".startswith(f"{path}/") for one in self._asking)
+        return "waiting" if asks else "active"
+
     def row(self, cause: Callable[[], str]) -> dict[str, Any]:
         """Return the row.
 
@@ -133,8 +147,8 @@ class RowFold:
             newest event [ns since the epoch, None if unknown]; `outcome`: None if the run has not
             ended; `reason`: the first cause of a failure, or the running state, or ""; `strip`: for
             each visit of a child of the root the row, the state's name, begin and end [s since the
-            run began; None: still running] and the class of its outcome; `outages`: pairs [s since
-            the run began] without a process.
+            run began; None: still running] and the class of its outcome, "active" or "waiting";
+            `outages`: pairs [s since the run began] without a process.
         """
         record, outcome = self._record, self._outcome
         reason = ""
@@ -145,7 +159,7 @@ class RowFold:
                 reason = _name(path, record) + tidy + (f": {note}" if note else "")
         elif outcome == RAISED or record.class_of(outcome) in {"failure", "preempted"}:
             reason = cause()
-        pieces = [*self._pieces, *(self._piece(path, None, "active") for path in self._since)]
+        pieces = [*self._pieces, *(self._piece(one, None, self._kind(one)) for one in self._since)]
         return {
             "machine": record.label,
             "robots": self._robots,

@@ -196,7 +196,7 @@ export interface RunRow {
   reason: string;
   problem: string;
   file: string;
-  strip: [number, string, number, number | null, "success" | "failure" | "preempted" | "other" | "active"][];
+  strip: [number, string, number, number | null, "success" | "failure" | "preempted" | "other" | "active" | "waiting"][];
   outages: [number, number][];
   run: string;
   asks: boolean;
@@ -364,7 +364,7 @@ export interface FleetRow {
   reason: string;
   problem: string;
   file: string;
-  strip: [number, string, number, number | null, "success" | "failure" | "preempted" | "other" | "active"][];
+  strip: [number, string, number, number | null, "success" | "failure" | "preempted" | "other" | "active" | "waiting"][];
   outages: [number, number][];
   run: string;
   asks: boolean;
