@@ -221,3 +221,26 @@ def test_beside_a_question_no_button_of_a_phone_held_sideways_is_cut(served, loo
             .filter((box) => box.width && box.right > right).length; }"""
     page.wait_for_selector(".zoom .offer")  # the widest
     assert page.evaluate(cut) == 0
+
+
+@pytest.mark.browser
+def test_a_phone_held_sideways_shows_the_answers_below_the_picture(served, look):
+    asked = {**ASKED, "has_picture": True}
+    served.add(
+        "one",
+        events=[*WAITS[:2], ("QuestionAsked", "/JOB/A", asked)],
+        control={"paused": False, "breakpoints": []},
+    )
+    page = look(f"{served.start(token='t')}#token=t", drawn=False)
+    picture = b'<svg xmlns="http://www.w3.org/2000/svg" width="160" height="90"/>'
+    page.route(
+        "**/api/question*",
+        lambda route: route.fulfill(body=picture, content_type="image/svg+xml"),
+    )
+    page.set_viewport_size({"width": 844, "height": 390})
+    page.reload()
+    page.wait_for_selector(".question-picture")
+    page.wait_for_selector("#preempt")
+    below = """() => document.querySelector('.operator').getBoundingClientRect().top
+        - Math.max(...[...document.querySelectorAll('.answer')].map((b) => b.getBoundingClientRect().bottom))"""
+    assert page.evaluate(below) >= 0
