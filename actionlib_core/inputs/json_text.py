@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from typing import Any, Final
 
 MAX_JSON_NESTING: Final = 100
@@ -18,7 +17,6 @@ MAX_JSON_PARTS: Final = 2_000_000
 """Most arrays and objects."""
 
 _MAX_DIGITS: Final = 300
-_HUGE: Final = re.compile(r"\d{300}")
 
 MAX_JSON_LENGTH: Final = 32_000_000
 """Longest text, unless the caller allows less [characters]."""
@@ -54,8 +52,7 @@ def load_json(
             f"got {parts:,} arrays and objects; expected at most {MAX_JSON_PARTS:,}"
         )
     try:
-        # A whole number that is too large for a float raises in any computation with floats.
-        data = (_HUGE_DECODER if _HUGE.search(text) else _DECODER).decode(text)
+        data = _DECODER.decode(text)
     except RecursionError as error:
         raise JsonTextError(f"it is nested deeper than {deepest} levels") from error
     except ValueError as error:  # also for a number with thousands of digits
@@ -71,12 +68,12 @@ def _finite(text: str) -> float | str:
 
 
 def _whole(text: str) -> int | str:
+    # A whole number that is too large for a float raises in any computation with floats.
     return text if len(text) > _MAX_DIGITS else int(text)
 
 
 # `json.loads` makes one for each text, which takes as long as a short text.
-_DECODER: Final = json.JSONDecoder(parse_constant=str, parse_float=_finite)
-_HUGE_DECODER: Final = json.JSONDecoder(parse_constant=str, parse_float=_finite, parse_int=_whole)
+_DECODER: Final = json.JSONDecoder(parse_constant=str, parse_float=_finite, parse_int=_whole)
 
 
 def check_depth(data: Any, deepest: int = MAX_JSON_NESTING) -> None:
