@@ -746,7 +746,7 @@ def _numbered(events: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def read_recording(
-    path: str | Path, *, stream: bool = False, newest: int | None = None, topics: bool = True
+    path: str | Path, *, stream: bool = False, newest: int | None = None, plots: bool = True
 ) -> Recording:
     """Read a file.
 
@@ -759,7 +759,8 @@ def read_recording(
             only iterate them; inputs are left out then.
         newest: The most events that are kept, and the most records of topics besides maps; those
             before them are folded into `base`, and inputs are left out. None: all.
-        topics: Whether data of robots' topics is read.
+        plots: Whether what is only shown is read: data of robots' topics, and the content of
+            feedback, which is None then.
 
     Raises:
         RecordingError: it cannot be read, or a line before the last is not an event; with the line.
@@ -778,24 +779,24 @@ def read_recording(
                 return replace(header, events=events, observed=observed)  # type: ignore[arg-type]
             if size > LARGEST:
                 raise RecordingError(path, f"got {size:,} bytes; expected at most {LARGEST:,}.")
-            return _read(path, file, newest, topics)
+            return _read(path, file, newest, plots)
     except OSError as error:
         raise _unreadable(path, error) from error
 
 
-def _read(path: Path, file: TextIO, newest: int | None, topics: bool) -> Recording:
+def _read(path: Path, file: TextIO, newest: int | None, plots: bool) -> Recording:
     recording = _read_header(path, file.readline(MAX_LINE_LENGTH + 1))
     wrong = recording.wrong
 
     def wanted(line: str) -> bool:
-        return topics or not line.startswith(_TOPICS)
+        return plots or not line.startswith(_TOPICS)
 
     def events() -> Iterator[dict[str, Any]]:
         for number, record in _records(path, file, wanted):
             if record is None:
                 recording.cut = True
             elif record["kind"] in {OBSERVED, CROSSED}:
-                if record["kind"] == OBSERVED and not topics:
+                if record["kind"] == OBSERVED and not plots:
                     continue
                 try:
                     _add_data(recording, record, newest)
@@ -806,10 +807,16 @@ def _read(path: Path, file: TextIO, newest: int | None, topics: bool) -> Recordi
             elif record["kind"] != END:
                 yield record
 
-    numbered = _numbered(map(SteadyStamps().fix, events()))
+    found = events() if plots else map(_without_feedback, events())
+    numbered = _numbered(map(SteadyStamps().fix, found))
     recording.events = list(numbered if newest is None else _newest(recording, numbered, newest))
     _tell_wrong(path, wrong)
     return recording
+
+
+def _without_feedback(record: dict[str, Any]) -> dict[str, Any]:
+    """Return an event without the content of feedback, which is most of a recording's memory."""
+    return {**record, "feedback": None} if record["kind"] == "GoalFeedback" else record
 
 
 def _tell_wrong(path: Path, wrong: Sequence[str]) -> None:

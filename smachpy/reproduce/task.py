@@ -88,7 +88,7 @@ def run_file(path: str, options: Options) -> Reproduction:
     """
     with quiet():
         return reproduce(
-            read_recording(path, topics=False),
+            read_recording(path, plots=False),
             mission=options.mission,
             allow=options.allow,
             seed=options.seed,

@@ -433,11 +433,14 @@ def _add_messages(world: World, inputs: list[dict[str, Any]]) -> None:
                 (
                     m
                     for m in reversed(known[-_NEWEST:])
-                    if m[1] == value and key not in m[2] and (is_first or m[3] > born.get(key, -1))
+                    if t - m[0] < TWICE_S
+                    and m[1] == value
+                    and key not in m[2]
+                    and (is_first or m[3] > born.get(key, -1))
                 ),
                 None,
             )
-            if same is not None and t - same[0] < TWICE_S:
+            if same is not None:
                 same[2].add(key)
                 continue
             known.append((t, value, {key}, number))

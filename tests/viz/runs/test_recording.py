@@ -225,9 +225,19 @@ def test_data_of_topics_in_another_shape_is_left_out_with_a_warning(record, capl
     path = with_line(path, kind="Observed", **fields)
     recording = read_recording(path)
     assert [one["at"] for one in recording.observed] == [[1.0, 2.0, 0.0]]
-    without = read_recording(path, topics=False)
+    without = read_recording(path, plots=False)
     assert (without.events, without.observed) == (recording.events, [])
     assert "1 record(s) of topics or inputs are left out; the first: line 9" in caplog.text
+
+
+def test_feedback_that_is_only_shown_keeps_its_place_and_not_its_content(record):
+    fields = {"action": "a", "goal_id": "1", "feedback": {"x": 1.0}}
+    path = with_line(record("run.jsonl"), kind="GoalFeedback", **fields)
+    whole, without = (read_recording(path, plots=plots).events for plots in (True, False))
+    [feedback] = [event for event in whole if event["kind"] == "GoalFeedback"]
+    assert feedback["feedback"] == {"x": 1.0}
+    feedback["feedback"] = None
+    assert without == whole
 
 
 @pytest.mark.parametrize(

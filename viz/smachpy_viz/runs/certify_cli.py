@@ -261,7 +261,7 @@ def _simulated(
         results = simulate(plan, cluster, jobs=args.jobs)
         for one in results:
             if one.outcome is not None:
-                taken |= transitions_of(read_recording(one.task.file, topics=False).events)
+                taken |= transitions_of(read_recording(one.task.file, plots=False).events)
     ends = Counter(one.outcome for one in results if one.outcome is not None)
     failed = [f"run {one.task.number}: {one.error}" for one in results if one.outcome is None]
     said = [f"{outcome} x{count}" for outcome, count in ends.most_common()]
@@ -308,7 +308,7 @@ def _reproduced(
     verdicts = list(verdicts_of(paths, options, args.jobs, cluster))
     for one in verdicts:
         if one.kind != "failed":
-            taken |= transitions_of(read_recording(one.path, topics=False).events)
+            taken |= transitions_of(read_recording(one.path, plots=False).events)
     return {
         "ok": all(one.kind == "same" for one in verdicts),
         "said": summary(verdicts),

@@ -106,7 +106,7 @@ def _write(args: argparse.Namespace) -> int:
     if args.output.suffix != ".py":
         raise UsageError(f"{where} {str(args.output)!r}: expected a name that ends with .py.")
     _check_new(args.output, "-o")
-    recording = read_recording(args.places[0], topics=False)
+    recording = read_recording(args.places[0], plots=False)
     folder = beside(recording, args.mission) if args.beside_mission else args.output.parent
     with quiet():
         written = write_test(
