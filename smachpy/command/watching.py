@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+import shlex
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +103,8 @@ class Watch:
         if self._viewer is None:
             return
         if self._file is not None:
-            print(f"recorded: smachpy view {printable(str(self._file.path))}", flush=True)
+            path = shlex.quote(str(self._file.path))
+            print(printable(f"recorded: smachpy view {path}"), flush=True)
         if ending.requested() or self._stay == 0 or self._viewer.exit_code is not None:
             return
         how = "raised an exception" if outcome is None else f"ended: {outcome}"

@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+import shlex
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -171,7 +172,7 @@ class AskOperator(State):
             ask.publish(String(f"{question.text} ({', '.join(self.__answers)})"))
             logwarn(
                 f"{question.text} Answer {' or '.join(self.__answers)} within "
-                f"{self.__patience:g} s: smachpy answer {self.__answers[0]}"
+                f"{self.__patience:g} s: smachpy answer {shlex.quote(self.__answers[0])}"
             )
             answer = asking.wait(scope)
             ask.publish(String(""))

@@ -11,10 +11,13 @@ import sys
 import time
 import urllib.request
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from actionlib_core import shutdown
 from smachpy.command import main, runs_folder
+from smachpy.command.watching import Watch
 from smachpy.events import recording
 from smachpy.events.recording import read_recording
 
@@ -120,6 +123,14 @@ def summary_at(address):
     with urllib.request.urlopen(f"{address}api/machines", timeout=60) as answer:
         (one,) = json.load(answer)
     return one
+
+
+def test_the_command_that_replays_a_run_can_be_copied(capsys):
+    file = SimpleNamespace(path=Path("my runs/a.jsonl"), close=lambda: None)
+    watch = Watch(file, SimpleNamespace(exit_code=0), 0.0)
+    with shutdown.use_shutdown(shutdown.Shutdown()) as ending:
+        watch.linger("done", ending)
+    assert capsys.readouterr().out == "recorded: smachpy view 'my runs/a.jsonl'\n"
 
 
 @pytest.mark.slow

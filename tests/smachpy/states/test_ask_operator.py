@@ -30,6 +30,12 @@ def answer(mission):
     return lambda at, text: topic.publish_at(at, String(text))
 
 
+def test_the_command_in_the_log_can_be_copied(mission, answer, caplog):
+    answer(5.0, "go home")
+    mission(asking("go home", "no")).assert_outcome("go home")
+    assert "smachpy answer 'go home'" in caplog.text
+
+
 @pytest.mark.parametrize("text", ["retry", " Retry\n", "skip"])
 def test_the_answer_is_the_outcome(mission, answer, text):
     answer(5.0, text)
