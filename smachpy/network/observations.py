@@ -62,7 +62,7 @@ _MAX_POINTS: Final = 200  # of a plan
 _OCCUPIED, _FREE = 65, 25  # [%], the thresholds of ROS's map_saver
 _STANDS: Final = 1e-3  # [m/s] and [rad/s]: a slower robot is at rest
 _MAX_FRAMES: Final = 32  # between a frame and the map; a longer chain is a cycle
-_MAX_SCOPES: Final = 1000
+_MAX_SCOPES: Final = 1000  # robots, and topics with numbers; whoever publishes can invent them
 _MAX_NAMES: Final = 10_000  # of frames of one robot; whoever publishes on `tf` can invent them
 _MAX_NUMBERS: Final = 32  # of one message
 _MAX_ITEMS: Final = 8  # of an array
@@ -143,9 +143,11 @@ class Observer:
         self._recorded: dict[tuple[str, str], tuple[int, Any]] = {}  # by `what` and robot
         self._localized: set[str] = set()
         self._late_maps: dict[str, dict[str, Any]] = {}  # robot -> a map that came too soon
+        self._robots: set[str] = set()
+        self._topics: set[str] = set()  # those of `NUMBERS`
 
     def take(self, role: str, robot: str, message: Any, stamp_ns: int) -> list[dict[str, Any]]:
-        """Return the records of a message; none if it has invalid numbers.
+        """Return the records of a message; none if it has invalid numbers, or of too many robots.
 
         Args:
             role: The topic's role, see `role_of`.
@@ -153,6 +155,10 @@ class Observer:
             message: A message of ROS 1 or ROS 2.
             stamp_ns: Its arrival.
         """
+        known = self._topics if role == NUMBERS else self._robots
+        if robot not in known and len(known) >= _MAX_SCOPES:
+            return []
+        known.add(robot)
         make = getattr(self, f"_take_{role}")
         try:
             found = [(what, robot, facts) for what, facts in make(robot, message, stamp_ns)]
@@ -178,8 +184,6 @@ class Observer:
     # -- one method for each role: they yield `what` and the fields of the record ----------------
 
     def _take_tf(self, robot: str, message: Any, _stamp_ns: int) -> Iterable[Any]:
-        if robot not in self._frames and len(self._frames) >= _MAX_SCOPES:
-            return ()
         known = self._frames.setdefault(robot, {})
         for stamped in message.transforms:
             if len(known) >= _MAX_NAMES and _plain(stamped.child_frame_id) not in known:

@@ -31,7 +31,7 @@ MAX_KEPT_OBSERVATIONS: Final = 20_000
 """Number of records kept for viewers that join late, besides the newest maps."""
 
 MAX_KEPT_BYTES: Final = 8_000_000
-"""Limit of their text [bytes]."""
+"""Limit of their text, and of that of the newest maps [bytes]."""
 
 MAX_TOPICS: Final = 400
 """Maximum number of topics to which it subscribes."""
@@ -71,7 +71,8 @@ class RobotTopics:
         self._listeners: list[Callable[[dict[str, Any]], object]] = []
         self._kept: deque[tuple[dict[str, Any], int]] = deque()
         self._kept_bytes = 0
-        self._maps: dict[str, dict[str, Any]] = {}
+        self._maps: dict[str, tuple[dict[str, Any], int]] = {}  # by robot, the newest last
+        self._maps_bytes = 0
         self._count = 0
         self._watches: list[Closable] = []
         self._topics: dict[
@@ -104,9 +105,8 @@ class RobotTopics:
         """Return the newest records and the newest map of each robot, oldest first."""
         with self._lock:
             first = self._kept[0][0]["n"] if self._kept else self._count + 1
-            maps = sorted(self._maps.values(), key=lambda one: one["n"])
             return [
-                *(one for one in maps if one["n"] < first),
+                *(one for one, _ in self._maps.values() if one["n"] < first),
                 *(record for record, _ in self._kept),
             ]
 
@@ -245,10 +245,18 @@ class RobotTopics:
     def _keep(self, record: dict[str, Any]) -> None:
         self._count += 1
         record["n"] = self._count
-        if record["what"] == "map":
-            self._maps[record["robot"]] = record
         size = len(record_text(record))
+        if record["what"] == "map":
+            self._forget_map(record["robot"])
+            self._maps[record["robot"]] = record, size
+            self._maps_bytes += size
+            while self._maps_bytes > MAX_KEPT_BYTES and len(self._maps) > 1:
+                self._forget_map(next(iter(self._maps)))
         self._kept.append((record, size))
         self._kept_bytes += size
         while len(self._kept) > MAX_KEPT_OBSERVATIONS or self._kept_bytes > MAX_KEPT_BYTES:
             self._kept_bytes -= self._kept.popleft()[1]
+
+    def _forget_map(self, robot: str) -> None:
+        _, size = self._maps.pop(robot, (None, 0))
+        self._maps_bytes -= size

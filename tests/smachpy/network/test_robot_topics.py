@@ -359,6 +359,30 @@ def test_of_many_records_the_newest_are_kept_and_the_map(office, monkeypatch):
     assert [one["n"] for one in kept] == sorted(one["n"] for one in kept)
 
 
+def test_of_many_large_maps_the_newest_are_kept(office, monkeypatch):
+    """A history of all of them was longer than viewers read: they did not show the machine."""
+    monkeypatch.setattr("smachpy.network.robot_topics.MAX_KEPT_BYTES", 10_000)
+    _, node, _ = office
+    with RobotTopics(node) as topics:
+        for number in [*range(100), 98]:
+            topics._keep({"what": "map", "robot": f"r{number}", "cells": "x" * 3_000})
+        kept = topics.kept()
+    assert [one["robot"] for one in kept] == ["r97", "r98", "r99", "r98"]
+    assert sum(len(json.dumps(one)) for one in kept) < 2 * 10_000
+
+
+def test_robots_and_topics_without_end_are_bounded(monkeypatch):
+    monkeypatch.setattr("smachpy.network.observations._MAX_SCOPES", 3)
+    observer = Observer()
+    for role, message in (("odometry", odometry(1.0, 2.0)), ("numbers", Float64(1.0))):
+        told = [observer.take(role, f"r{number}", message, S) for number in range(5)]
+        assert [len(one) for one in told] == [1, 1, 1, 0, 0]
+        assert observer.take(role, "r0", message, 9 * S) == ([] if role == "odometry" else [{
+            "kind": "Observed", "path": "", "stamp_ns": 9 * S, "what": "values", "robot": "",
+            "topic": "r0", "values": {"data": 1.0},
+        }])  # fmt: skip
+
+
 def test_a_recording_holds_what_the_robot_told(office, tmp_path):
     _, node, _ = office
     sm = StateMachine(outcomes=["done"], name="JOB")
