@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import signal
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 
@@ -11,6 +14,7 @@ import pytest
 
 from smachpy.events.recording import Recorder, read_recording
 from smachpy.testing import mission_kit
+from smachpy_viz.live import started_commands
 from smachpy_viz.live.machines import Machines
 from smachpy_viz.live.reproductions import ReproductionRequestError, Reproductions
 from smachpy_viz.live.runs import Runs
@@ -37,6 +41,18 @@ def mission():
         )
     return sm
 """
+
+
+def test_what_has_ended_gets_no_signal(monkeypatch):
+    """Its number may be another process's: *Stop* of an old reproduction hit that one's group."""
+    sent = []
+    monkeypatch.setattr(started_commands.os, "killpg", lambda *words: sent.append(words))
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    started_commands.send_signal(process, signal.SIGINT)
+    assert sent == [(process.pid, signal.SIGINT)]
+    process.communicate(b"\n", timeout=60)
+    started_commands.send_signal(process, signal.SIGINT)
+    assert len(sent) == 1
 
 
 @pytest.fixture

@@ -37,7 +37,9 @@ def start_command(words: Iterable[str], errors: IO[str]) -> subprocess.Popen[str
 
 
 def send_signal(process: subprocess.Popen[str], number: int) -> None:
-    """Send a signal to a process and its group, which it leads."""
+    """Send a signal to a process and its group, which it leads; nothing if it has ended."""
+    if process.poll() is not None:  # another group may have its number by now
+        return
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, number)
 
