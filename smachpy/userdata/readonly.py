@@ -23,7 +23,7 @@ from smachpy.base.slips import accepts
 from smachpy.exceptions import ReadOnlyError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
 # Py_TPFLAGS_HEAPTYPE: set for classes made by a `class` statement, not for static types of C code.
 _HEAP_TYPE = 1 << 9
@@ -105,7 +105,9 @@ def _object_still_shows(_view: Any, _value: Any) -> bool:
 
 
 def writable(value: Any) -> Any:
-    """Undo `read_only`, also inside lists, tuples, sets and dicts; others are unchanged.
+    """Undo `read_only`, also inside lists, tuples, sets, dicts, messages and dataclasses.
+
+    A container with a view inside is copied, and a field that is one gets the original.
 
     Raises:
         ReadOnlyError: the value contains itself, and views too.
@@ -129,26 +131,49 @@ def _has_view(value: Any) -> bool:
         one = left.pop()
         if isinstance(one, _View):
             return True
-        inside = one.values() if type(one) is dict else one
-        if type(one) in {list, tuple, set, frozenset, dict}:
-            new = [part for part in inside if id(part) not in seen]
-            seen.update(map(id, new))
-            left += new
+        new = [part for part in _inside(one) if id(part) not in seen]
+        seen.update(map(id, new))
+        left += new
     return False
 
 
+def _inside(value: Any) -> Iterable[Any]:
+    """Return the parts of a value in which `writable` looks for views."""
+    kind: Any = type(value)
+    if kind is list or kind is tuple or kind is set or kind is frozenset:
+        parts: Iterable[Any] = () if ATOMS.issuperset(map(type, value)) else value
+        return parts
+    if kind is dict:
+        return list(value.values())
+    found = [getattr(value, name, None) for name in _fields(kind)]
+    return [part for part in found if type(part) not in ATOMS]
+
+
+@functools.lru_cache(maxsize=1024)
+def _fields(kind: Any) -> tuple[str, ...]:
+    """Return the names of the fields of messages, dataclasses and named tuples; of others none."""
+    if hasattr(kind, "__dataclass_fields__"):
+        return tuple(kind.__dataclass_fields__)
+    if hasattr(kind, "_md5sum") and hasattr(kind, "__slots__"):
+        return tuple(kind.__slots__)
+    return tuple(kind._fields) if issubclass(kind, tuple) and hasattr(kind, "_make") else ()
+
+
 def _writable(value: Any) -> Any:
-    kind = type(value)
-    if kind in ATOMS:
-        return value
+    kind: Any = type(value)
     if issubclass(kind, _View):
         return value._smachpy_original
-    if kind is list or kind is tuple or kind is set or kind is frozenset:
-        if any(_holds_view(item) for item in value):
-            return kind(_writable(item) for item in value)
+    if kind in ATOMS or not any(map(_holds_view, _inside(value))):
         return value
-    if kind is dict and any(_holds_view(item) for item in value.values()):
+    if kind is dict:
         return {key: _writable(item) for key, item in value.items()}
+    if not _fields(kind) or issubclass(kind, tuple):
+        return getattr(kind, "_make", kind)(map(_writable, value))
+    for name in _fields(kind):
+        part = getattr(value, name, None)
+        new = _writable(part)
+        if new is not part:
+            object.__setattr__(value, name, new)  # it may be frozen
     return value
 
 
@@ -156,11 +181,7 @@ def _holds_view(value: Any) -> bool:
     kind = type(value)
     if kind in ATOMS:
         return False
-    if issubclass(kind, _View):
-        return True
-    if kind is list or kind is tuple or kind is set or kind is frozenset:
-        return any(map(_holds_view, value))
-    return kind is dict and any(map(_holds_view, value.values()))
+    return issubclass(kind, _View) or any(map(_holds_view, _inside(value)))
 
 
 class _View:

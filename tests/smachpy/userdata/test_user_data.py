@@ -16,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import smachpy
-from actionlib_core.interfaces.geometry_msgs.msg import Point
+from actionlib_core.interfaces.geometry_msgs.msg import Point, PoseStamped
+from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseGoal
 from smachpy import CBState, InvalidStateError, StateMachine
 from smachpy.events import UserdataWritten
 from smachpy.userdata.user_data import Remapper, UserData, get_const
@@ -307,6 +308,65 @@ def test_a_value_read_and_written_on_is_the_original_again():
     sm.execute()
     assert sm.userdata.out is original
     assert original[0].x == 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Order:
+    pose: Pose
+    others: tuple = ()
+
+
+@dataclasses.dataclass
+class Link:
+    next: object
+    pose: object
+
+
+def ring(pose):
+    link = Link(None, pose)
+    link.next = link
+    return link
+
+
+@pytest.mark.parametrize(
+    ("make", "of"),
+    [
+        (lambda pose: dataclasses.replace(pose, x=2.0), lambda made: made),
+        (lambda pose: Order(pose), lambda made: made.pose),
+        (lambda pose: {"to": [Order(None, (pose,))]}, lambda made: made["to"][0].others[0]),
+        (lambda pose: Pair(pose, 1), lambda made: made.a),
+    ],
+)
+def test_what_is_made_of_read_only_values_can_be_changed_by_a_later_state(make, of):
+    """It was told to declare the key of the first state with io_keys."""
+    userdata = UserData()
+    userdata.pose = Pose(tags=["a"])
+    first = Remapper(userdata, ["pose"], ["order"])
+    first.order = make(first.pose)
+    of(Remapper(userdata, ["order"], ["order"]).order).tags.append("b")
+    assert userdata.pose.tags == ["a", "b"]
+    with pytest.raises(smachpy.ReadOnlyError):
+        first.pose.tags.append("c")
+
+
+def test_a_message_with_a_read_only_field_keeps_what_is_set_later():
+    userdata = UserData()
+    userdata.pose = PoseStamped()
+    first = Remapper(userdata, ["pose"], ["goal"])
+    goal = MoveBaseGoal(target_pose=first.pose)
+    first.goal = goal
+    Remapper(userdata, ["goal"], ["goal"]).goal.target_pose.header.frame_id = "map"
+    assert userdata.goal is goal
+    assert userdata.pose.header.frame_id == "map"
+
+
+def test_a_record_with_itself_and_what_is_read_only_says_so():
+    userdata = UserData()
+    userdata.pose = Pose()
+    window = Remapper(userdata, ["pose"], ["ring"])
+    with pytest.raises(smachpy.ReadOnlyError, match="contains itself and values"):
+        window.ring = ring(window.pose)
+    window.ring = ring(1)
 
 
 class Route:
