@@ -118,8 +118,8 @@ class Modes(StateMachine):
         """Return modes with the table of a machine of the package `transitions`.
 
         Args:
-            machine: The machine, nested or not. Its callbacks are not used, nor the events
-                `to_MODE` that `transitions` adds.
+            machine: The machine, nested or not. Its callbacks and internal transitions are not
+                used, nor the events `to_MODE` that `transitions` adds.
             missions: Mode -> mission; a mode in a mode is "manual_slow".
             **options: Those of `Modes`.
 

@@ -314,7 +314,7 @@ def states_of(
 
 
 def rows_of(machine: Any, known: Iterable[str]) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a machine, without those of its events `to_MODE`.
+    """Yield the rows of a machine, without those of its events `to_MODE` and internal ones.
 
     Args:
         machine: The machine.
@@ -332,5 +332,7 @@ def rows_of(machine: Any, known: Iterable[str]) -> Iterator[dict[str, Any]]:
                 if way.conditions:
                     problem = f"{name}: got conditions, which are code; expected none. Try `when`."
                     raise ModesError([problem])
-                source, target = name_of(machine, way.source), way.dest or way.source
-                yield {"trigger": name, "source": source, "dest": name_of(machine, target)}
+                if way.dest is None:  # an internal one, which leaves no mode
+                    continue
+                source, target = (name_of(machine, one) for one in (way.source, way.dest))
+                yield {"trigger": name, "source": source, "dest": target}

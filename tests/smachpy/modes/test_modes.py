@@ -579,6 +579,16 @@ def test_a_machine_of_transitions_can_be_given():
         Modes.from_machine(machine, {"aut": mission})
 
 
+def test_an_internal_transition_of_transitions_begins_no_mission_anew():
+    from transitions import Machine
+
+    rows = [["start", "idle", "auto"], ["tick", "idle", "auto"], ["tick", "auto", None]]
+    machine = Machine(states=["idle", "auto"], transitions=rows, initial="idle")
+    modes = Modes.from_machine(machine, {"auto": mission}, name="ROBOT")
+    run = run_of(modes, (1.0, "start"), (2.0, "tick"), end=5.0)
+    assert leaves(run).count("auto/A") == 1
+
+
 @pytest.mark.parametrize("separator", ["_", "."])
 def test_a_nested_machine_of_transitions_can_be_given(separator):
     from transitions.extensions import HierarchicalMachine
