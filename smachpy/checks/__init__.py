@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from smachpy.base.problems import Problems
 from smachpy.checks import facts, graph, structure, userdata
 from smachpy.checks import properties as properties_of_runs
 from smachpy.checks.model import RULES as RULES
@@ -76,12 +77,17 @@ def check(
         name: Name of the machine in paths; default: its own.
 
     Raises:
+        InvalidStateError: one of the lists is none.
         InconsistentMachineError: its containers are nested too deeply to be run.
         PropertyError: a property names a state or outcome that does not exist.
         IgnoreError: a comment switches off a rule that does not exist, or gives no reason; or
             `enable` names one that does not exist.
     """
     begun = time.perf_counter()  # the duration of the check itself, whatever the current clock is
+    arguments = Problems("check")
+    properties = arguments.values("properties", properties)
+    ignores, enable = arguments.values("ignores", ignores), arguments.values("enable", enable)
+    arguments.raise_all()
     on = {rule.name for rule in RULES.values() if rule.is_on}
     for rule in enable:
         check_rule("check: enable", rule)
@@ -98,7 +104,6 @@ def check(
         problems += structure.find(subject, moments)
         problems += userdata.find(subject, moments)
         problems += properties_of_runs.find(subject, moments, wanted)
-    ignores = tuple(ignores)
     kept: list[Problem] = []
     ignored: list[tuple[Problem, str]] = []
     for problem in problems:

@@ -16,6 +16,7 @@ from actionlib_core.interfaces.move_base_msgs.msg import MoveBaseAction
 from smachpy import (
     CBState,
     Concurrence,
+    InvalidStateError,
     Iterator,
     SimpleActionState,
     State,
@@ -1016,6 +1017,23 @@ def test_resources_in_different_orders(orders, found):
         both.add(f"N{number}", nested(*names))
     problems = [p for p in smachpy.check(both) if p.rule == "resource-order"]
     assert [problem.path for problem in problems] == found
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"properties": "never(ABORT)"},
+            r"check: properties: got 'never.*Try \['never\(ABORT\)'\]",
+        ),
+        ({"enable": "no-timeout"}, r"check: enable: got 'no-timeout'; expected a list"),
+        ({"ignores": Ignore("no-timeout", "why")}, r"check: ignores: got Ignore"),
+    ],
+)
+def test_one_where_a_list_is_meant_is_refused(given, said):
+    """It said that 'n' is no property."""
+    with pytest.raises(InvalidStateError, match=said):
+        check(patrol(), **given)
 
 
 def test_files_are_named_as_the_formats_of_ci_want_them():
