@@ -453,3 +453,14 @@ def test_escape_closes_the_dialog_and_not_what_is_below(served, look):
     page.keyboard.press("Escape")
     wait_for(page, "!document.querySelector('dialog[open]')")
     assert page.evaluate("() => smachpy.store.view.pageShown.value === 'runs'")
+
+
+def test_a_recording_of_another_machine_is_shown_with_its_own_states_alone(served, look):
+    other = [("Started", "/OTHER"), ("Entered", "/OTHER/X"), ("Left", "/OTHER/X", {"outcome": "x"})]
+    served.add("one", events=[*other, ("Finished", "/OTHER", {"outcome": "x"})]).recorded = True
+    page = look(served.start())
+    assert page.evaluate("() => [...smachpy.page.diagram.picture.states.keys()]") == [
+        "/JOB", "/JOB/A", "/JOB/B",
+    ]  # fmt: skip
+    wait_for(page, "document.querySelectorAll('.log li').length === 3")  # what happened is there
+    assert page.evaluate("() => smachpy.page.timeline.bars.hits") == []
