@@ -257,10 +257,26 @@ def of_recordings(folder: Path, sizes: Sequence[int]) -> dict[str, float]:
         summary = read_summary(path)
         read.append(io_bytes("rchar") - before)
         missing += 2 * size + 2 - summary.events
+    command = [sys.executable, __file__, "--view", str(path)]
+    opened = subprocess.run(command, check=True, capture_output=True)
     return {
         "recording: events missing": missing,
         "recording: bytes read for a list": read[-1],
+        "recording: MB to open it in the viewer": float(opened.stdout),
     }
+
+
+def open_in_viewer(path: Path) -> float:
+    """Return the most memory of this process when it opens a recording as the viewer does [MB]."""
+    from smachpy_viz.live.machines import Machines
+    from smachpy_viz.live.runs import Runs
+
+    machines = Machines()
+    machine = machines.get(Runs(machines, [path.parent]).open(f"file {path}"))
+    assert machine is not None
+    for _ in machine.snapshot_parts()[1]:
+        pass
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
 def of_timers(sizes: Sequence[int]) -> dict[str, float]:
@@ -677,6 +693,23 @@ def medians_in_turns(*acts: Callable[[], object]) -> list[float]:
     return [statistics.median(taken) for taken in times]
 
 
+def measure_here(args: argparse.Namespace) -> bool:
+    """Measure what another process of this program asks for; return whether one has asked."""
+    if args.servers:
+        print(json.dumps(start_servers(args.servers)))
+    elif args.states:
+        print(preempt_states(args.states))
+    elif args.view:
+        print(open_in_viewer(args.view))
+    elif args.serve:
+        serve()
+    elif args.clients:
+        send_goals(*args.clients)
+    else:
+        return False
+    return True
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true")
@@ -684,20 +717,11 @@ def main() -> None:
     parser.add_argument("--store", metavar="URL", help="an empty database for the queue")
     parser.add_argument("--servers", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--states", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--view", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--clients", type=int, nargs=2, help=argparse.SUPPRESS)
     args = parser.parse_args()
-    if args.servers:
-        print(json.dumps(start_servers(args.servers)))
-        return
-    if args.states:
-        print(preempt_states(args.states))
-        return
-    if args.serve:
-        serve()
-        return
-    if args.clients:
-        send_goals(*args.clients)
+    if measure_here(args):
         return
     waiting = (100, 1_000, 10_000, 100_000) if args.long else (100, 1_000, 10_000)
     finished = (10, 1_000, 10_000, 100_000) if args.long else (10, 1_000, 10_000)

@@ -475,6 +475,7 @@ class Summary:
         path: The file.
         machine: The machine's label.
         made_ns: When it was made [ns since the epoch].
+        stamp_ns: The same by the mission's own time.
         run: Name of the run of a durable mission, or "".
         first_ns, last_ns: Stamps of its first and last event.
         outcome: Outcome of the newest run in it; None if that has not ended.
@@ -488,6 +489,7 @@ class Summary:
     path: Path
     machine: str
     made_ns: int
+    stamp_ns: int
     run: str
     first_ns: int
     last_ns: int
@@ -533,6 +535,7 @@ def read_summary(path: str | Path) -> Summary:
         path=path,
         machine=header.record.label,
         made_ns=header.made_ns,
+        stamp_ns=header.stamp_ns,
         run=header.run,
         first_ns=end["first_ns"],
         last_ns=end["stamp_ns"],
@@ -591,6 +594,7 @@ def _joined_summary(one: Summary, other: Summary) -> Summary:
         last,
         path=first.path,
         made_ns=first.made_ns,
+        stamp_ns=first.stamp_ns,
         first_ns=first.first_ns,
         events=one.events + other.events,
         missing=one.missing + other.missing,
@@ -663,6 +667,15 @@ def _last_line(file: BinaryIO) -> tuple[int, bytes]:
     return begin + start, tail[start:stop]
 
 
+def has_end(path: Path) -> bool:
+    """Return whether a recording was completed, by its last line."""
+    try:
+        with path.open("rb") as file:
+            return _is_end(_last_line(file)[1])
+    except OSError:
+        return False
+
+
 def _is_end(line: bytes) -> bool:
     """Return whether a line is an end mark; events of a machine have other kinds."""
     return line.startswith((b'{"kind":"End",', b'{"kind": "End",'))
@@ -720,7 +733,7 @@ def event_line(record: dict[str, Any]) -> str:
 
 def recording_lines(
     record: StateRecord,
-    events: list[dict[str, Any]],
+    events: Iterable[dict[str, Any]],
     base: dict[str, Any] | None,
     observed: Iterable[dict[str, Any]] = (),
     made_ns: int | None = None,
@@ -729,7 +742,8 @@ def recording_lines(
 
     `made_ns` is the real date if time was virtual.
     """
-    stamp_ns = events[0]["stamp_ns"] if events else 0
+    first = next(iter(events), {"stamp_ns": 0})
+    stamp_ns = first["stamp_ns"]
     yield header_line(record, stamp_ns, base, made_ns=made_ns)
     by_time = heapq.merge(_numbered(events), observed, key=itemgetter("stamp_ns"))
     yield from map(event_line, by_time)

@@ -27,7 +27,7 @@ from actionlib_core.pubsub.topic import Publisher
 from actionlib_core.transport.memory import MemoryNetwork
 from actionlib_core.transport.tokens import Endpoint, Kind, token_key
 from smachpy import CBState, Concurrence, IntrospectionServer, StateMachine
-from smachpy.events import EVENT_KINDS
+from smachpy.events import EVENT_KINDS, record_text
 from smachpy.events.introspection import describe
 from smachpy.events.reading import read_event
 from smachpy.events.run_state import RunState
@@ -437,8 +437,8 @@ def test_what_is_kept_of_all_machines_together_is_bounded(monkeypatch):
         observed = [{**HEAD, "n": n, "what": "value", **OBSERVED["value"]} for n in range(1, 500)]
         told = history(events=[event("Started", 1), *events], observed=observed)
         machine.reset({**told, "description": RECORD})
-        assert sum(len(text) for _, _, text in machine._events) <= 10_000
-        assert sum(len(text) for _, _, text in machine._observed) <= 10_000
+        assert sum(len(record_text(one)) for one in machine.events()) <= 10_000
+        assert sum(len(record_text(one)) for one in machine.observed()) <= 10_000
         assert json.loads(machine.snapshot()[1])["base"]["run"] == 1
 
 

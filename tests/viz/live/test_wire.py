@@ -340,6 +340,21 @@ def test_wrong_token_does_not_log_in(one_run, token):
         assert checked(wire.Failure, json.load(error))["wants_token"]
 
 
+def test_a_long_message_is_sent_in_parts_and_its_id_is_with_the_last(monkeypatch):
+    monkeypatch.setattr(streams_module, "SENT_AT_ONCE", 5)
+    made = []
+
+    def part(text):
+        made.append(text)
+        return text
+
+    long = map(part, ["data: ", "1234", ",5678", "\n\n"])
+    parts = streams_module._texts(["data: 0\n\n", "id: e:1\n", long])
+    assert next(parts) == "data: 0\n\n"
+    assert made == []  # what nobody has taken is not made
+    assert [*parts] == ["id: e:1\n", "data: ", "1234,5678", "\n\n"]
+
+
 def test_page_of_another_site_does_not_log_in(one_run):
     base = one_run.start(read_token="reader")
     for origin in ("http://evil.example", "null", ""):

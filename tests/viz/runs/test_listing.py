@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import random
 from dataclasses import asdict
@@ -200,7 +201,7 @@ def test_the_cost_of_a_live_row_does_not_grow_with_the_run(monkeypatch):
     history = {"epoch": "e", "description": chain(), "base": None, "events": failed()[:1]}
     machine.reset(history)
     machine.add(failed()[1:4])
-    monkeypatch.setattr(machine, "_kept", lambda: pytest.fail("all events were read"))
+    monkeypatch.setattr(machine._events, "records", lambda: pytest.fail("all events were read"))
     assert machine.row()["reason"] == "B"
 
 
@@ -247,7 +248,9 @@ def test_a_file_is_read_again_only_when_it_has_changed(folder, monkeypatch):
     read = []
     real = runs_module.read_recording
     monkeypatch.setattr(
-        runs_module, "read_recording", lambda path: (read.append(path.name), real(path))[1]
+        runs_module,
+        "read_recording",
+        lambda path, **how: (read.append(path.name), real(path, **how))[1],
     )
     runs = Runs(Machines(), [folder])
     runs.rows()
@@ -257,6 +260,56 @@ def test_a_file_is_read_again_only_when_it_has_changed(folder, monkeypatch):
     os.utime(folder / "one.jsonl", ns=(1, 1))
     (row,) = [one for one in runs.rows()["runs"] if one["file"].endswith("one.jsonl")]
     assert row["outcome"] is None
+
+
+def test_a_long_recording_that_is_being_written_is_not_read_at_each_look(folder, monkeypatch):
+    monkeypatch.setattr(runs_module, "LONG", 10)
+    monkeypatch.setattr(runs_module, "REST", 1e9)
+    path = folder / "one.jsonl"
+    write(path, failed()[:3])
+    runs = Runs(Machines(), [folder])
+
+    def reason():
+        return next(one["reason"] for one in runs.rows()["runs"] if one["file"] == str(path))
+
+    assert reason() == ""
+    write(path, failed()[:4])
+    assert reason() == ""  # as it was
+    with path.open("a", encoding="utf-8") as file:
+        file.write('{"kind": "End", "path": "/JOB", "stamp_ns": 1, "events": 4, "missing": 0, ')
+        file.write('"first_ns": 1, "outcome": null, "outages": []}\n')
+    assert reason() == "B"
+
+
+def test_of_a_huge_recording_the_list_reads_two_lines_and_the_page_the_newest(folder, monkeypatch):
+    monkeypatch.setattr(runs_module, "LARGEST", 10)
+    monkeypatch.setattr(runs_module, "MOST_EVENTS", 2)
+    machines = Machines()
+    runs = Runs(machines, [folder])
+    rows = {one["file"].rpartition("/")[2]: one for one in runs.rows()["runs"]}
+    assert "no header" in rows["bad.jsonl"]["problem"]
+    row = rows["one.jsonl"]
+    whole = run_row(chain(), failed())
+    assert {one: row[one] for one in whole} == {**whole, "robots": [], "reason": "", "strip": []}
+    assert row["problem"] == ""
+    machine = machines.get(runs.open(row["id"]))
+    assert machine.events() == failed()[-2:]
+    assert json.loads(machine.snapshot()[1])["base"]["states"]["/JOB/A"]["visits"] == 1
+
+
+def test_the_list_does_not_wait_for_a_recording_that_is_being_opened(folder, monkeypatch):
+    real = runs_module.read_for_page
+    machines = Machines()
+    runs = Runs(machines, [folder])
+
+    def look(path):
+        assert not runs._lock.locked()
+        assert machines.summaries() == []
+        return real(path)
+
+    monkeypatch.setattr(runs_module, "read_for_page", look)
+    machine = machines.get(runs.open(f"file {folder / 'one.jsonl'}"))
+    assert machines.changed_since(0)[1] == [machine.summary()]
 
 
 def test_what_is_listed_can_be_opened_and_nothing_else(folder, tmp_path_factory, monkeypatch):

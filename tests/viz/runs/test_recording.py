@@ -36,8 +36,10 @@ from smachpy.events.recording import (
     recording_lines,
 )
 from smachpy.events.run_state import RunState
-from smachpy_viz.live import machines
+from smachpy_viz.live import kept, machines
+from smachpy_viz.live.machine_routes import _export_recording
 from smachpy_viz.live.machines import Machine, Machines
+from smachpy_viz.model.why import why
 from smachpy_viz.runs import html, pruning
 from smachpy_viz.runs.html import standalone_page
 from smachpy_viz.runs.statistics import (
@@ -530,6 +532,56 @@ def test_of_a_large_recording_the_page_has_the_newest_events_and_says_so(
     for event in events[:-4]:
         before.fold(event)
     assert page["snap"]["base"] == json.loads(json.dumps(before.data))
+
+
+def test_a_large_recording_is_shown_without_holding_its_events(record, monkeypatch):
+    path = record("run.jsonl", failing=True)
+    lines = path.read_text().splitlines(keepends=True)
+    pose = {
+        "kind": "Observed",
+        "path": "",
+        "stamp_ns": 1,
+        "robot": "",
+        "what": "of a newer program",
+    }
+    path.write_text("".join([lines[0], *[json.dumps(pose) + "\n"] * 40, *lines[1:]]))
+    whole = Machine("run", lambda _machine: None)
+    whole.load(read_recording(path))
+    monkeypatch.setattr(kept, "PACKED", 200)
+    monkeypatch.setattr(recording_module, "STREAMED", 10)
+    monkeypatch.setattr(recording_module, "_read", None)  # nothing is read whole
+    machine = Machines().load("run", read_recording(path, stream=True))
+    assert isinstance(machine.events(), kept.Packed)
+    seq, text = machine.snapshot()
+    assert (seq, json.loads(text)) == (whole.seq, json.loads(whole.snapshot()[1]))
+    assert list(machine.events()) == list(machine.events()) == whole.events()
+    assert machine.observed() == whole.observed() != []
+    assert ",".join(machine.observed_since(0)) == ",".join(whole.observed_since(0))
+    assert machine.newest_observed("of a newer program", 30) == whole.newest_observed(
+        "of a newer program", 30
+    )
+    assert machine.newest_events("", 1_000) == whole.events()
+    assert machine.row() == whole.row()
+    assert (machine.since(seq), machine.since(seq - 1)) == ([], whole.since(seq - 1))
+    assert machine.since(0) is None  # a page that lacks them gets a snapshot
+    assert _export_recording(machine, machine.record, "", []) == _export_recording(
+        whole, whole.record, "", []
+    )
+
+
+def test_a_page_saved_from_the_viewer_has_the_newest_events(record, monkeypatch):
+    machine = Machine("run", lambda _machine: None)
+    machine.load(read_recording(record("run.jsonl", failing=True)))
+    monkeypatch.setattr(html, "MOST_EVENTS", 4)
+    [data] = re.findall('id="run-data">([^<]*)<', html.page_of(machine, machine.record))
+    page = json.loads(gzip.decompress(base64.b64decode(data)))
+    assert page["snap"]["events"] == machine.events()[-4:]
+    assert page["snap"]["seq"] == machine.seq
+    before = RunState()
+    for event in machine.events()[:-4]:
+        before.fold(event)
+    assert page["snap"]["base"] == json.loads(json.dumps(before.data))
+    assert page["why"]["text"] == why(machine.record, machine.events()).text()
 
 
 def test_of_many_records_of_topics_the_newest_are_read_and_each_newest_map(record):
@@ -1174,7 +1226,8 @@ def test_files_of_one_name_are_two_machines(record, tmp_path):
         record("1.jsonl").rename(tmp_path / folder / "1.jsonl")
     record("2.jsonl")
     machines = Machines()
-    _load(machines, [str(tmp_path / "a"), str(tmp_path / "b/1.jsonl"), str(tmp_path / "2.jsonl")])
+    files = [str(tmp_path / "a"), str(tmp_path / "b/1.jsonl"), str(tmp_path / "2.jsonl")]
+    _load(machines, files, terminal=False)
     names = [one["name"] for one in machines.summaries()]
     assert names == [str(tmp_path / "a/1.jsonl"), str(tmp_path / "b/1.jsonl"), "2.jsonl"]
 

@@ -150,7 +150,7 @@ def _run(args: argparse.Namespace) -> int:
 
     # Files first: errors in them should not wait for the network.
     machines = Machines(None if args.map is None else read_floor(args.map))
-    _load(machines, args.files)
+    _load(machines, args.files, terminal=args.tui)
     runs = StatisticsOfFiles(args.runs)
     with ros2_of_options(args):
         node = get_node()
@@ -278,15 +278,20 @@ def private_runs(node: Node, parts: Sequence[Network | Actions]) -> Iterator[Non
         executor.join(LEAVE_S)
 
 
-def _load(machines: Machines, files: list[str]) -> None:
+def _load(machines: Machines, files: list[str], *, terminal: bool) -> None:
     from smachpy.events.recording import find_recordings, read_recording
+    from smachpy_viz.live.runs import read_for_page
+    from smachpy_viz.runs.html import MOST_EVENTS
 
     # Files of the same name in several folders are shown by their paths.
     paths = list(dict.fromkeys(find_recordings(files)))
     names = [path.name for path in paths]
     for path in paths:
-        machine = machines.obtain(path.name if names.count(path.name) == 1 else str(path))
-        machine.load(read_recording(path))
+        name = path.name if names.count(path.name) == 1 else str(path)
+        if terminal:  # which goes through the events again and again
+            machines.obtain(name).load(read_recording(path, newest=MOST_EVENTS))
+        else:
+            machines.load(name, read_for_page(path))
 
 
 def _end_with_parent(server: Any) -> None:

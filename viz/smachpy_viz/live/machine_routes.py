@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 from typing import TYPE_CHECKING, Any, Final
 
 from starlette.concurrency import run_in_threadpool
@@ -181,7 +182,9 @@ def _export_recording(
     from smachpy.events.recording import recording_lines
 
     base, events = machine.history()
-    return "".join(recording_lines(record, events, base, machine.observed())).encode()
+    file = io.BytesIO()  # a list of all lines would take several times as much memory
+    file.writelines(map(str.encode, recording_lines(record, events, base, machine.observed())))
+    return file.getvalue()
 
 
 EXPORTS: Final = {

@@ -7,7 +7,6 @@ import json
 import logging
 import threading
 import uuid
-from collections import deque
 from dataclasses import asdict
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -16,13 +15,14 @@ from actionlib_core.inputs.checked_data import checked
 from smachpy.events import record_text
 from smachpy.events.introspection import StateRecord
 from smachpy.events.run_state import RunState, innermost
+from smachpy_viz.live.kept import Kept, with_commas
 from smachpy_viz.model.labels import shorten
 from smachpy_viz.model.progress import progress_of
 from smachpy_viz.model.why import newest_run
 from smachpy_viz.runs.listing import RowFold, first_cause
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from smachpy.events.recording import Recording
     from smachpy_viz.runs.notes import RunNote
@@ -144,16 +144,13 @@ class Machine:
         self._now = RunState()
         self._row: RowFold | None = None  # of the newest run; None until it is made from the events
         self._cause: tuple[int, str] = (-1, "")  # number of the last event then, and the cause
-        # Number, record and JSON text; the text is made once for all pages.
-        self._events: deque[tuple[int, dict[str, Any], str]] = deque()
-        self._bytes = 0
+        self._events = Kept()
         self._seq = 0
         self._folded = 0
-        self._observed: deque[tuple[int, dict[str, Any], str]] = deque()
+        self._observed = Kept()
         # The newest map of each robot: it is published once and must outlive the bounded records.
         self._maps: dict[str, tuple[int, dict[str, Any], str]] = {}
         self._observed_seq = 0
-        self._observed_bytes = 0
 
     @property
     def observed_seq(self) -> int:
@@ -165,14 +162,27 @@ class Machine:
         """Number of the newest event."""
         return self._seq
 
-    def load(self, recording: Recording) -> None:
-        """Show a recording, with all of its events."""
+    def load(self, recording: Recording, *, packs: bool = False) -> None:
+        """Show a recording, with all of its events.
+
+        Args:
+            recording: The recording; its events may be read from the file one by one.
+            packs: Whether they take a tenth of the memory; then it takes long to find one of them.
+        """
         self.recorded, self.file = True, str(recording.path)
         self.date_shift = recording.made_ns - recording.stamp_ns
-        self.reset(recording.history(), limit=len(recording.events) + 1)
+        self.reset(recording.history(), packs=packs)
 
-    def reset(self, history: dict[str, Any], *, limit: int = MAX_KEPT_EVENTS) -> None:
-        """Replace everything by a history that was checked, from the network or a file."""
+    def reset(
+        self, history: dict[str, Any], *, limit: int = MAX_KEPT_EVENTS, packs: bool = False
+    ) -> None:
+        """Replace everything by a history that was checked, from the network or a file.
+
+        Args:
+            history: As a server sends it.
+            limit: The most events of a live machine that are kept.
+            packs: As for `load`.
+        """
         described = history["description"]
         if not isinstance(described, StateRecord):
             described = checked(StateRecord, described)
@@ -182,7 +192,10 @@ class Machine:
         # machine of its own.
         if str(history["epoch"]) != self.epoch:
             same_run = bool(self.run) and history.get("run") == self.run
-            self._earlier = self.history() if same_run and _begins_in_the_middle(history) else None
+            self._earlier = None
+            if same_run and _begins_in_the_middle(history):
+                before, kept = self.history()
+                self._earlier = before, list(kept)
             if not same_run and self._now.data["started"] is not None:
                 self.before = self._keep(self._split_off()) or self.before
             if not same_run:
@@ -203,16 +216,16 @@ class Machine:
             # Two deep copies: folding an event changes the data in place.
             self._base = RunState(json.loads(json.dumps(base)) if base else None)
             self._now = RunState(json.loads(json.dumps(base)) if base else None)
-            self._events.clear()
+            self._events = Kept(packs=packs)
             self._row, self._cause = RowFold(record), (-1, "")
-            self._bytes = self._seq = self._folded = 0
-            if events:  # events that the machine dropped before the first one are not missing
-                self._folded = events[0]["seq"] - events[0].get("dropped", 0) - 1
+            self._seq = self._folded = 0
             for event in events:
+                if not self._seq:  # events that the machine dropped before it are not missing
+                    self._folded = event["seq"] - event.get("dropped", 0) - 1
                 self._append(event, limit)
-            self._observed.clear()
+            self._observed = Kept(packs=packs)
             self._maps.clear()
-            self._observed_seq = self._observed_bytes = 0
+            self._observed_seq = 0
             self._observe(history.get("observed") or ())
         self._on_change(self)
 
@@ -228,13 +241,13 @@ class Machine:
             kept.recorded, kept.node, kept.epoch = True, self.node, f"kept {self.epoch}"
             kept.run, kept.notes = self.run, self.notes
             kept.before, kept.after = self.before, self.name
-            kept._base, kept._now, kept._bytes = self._base, self._now, self._bytes
+            kept._base, kept._now = self._base, self._now
             kept._seq, kept._folded = self._seq, self._folded
-            kept._events, self._events = self._events, deque()
+            kept._events, self._events = self._events, Kept()
             self._row = None
-            kept._observed, self._observed = self._observed, deque()
+            kept._observed, self._observed = self._observed, Kept()
             kept._maps, self._maps = self._maps, {}
-            kept._observed_seq, kept._observed_bytes = self._observed_seq, self._observed_bytes
+            kept._observed_seq = self._observed_seq
         return kept
 
     def describe(self, record: StateRecord) -> None:
@@ -257,7 +270,7 @@ class Machine:
                     continue
                 if record["seq"] - record.get("dropped", 0) > self._seq + 1:
                     return False
-                self._append(record, MAX_KEPT_EVENTS)
+                self._append(record)
         self._on_change(self)
         return True
 
@@ -272,41 +285,38 @@ class Machine:
             if record["n"] <= self._observed_seq:
                 continue
             self._observed_seq = record["n"]
-            text = record_text(record)
-            entry = record["n"], record, text
+            entry = record["n"], record, record_text(record)
             robot = record["robot"]
             if record["what"] == "map" and (robot in self._maps or len(self._maps) < MAX_ROBOTS):
                 self._maps[robot] = entry
-            self._observed.append(entry)
-            self._observed_bytes += len(text)
+            self._observed.append(*entry)
             while not self.recorded and (
-                len(self._observed) > MAX_KEPT_OBSERVATIONS or self._observed_bytes > self._budget()
+                len(self._observed) > MAX_KEPT_OBSERVATIONS or self._observed.size > self._budget()
             ):
-                self._observed_bytes -= len(self._observed.popleft()[2])
+                self._observed.popleft()
 
     def observed(self) -> list[dict[str, Any]]:
         """Return the kept records of robot topics, oldest first."""
         with self._lock:
-            return [record for _, record, _ in self._all_observed()]
+            return [*(record for _, record, _ in self._old_maps()), *self._observed.records()]
 
-    def observed_since(self, seq: int) -> list[str]:
-        """Return the kept records of robot topics after number `seq`, as JSON texts."""
-        # From the end: a page usually lacks only the newest records of thousands.
+    def observed_since(self, seq: int) -> Iterable[str]:
+        """Return the kept records of robot topics after number `seq`, as texts of JSON.
+
+        Each has one or several records, with commas between these.
+        """
         with self._lock:
-            if seq <= 0:
-                return [text for _, _, text in self._all_observed()]
-            newer = itertools.takewhile(lambda one: one[0] > seq, reversed(self._observed))
-            texts = [text for _, _, text in newer]
-        texts.reverse()
-        return texts
+            newer = self._observed.after(seq) if seq > 0 else None
+            if newer is not None:
+                return newer
+            maps = [text for _, _, text in self._old_maps()]
+            return itertools.chain(maps, self._observed.parts())
 
-    def _all_observed(self) -> list[tuple[int, dict[str, Any], str]]:
-        # Newest maps that are no longer among the kept records come before them.
-        first = self._observed[0][0] if self._observed else 0
-        maps = [one for one in self._maps.values() if one[0] < first]
+    def _old_maps(self) -> list[tuple[int, dict[str, Any], str]]:
+        """Return the newest maps that are no longer among the kept records; they come first."""
         if self._floor is not None and not self._maps:
-            maps = [(0, self._floor, record_text(self._floor))]
-        return [*maps, *self._observed]
+            return [(0, self._floor, record_text(self._floor))]
+        return [one for one in self._maps.values() if one[0] < self._observed.oldest]
 
     def refuse(self, sender: str, problems: Sequence[str]) -> None:
         """Count messages, or parts of them, that were left out because they were wrong."""
@@ -341,10 +351,7 @@ class Machine:
         with self._lock:
             if not self._folded <= seq <= self._seq:
                 return None
-            newer = itertools.takewhile(lambda one: one[0] > seq, reversed(self._events))
-            texts = [text for _, _, text in newer]
-        texts.reverse()
-        return texts
+            return self._events.after(seq)
 
     def snapshot(self, *, short: bool = False) -> tuple[int, str]:
         """Return the newest event's number and everything a new page needs, as JSON.
@@ -352,24 +359,30 @@ class Machine:
         Args:
             short: Leave out the events, for pages that are too far behind.
         """
+        seq, parts = self.snapshot_parts(short=short)
+        return seq, "".join(parts)
+
+    def snapshot_parts(self, *, short: bool = False) -> tuple[int, Iterator[str]]:
+        """Return the number and the parts of the text that `snapshot` returns."""
         with self._lock:
             base = json.dumps((self._now if short else self._base).data)
-            texts = [] if short else [text for _, _, text in self._events]
+            events = iter(()) if short else self._events.parts()
             seq = self._seq
             head = json.dumps({**self._facts(), "seq": seq, "problems": self.problems})
-        # The events are JSON already; they are joined outside the lock, which `add` needs.
-        return seq, f'{head[:-1]}, "base": {base}, "events": [{", ".join(texts)}]}}'
+        return seq, itertools.chain(
+            [f'{head[:-1]}, "base": {base}, "events": ['], with_commas(events), ["]}"]
+        )
 
-    def events(self) -> list[dict[str, Any]]:
-        """Return the kept events."""
+    def events(self) -> Iterable[dict[str, Any]]:
+        """Return the kept events, a list unless they are packed; it can be iterated repeatedly."""
         with self._lock:
-            return self._kept()
+            return self._events.records()
 
-    def history(self) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    def history(self) -> tuple[dict[str, Any], Iterable[dict[str, Any]]]:
         """Return a copy of the state before the kept events, and these events, consistently."""
         with self._lock:
             copy: dict[str, Any] = json.loads(json.dumps(self._base.data))
-            return copy, [record for _, record, _ in self._events]
+            return copy, self._events.records()
 
     def active(self) -> list[str]:
         """Return the paths of the running states."""
@@ -429,7 +442,7 @@ class Machine:
             self._row = None
             self.revision += 1
 
-    def _append(self, record: dict[str, Any], limit: int) -> None:
+    def _append(self, record: dict[str, Any], limit: int = MAX_KEPT_EVENTS) -> None:
         self._seq = record["seq"]
         if not self.recorded and (full := self._full_for(record)):
             self.refused += 1
@@ -438,13 +451,12 @@ class Machine:
         record = with_progress(record, self._now.data["goals"])
         self._now.fold(record)
         self._fold_row(record)
-        text = record_text(record)
-        self._events.append((self._seq, record, text))
-        self._bytes += len(text)
+        self._events.append(self._seq, record, record_text(record))
         # The oldest events move from the queue into the base, so base and queue make up the run.
-        while len(self._events) > limit or (self._bytes > self._budget() and not self.recorded):
-            self._folded, old, text = self._events.popleft()
-            self._bytes -= len(text)
+        while not self.recorded and (
+            len(self._events) > limit or self._events.size > self._budget()
+        ):
+            self._folded, old = self._events.popleft()
             self._base.fold(old)
 
     def _fold_row(self, record: dict[str, Any]) -> None:
@@ -464,30 +476,28 @@ class Machine:
             assert record is not None
             if self._row is None:
                 self._row = RowFold(record)
-                for event in newest_run(self._kept(), record.path):
+                for event in newest_run(list(self._events.records()), record.path):
                     self._row.add(event)
 
             def cause() -> str:
                 if self._cause[0] != self._seq:
-                    self._cause = self._seq, first_cause(record, self._kept())
+                    self._cause = self._seq, first_cause(record, self._events.records())
                 return self._cause[1]
 
             return self._row.row(cause)
 
-    def _kept(self) -> list[dict[str, Any]]:
-        return [record for _, record, _ in self._events]
-
     def newest_events(self, prefix: str, most: int) -> list[dict[str, Any]]:
         """Return the newest kept events whose kind begins with `prefix`, oldest first."""
         with self._lock:
-            kinds = (one for _, one, _ in reversed(self._events) if one["kind"].startswith(prefix))
+            kinds = (one for one in self._events.reversed() if one["kind"].startswith(prefix))
             return list(itertools.islice(kinds, most))[::-1]
 
     def newest_observed(self, what: str, most: int) -> list[dict[str, Any]]:
         """Return the newest kept records of robot topics of one kind, oldest first."""
         with self._lock:
-            records = (one for _, one, _ in reversed(self._all_observed()) if one["what"] == what)
-            return list(itertools.islice(records, most))[::-1]
+            old = (record for _, record, _ in reversed(self._old_maps()))
+            records = itertools.chain(self._observed.reversed(), old)
+            return list(itertools.islice((r for r in records if r["what"] == what), most))[::-1]
 
     def _full_for(self, record: dict[str, Any]) -> str:
         """Return why there is no room for what an event adds for good; "" if there is."""
@@ -507,7 +517,8 @@ def _begins_in_the_middle(history: dict[str, Any]) -> bool:
     """Return whether a server knows only its own part of a run that another process began."""
     base, events = history.get("base"), history["events"]
     is_first = not base or base["started"] is None
-    return is_first and bool(events) and bool(events[0]["kind"] == "Recovered")
+    first = next(iter(events), None)
+    return is_first and first is not None and bool(first["kind"] == "Recovered")
 
 
 def with_progress(record: dict[str, Any], goals: dict[str, Any]) -> dict[str, Any]:
@@ -581,6 +592,21 @@ class Machines:
             self._machines[machine.name] = machine
             self._count_change(machine)
         return machine.name
+
+    def load(self, name: str, recording: Recording) -> Machine:
+        """Show a recording under a name, in place of what was shown there; return its machine."""
+
+        def on_change(machine: Machine) -> None:
+            if self._machines.get(name) is machine:
+                self._changed(machine)
+
+        # Others look at it when it is complete: a large recording takes long.
+        machine = Machine(name, on_change, self._keep, self._floor, self._budget)
+        machine.load(recording, packs=True)
+        with self._lock:
+            self._machines[name] = machine
+        self._changed(machine)
+        return machine
 
     def forget(self, name: str) -> None:
         """Remove a machine."""

@@ -16,9 +16,8 @@ from actionlib_core.clock import RealClock
 from actionlib_core.inputs.checked_file import read_limited
 from actionlib_core.process.private_files import open_private
 from smachpy.command import EXIT_ERROR
-from smachpy.events.recording import read_recording
 from smachpy.exceptions import SmachError
-from smachpy_viz.live.runs import AGAIN
+from smachpy_viz.live.runs import AGAIN, read_for_page
 from smachpy_viz.live.started_commands import (
     STOP_S,
     end_all,
@@ -272,8 +271,7 @@ class Reproductions:
             },
         )
         if found.kind != "failed":
-            machine = self._machines.obtain(one.machine)
-            machine.load(read_recording(one.output))
+            self._machines.load(one.machine, read_for_page(one.output))
             found.machine = one.machine
         return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import deque
 from typing import TYPE_CHECKING, Final
 
 from starlette.concurrency import run_in_threadpool
@@ -65,9 +66,13 @@ class RunRoutes:
         machine = machine_of(request, self._runs.machines)
         assert machine.record is not None
         from smachpy_viz.runs.good_runs import compare_with_good
+        from smachpy_viz.runs.html import MOST_EVENTS
 
         good = self._runs.good(machine.name)
-        found = await run_in_threadpool(compare_with_good, machine.record, machine.events(), good)
+        record, events = machine.record, machine.events()
+        found = await run_in_threadpool(
+            lambda: compare_with_good(record, list(deque(events, MOST_EVENTS)), good)
+        )
         return Json(found.to_json())
 
     async def _open(self, request: Request) -> Response:

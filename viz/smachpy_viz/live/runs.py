@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import itertools
 import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from smachpy.events.recording import RecordingError, read_recording
+from smachpy.events.recording import RecordingError, has_end, read_recording, read_summary
 from smachpy.exceptions import MissionError
-from smachpy_viz.runs.listing import run_row
+from smachpy_viz.runs.html import MOST_EVENTS
+from smachpy_viz.runs.listing import run_row, summary_row
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from smachpy.events.introspection import StateRecord
+    from smachpy.events.recording import Recording, Summary
     from smachpy_viz.live.journals import Journals
     from smachpy_viz.live.machines import Machines
 
@@ -50,7 +53,13 @@ LARGEST_GOOD: Final = 20_000_000
 """Largest recording among them [bytes]."""
 
 LARGEST: Final = 200_000_000
-"""Largest recording that is read [bytes]."""
+"""Largest recording that is shown as a whole: a browser gets it as one text [bytes]."""
+
+LONG: Final = 20_000_000
+"""A recording of more bytes that is being written is read again for its row after a rest."""
+
+REST: Final = 20.0
+"""The rest, as a multiple of the time that reading took."""
 
 
 class Runs:
@@ -77,8 +86,10 @@ class Runs:
         self._journals = journals
         self._folders = list(dict.fromkeys(folders))
         self._lock = threading.Lock()
-        # Rows of files, with the time and size by which a change is noticed.
-        self._rows: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
+        # Rows of files, with the time and size by which a change is noticed, and the end of the
+        # rest.
+        self._rows: dict[Path, tuple[tuple[int, int], dict[str, Any], float]] = {}
+        self._opening = threading.Lock()
         # Names of machines with the same of their files, in the order of their opening.
         self._opened: dict[str, tuple[int, int]] = {}
 
@@ -175,7 +186,7 @@ class Runs:
         if kind == "machine" and self.machines.get(name) is not None:
             return name
         path = Path(name)
-        with self._lock:
+        with self._opening:  # the list of runs does not wait for it
             files = self._files()
             # Only files that are listed: a page must not read any other file of this computer.
             if kind != "file" or path not in files:
@@ -187,14 +198,16 @@ class Runs:
                 shown = f"run {path}"
             stamp = _stamp_of(path)
             if self.machines.get(shown) is None or self._opened.get(shown) != stamp:
-                recording = read_recording(path)
-                self.machines.obtain(shown).load(recording)
-            self._opened.pop(shown, None)  # moved to the end: the most recently used
-            self._opened[shown] = stamp
-            while len(self._opened) > MAX_OPEN_RECORDINGS:
-                oldest = next(iter(self._opened))
-                del self._opened[oldest]
-                self.machines.forget(oldest)
+                recording = read_for_page(path)
+                self._opened.setdefault(shown, stamp)  # before it is known: it is no live machine
+                self.machines.load(shown, recording)
+            with self._lock:
+                self._opened.pop(shown, None)  # moved to the end: the most recently used
+                self._opened[shown] = stamp
+                while len(self._opened) > MAX_OPEN_RECORDINGS:
+                    oldest = next(iter(self._opened))
+                    del self._opened[oldest]
+                    self.machines.forget(oldest)
         return shown
 
     def file_of(self, name: str) -> Path | None:
@@ -300,10 +313,14 @@ class Runs:
 
     def _row_of_file(self, path: Path) -> dict[str, Any]:
         stamp = _stamp_of(path)
-        known = self._rows.get(path)
-        if known is None or known[0] != stamp:
-            known = self._rows[path] = stamp, _read_row(path, stamp[1])
-        return known[1]
+        known, now = self._rows.get(path), time.monotonic()
+        if known is not None and (
+            stamp == known[0] or (stamp[1] > LONG and now < known[2] and not has_end(path))
+        ):
+            return known[1]
+        row = _read_row(path, stamp[1])
+        self._rows[path] = stamp, row, now + REST * (time.monotonic() - now)
+        return row
 
 
 def _stamp_of(path: Path) -> tuple[int, int]:
@@ -313,6 +330,16 @@ def _stamp_of(path: Path) -> tuple[int, int]:
     except OSError:
         return 0, 0
     return facts.st_mtime_ns, facts.st_size
+
+
+def read_for_page(path: Path) -> Recording:
+    """Return a recording for a page, to be read event by event; the newest ones of a huge one.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    is_whole = _stamp_of(path)[1] <= LARGEST
+    return read_recording(path, stream=is_whole, newest=None if is_whole else MOST_EVENTS)
 
 
 def with_missions(
@@ -368,19 +395,19 @@ def _dated(row: dict[str, Any], shift: int) -> dict[str, Any]:
 
 
 def _read_row(path: Path, size: int) -> dict[str, Any]:
+    read: Summary | Recording
     row: dict[str, Any] = {"id": f"file {path}", "name": None, "live": False, "file": str(path)}
     row |= {"run": "", "mission": None, "asks": False}
-    problem = f"got {size} bytes; expected at most {LARGEST}" if size > LARGEST else ""
-    if not problem:
-        try:
-            recording = read_recording(path)
-        except RecordingError as error:
-            problem = str(error)
+    try:
+        if size > LARGEST:
+            summary = read_summary(path)
+            read, listed = summary, summary_row(summary)
         else:
-            row["run"] = recording.run
-            listed = run_row(recording.record, recording.events)
-            shift = recording.made_ns - recording.stamp_ns
-            return {**row, **_dated(listed, shift), "problem": ""}
-    row |= dict.fromkeys(("began", "ended", "last", "stamp", "outcome"))
-    row |= {"machine": path.stem, "robots": [], "reason": "", "strip": [], "outages": []}
-    return {**row, "problem": problem}
+            recording = read_recording(path, stream=True)
+            read, listed = recording, run_row(recording.record, recording.events)
+    except RecordingError as error:
+        row |= dict.fromkeys(("began", "ended", "last", "stamp", "outcome"))
+        row |= {"machine": path.stem, "robots": [], "reason": "", "strip": [], "outages": []}
+        return {**row, "problem": str(error)}
+    dated = _dated(listed, read.made_ns - read.stamp_ns)
+    return {**row, **dated, "run": read.run, "problem": ""}

@@ -15,21 +15,23 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import json
 import math
 import re
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from urllib.parse import quote, unquote
 
 from starlette.responses import Response
 from starlette.routing import Route
 
 from smachpy_viz.live.answers import RequestError
+from smachpy_viz.live.kept import with_commas
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Iterable, Iterator
 
     from starlette.requests import Request
     from starlette.types import Receive, Scope, Send
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
     from smachpy_viz.live.actions import Actions
     from smachpy_viz.live.machines import Machine, Machines
     from smachpy_viz.live.security import Access
+
+    Message: TypeAlias = str | Iterator[str]
+    """A message as text, or a long one in parts."""
 
 COALESCE_S: Final = 0.004
 """Time to wait for further events before a message, besides that of the link [s]."""
@@ -54,7 +59,10 @@ BEAT_S: Final = 2.0
 """Longest time between two beats; without them the page considers the server lost [s]."""
 
 SEND_S: Final = 30.0
-"""Time in which a page must take a message [s]."""
+"""Time in which a page must take a message, or a part of a long one [s]."""
+
+SENT_AT_ONCE: Final = 256_000
+"""About the longest part of a message [characters]."""
 
 MAX_LAG_EVENTS: Final = 3_000
 """A page that is more events behind than this gets a snapshot."""
@@ -223,7 +231,7 @@ class Followed:
         waits = self._observed != machine.observed_seq
         return max(0.0, self._observed_sent + OBSERVED_S - now) if waits else math.inf
 
-    def update(self, machine: Machine, now: float) -> Iterator[str]:
+    def update(self, machine: Machine, now: float) -> Iterator[Message]:
         """Yield the messages with what is new of the machine."""
         if machine.version != self._version:
             self._version = machine.version
@@ -231,18 +239,18 @@ class Followed:
         if self.observed_due(machine, now) <= 0:
             texts = machine.observed_since(self._observed)
             self._observed, self._observed_sent = machine.observed_seq, now
-            name = json.dumps(machine.name)
-            yield f'event: observed\ndata: {{"name":{name},"records":[{",".join(texts)}]}}\n\n'
+            head = f'event: observed\ndata: {{"name":{json.dumps(machine.name)},"records":['
+            yield itertools.chain([head], with_commas(texts), ["]}\n\n"])
 
-    def _events(self, machine: Machine) -> Iterator[str]:
+    def _events(self, machine: Machine) -> Iterator[Message]:
         # A snapshot for a new page, another program or a page too far behind; else the new events.
         behind = machine.since(self._seq) if machine.epoch == self._epoch else None
         if behind is None or len(behind) > MAX_LAG_EVENTS:
             missed, before = behind is not None, self._seq
             self._epoch = machine.epoch
             self._observed, self._observed_sent = -1, -math.inf
-            self._seq, snap = machine.snapshot(short=missed)
-            yield f"event: snap\ndata: {snap}\n\n"
+            self._seq, snap = machine.snapshot_parts(short=missed)
+            yield itertools.chain(["event: snap\ndata: "], snap, ["\n\n"])
             if missed:
                 yield _message("gap", {"name": machine.name, "missed": self._seq - before})
             behind = []
@@ -300,11 +308,12 @@ class Stream:
             # Cleared before looking: a change from now on ends the wait below at once.
             self.news.clear()
             now = loop.time()
-            parts = [*self._list(now), *self._machine_messages(now), *self._others(now)]
-            if parts:
+            found = [*self._list(now), *self._machine_messages(now), *self._others(now)]
+            if found:
                 # At the last one: a browser that reconnects between two of them lacks the others.
                 ids = " ".join(one.id for one in self._followed)
-                yield f"{''.join(parts[:-1])}id: {ids}\n{parts[-1]}"
+                for text in _texts([*found[:-1], f"id: {ids}\n", found[-1]]):
+                    yield text
             # Wait for a change or until something is due; after a change, a little for others.
             try:
                 async with asyncio.timeout(max(self._due(now), COALESCE_S)):
@@ -313,7 +322,7 @@ class Stream:
                 continue
             await asyncio.sleep(COALESCE_S)
 
-    def _machine_messages(self, now: float) -> Iterator[str]:
+    def _machine_messages(self, now: float) -> Iterator[Message]:
         for one in self._followed:
             machine = self._machines.get(one.name) if one.name else self._machines.first()
             if machine is None or machine.record is None:
@@ -395,6 +404,19 @@ class EventStream(Response):
 async def _left(receive: Receive) -> None:
     while (await receive())["type"] != "http.disconnect":
         pass
+
+
+def _texts(messages: Iterable[Message]) -> Iterator[str]:
+    """Yield short messages together, and long ones in parts that are made when they are sent."""
+    text = ""
+    for one in messages:
+        for part in (one,) if isinstance(one, str) else one:
+            text += part
+            if len(text) > SENT_AT_ONCE:
+                yield text
+                text = ""
+    if text:
+        yield text
 
 
 def _message(name: str, data: Any) -> str:

@@ -153,7 +153,7 @@ class MissionApp(App[None]):
             self._begin(machine, machine.record)
         self._catch_up(machine)
         self._draw_status(machine)
-        events = machine.events()
+        events = list(machine.events())
         ended = (machine.stale is not None or machine.recorded) and events
         if self._until is not None:
             events = [event for event in events if event["seq"] <= self._until]
@@ -184,7 +184,8 @@ class MissionApp(App[None]):
 
     def _refold(self, machine: Machine) -> None:
         """Fold all events of the machine from the beginning."""
-        base, events = machine.history()
+        base, kept = machine.history()
+        events = list(kept)
         self._state, self._seq = RunState(base), 0
         self._mark = 0, ""
         self._fold(events)
@@ -193,8 +194,8 @@ class MissionApp(App[None]):
 
     def _look_back(self, machine: Machine, until: int) -> None:
         """Show the state after event `until`; fold from the mark if it is before that event."""
-        base, events = machine.history()
-        events = [event for event in events if event["seq"] <= until]
+        base, kept = machine.history()
+        events = [event for event in kept if event["seq"] <= until]
         number, text = self._mark
         at = sum(event["seq"] <= number for event in events)
         if at and events[at - 1]["seq"] == number:
@@ -402,7 +403,7 @@ class MissionApp(App[None]):
         if machine is None or machine.record is None:
             return
         here = self._seq if self._until is None else self._until
-        events = machine.events()
+        events = list(machine.events())
         numbers = [event["seq"] for event in events]
         # The neighbour by number, as numbers have gaps where events were dropped.
         to = (

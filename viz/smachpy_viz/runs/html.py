@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from collections import deque
+from typing import TYPE_CHECKING, Any, Final
 
 from smachpy.events.recording import Streamed
+from smachpy.events.run_state import RunState
 from smachpy_viz.live import assets
 from smachpy_viz.live.machines import Machine
 from smachpy_viz.model.why import why
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from smachpy.events.recording import Recording
     from smachpy_viz.runs.notes import RunNote
 
-MOST_EVENTS = 100_000
+MOST_EVENTS: Final = 100_000
 """The most events in a page; of those before them it has the counts and newest values."""
 
 
@@ -57,7 +59,7 @@ def page_of(
     notes: Sequence[RunNote] = (),
     events: Iterable[dict[str, Any]] | None = None,
 ) -> str:
-    """Return the page of a machine as it is now.
+    """Return the page of a machine as it is now, with its newest events.
 
     Args:
         machine: The machine.
@@ -67,9 +69,16 @@ def page_of(
         notes: The notes that all pages share.
         events: The events that explain its end; None: those that it has kept.
     """
+    base, kept = machine.history()
+    before, newest = RunState(base), deque[dict[str, Any]]()
+    for event in kept:
+        newest.append(event)
+        if len(newest) > MOST_EVENTS:
+            before.fold(newest.popleft())
+    facts = json.loads(machine.snapshot(short=True)[1])
     run = {
         "model": assets.model(record),
-        "snap": json.loads(machine.snapshot()[1]),
+        "snap": {**facts, "base": before.data, "events": list(newest)},
         "observed": machine.observed(),
         "statistics": statistics,
         "view": view,

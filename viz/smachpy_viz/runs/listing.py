@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from smachpy.events.introspection import StateRecord
+    from smachpy.events.recording import Summary
 
     _Piece: TypeAlias = tuple[int, str, float, float | None, str]
 
@@ -34,15 +35,42 @@ MAX_CELL_LENGTH: Final = 160
 _ENDS: Final = frozenset({"Left", "Failed", "Finished"})
 
 
-def run_row(record: StateRecord, events: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the row for the newest run in `events`; see `RowFold.row`."""
+def run_row(record: StateRecord, events: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """Return the row for the newest run in `events`, which are iterated again for some rows.
+
+    See `RowFold.row`.
+    """
     fold = RowFold(record)
-    for event in newest_run(events, record.path):
+    for event in events:
+        if event["path"] == record.path and event["kind"] == "Started":
+            fold = RowFold(record)
+        elif event["path"] == record.path and event["kind"] == "Recovered":
+            # Ends that states got only because a process ended are left out.
+            fold = RowFold(record)
+            for one in newest_run(list(events), record.path):
+                fold.add(one)
+            break
         fold.add(event)
     return fold.row(lambda: first_cause(record, events))
 
 
-def first_cause(record: StateRecord, events: Sequence[dict[str, Any]]) -> str:
+def summary_row(summary: Summary) -> dict[str, Any]:
+    """Return the row of a recording that is not read, without robots, reason and strip."""
+    began, last = summary.first_ns, summary.last_ns
+    return {
+        "machine": summary.machine,
+        "robots": [],
+        "began": began,
+        "ended": None if summary.outcome is None else last,
+        "last": last,
+        "outcome": summary.outcome,
+        "reason": "",
+        "strip": [],
+        "outages": spans_after(began, summary.outages),
+    }
+
+
+def first_cause(record: StateRecord, events: Iterable[dict[str, Any]]) -> str:
     """Return the first cause of the end of the newest run, or ""."""
     steps = why(record, events).steps
     if not steps:
