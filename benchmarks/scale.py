@@ -93,7 +93,7 @@ class Cost:
 
         self._store._do = counted
         self._begun = time.perf_counter()
-        self._counts = hasattr(self._store._connection, "set_progress_handler")
+        self._counts = counts_steps(self._store)
         if self._counts:
             self._store._connection.set_progress_handler(self._step, 10)
         return self
@@ -124,6 +124,13 @@ def fill(store: Any, first: int, last: int, status: str, robots: int = 100) -> N
     for begin in range(first, last, 2_000):  # a transaction has a deadline
         numbers = range(begin, min(begin + 2_000, last))
         store._transact(work)
+    if not counts_steps(store):  # PostgreSQL does so by itself, within a minute
+        store._transact(lambda cursor, _: store._do(cursor, "ANALYZE smachpy_missions"))
+
+
+def counts_steps(store: Any) -> bool:
+    """Return whether the store is a file, of which SQLite counts the steps."""
+    return hasattr(store._connection, "set_progress_handler")
 
 
 def growth(
