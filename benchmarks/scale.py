@@ -208,7 +208,12 @@ def of_finished(place: str, sizes: Sequence[int]) -> dict[str, float]:
             for row in store.missions(limit=PAGE):
                 overview(store, row)
 
-        return growth(store, sizes, "ended", {"run_durable": run, f"a list of {PAGE}": page})
+        acts = {
+            "run_durable": run,
+            f"a list of {PAGE}": page,
+            "a list of a status": lambda: store.missions(statuses=["ended"], limit=PAGE),
+        }
+        return growth(store, sizes, "ended", acts)
 
 
 def nested(depth: int) -> smachpy.StateMachine:

@@ -123,27 +123,33 @@ class SqlStore(SqlQueue):
         values: list[object] = []
         if open_only:
             conditions.append(OPEN)
-        if statuses:
-            # The row of an interrupted mission may still say that its process runs it.
-            wanted = {*statuses, *({RUNNING} if INTERRUPTED in statuses else ())}
-            conditions.append(f"status IN ({places(wanted)})")
-            values += sorted(wanted)
         if robot is not None:
             conditions.append(f"{ROBOT.format('')} = ?")
             values.append(robot_identity(robot))
         if target is not None:
             conditions.append("target = ?")
             values.append(target)
-        where = f" WHERE {' AND '.join(conditions)}" if conditions else ""
-        page = "" if limit is None else f" LIMIT {int(limit)} OFFSET {int(skip)}"
+        newest_first = "ORDER BY created DESC, id DESC"
+        page = first = ""
+        if limit is not None:
+            page, first = f" LIMIT {int(limit)} OFFSET {int(skip)}", f" LIMIT {limit + skip}"
+        if statuses:
+            # The row of an interrupted mission may still say that its process runs it.
+            wanted = sorted({*statuses, *({RUNNING} if INTERRUPTED in statuses else ())})
+            # One by one: with `IN`, an index would not give them in order.
+            of_one = " AND ".join(["status = ?", *conditions])
+            listed = " UNION ALL ".join(
+                f"SELECT * FROM (SELECT {COLUMNS}, {HELD} FROM smachpy_missions "
+                f"WHERE {of_one} {newest_first}{first}) AS s{number}"
+                for number, _ in enumerate(wanted)
+            )
+            values = [value for status in wanted for value in (status, *values)]
+        else:
+            where = f" WHERE {' AND '.join(conditions)}" if conditions else ""
+            listed = f"SELECT {COLUMNS}, {HELD} FROM smachpy_missions{where}"
 
         def work(cursor: Cursor, _: bool) -> list[MissionRow]:
-            self._do(
-                cursor,
-                f"SELECT {COLUMNS}, {HELD} FROM smachpy_missions{where} "
-                f"ORDER BY created DESC, id DESC{page}",
-                *values,
-            )
+            self._do(cursor, f"{listed} {newest_first}{page}", *values)
             rows = cursor.fetchall()
             now = self._now(cursor)
             return [self._row(row, now) for row in rows]

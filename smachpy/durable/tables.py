@@ -180,8 +180,10 @@ _INDEXES: Final = (
     ("robots", "UNIQUE INDEX", f"(({ROBOT.format('')}))", " WHERE owner IS NOT NULL"),
     ("groups", "UNIQUE INDEX", "(grp)", " WHERE owner IS NOT NULL AND grp IS NOT NULL"),
     ("open", "INDEX", "(created, id)", f" WHERE {OPEN}"),
-    ("targets", "INDEX", "(target)", f" WHERE {OPEN}"),
     ("newest", "INDEX", "(created, id)", ""),
+    ("newest_of_status", "INDEX", "(status, created, id)", ""),
+    ("newest_of_robot", "INDEX", f"(({ROBOT.format('')}), created, id)", ""),
+    ("newest_of_target", "INDEX", "(target, created, id)", f" WHERE {OPEN}"),
     ("changed", "INDEX", "(status, changed)", ""),
 )
 """Name, kind, columns and condition; the two unique ones are what keeps a robot from two missions.

@@ -240,6 +240,33 @@ def test_a_look_at_missions_that_cannot_begin_costs_the_same_however_many_wait(
     store.close()
 
 
+@pytest.mark.parametrize(
+    "filters",
+    [
+        {"statuses": ["queued"]},
+        {"statuses": ["queued", "interrupted"]},
+        {"statuses": ["queued"], "skip": 20},
+        {"robot": "r1"},
+        {"robot": "r2"},
+        {"open_only": True, "target": ROW.target},
+    ],
+    ids=str,
+)
+def test_a_page_of_a_list_costs_the_same_however_many_missions_fit(tmp_path, filters):
+    store = open_store(tmp_path / "queue.db")
+    costs = []
+    for count in (100, 2_000):
+        put_many(store, [replace(ROW, id=f"{count} {n}", robot="r1") for n in range(count)])
+        with Steps(store) as steps:
+            rows = store.missions(limit=20, **filters)
+        costs.append(steps.count)
+    last = 0 if filters.get("robot") == "r2" else 20
+    skip = filters.get("skip", 0)
+    assert [row.id for row in rows] == [f"2000 {n}" for n in range(2_000)][-last - skip :][:last]
+    assert costs[1] < 1.2 * costs[0]
+    store.close()
+
+
 def test_a_store_without_an_index_gets_it_when_it_is_opened(store_place):
     """A newer smachpy has more indexes of the same version; an older one does not need them."""
 
