@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+from bisect import bisect_left, insort
 from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -389,20 +390,15 @@ def odd_verdicts(
         return
     paths = {one.path for one in now}
     before: dict[str, Mapping[str, Any]] = {}
-    messages: list[Mapping[str, Any]] = []
+    messages: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)  # by topic and time
     for one in inputs:
         if one["what"] == "message":
-            messages.append(one)
+            insort(messages[f"/{one['name']}"], one, key=_time)
         elif one["what"] == "said" and one["name"] in paths:
             path, last = one["name"], before.get(one["name"])
             if last is not None:  # it said the same of the messages between the two
-                topic = f"/{one['key'].strip('/')}"
-                for message in messages:
-                    if (
-                        last["t"] <= message["t"] < one["t"]
-                        and f"/{message['name']}".endswith(topic)
-                        and message.get("value") != one.get("value")
-                    ):
+                for message in _between(messages, one["key"], last["t"], one["t"]):
+                    if message.get("value") != one.get("value"):
                         _add(known[path], message, last["state"])
             _add(known[path], one, one["state"])
             before[path] = one
@@ -414,6 +410,21 @@ def odd_verdicts(
                 f"{place(one_.path)}  says {one} {shown}" for one in (min(then), one_.state)
             )
             yield Odd(one_.t - began, one_.path, was, is_, one_.after)
+
+
+def _between(
+    messages: Mapping[str, Sequence[Mapping[str, Any]]], key: str, begin: float, end: float
+) -> Iterator[Mapping[str, Any]]:
+    """Yield the messages of a topic, in any namespace, from `begin` until before `end`."""
+    topic = f"/{key.strip('/')}"
+    for name, of_topic in messages.items():
+        if name.endswith(topic):
+            first = bisect_left(of_topic, begin, key=_time)
+            yield from of_topic[first : bisect_left(of_topic, end, key=_time)]
+
+
+def _time(record: Mapping[str, Any]) -> float:
+    return float(record["t"])
 
 
 def _add(known: dict[str, set[str]], one: Mapping[str, Any], said: str) -> None:

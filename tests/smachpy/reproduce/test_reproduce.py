@@ -26,7 +26,7 @@ from smachpy import CBState, StateMachine
 from smachpy.command import main
 from smachpy.events.introspection import describe
 from smachpy.events.recording import Recorder, read_recording
-from smachpy.reproduce.compare import compare, steps_of
+from smachpy.reproduce.compare import Said, compare, odd_verdicts, steps_of
 from smachpy.reproduce.report import lines_of
 from smachpy.reproduce.run import ReproductionError, reproduce
 from smachpy.reproduce.world import world_of
@@ -1058,6 +1058,33 @@ def test_a_change_that_leaves_the_path_is_found_too(tmp_path, capsys, old, new, 
         assert now in present
         assert recorded != present
         assert "is gone" not in out
+
+
+def test_the_cost_of_what_conditions_say_grows_with_the_messages():
+    """Each verdict was compared with all messages before it."""
+    looked = [0]
+
+    class Message(dict):
+        def __getitem__(self, key):
+            looked[0] += 1
+            return super().__getitem__(key)
+
+    def odds(count):
+        inputs = []
+        for n in range(count):
+            inputs.append(Message(what="message", name="robot/door", t=float(n), value=n))
+            inputs.append(Message(what="message", name="robot/other", t=float(n), value=-n))
+            if n % 3 == 0:  # of the two between, it says the same as of the last one
+                said = {"what": "said", "name": "/M/WAIT", "key": "door", "state": "no"}
+                inputs.append(Message(said, t=float(n), value=n))
+        now = [Said(50.0 + n, "/M/WAIT", "door", n, "yes", n) for n in range(count)]
+        looked[0] = 0
+        return list(odd_verdicts(inputs, now, 50.0)), looked[0]
+
+    found, few = odds(100)
+    assert [one.at for one in found] == [float(n) for n in range(100)]
+    many = odds(1_000)[1]
+    assert many < 20 * few  # 100 times as many
 
 
 def numbered(values, begin):
