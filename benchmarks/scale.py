@@ -179,6 +179,11 @@ def of_queue(place: str, sizes: Sequence[int]) -> dict[str, float]:
             "reserve, none allowed": lambda: store.reserve(
                 this_runner(), seconds=LEASE_S, leave_targets=["errand.py"]
             ),
+            "reserve, other version": lambda: store.reserve(
+                this_runner(),
+                seconds=LEASE_S,
+                leave_shapes=[("errand.py", store.mission("queued0").structure)],
+            ),
         }
         return growth(store, sizes, "queued", looks)
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from actionlib_core.clock import current_clock
 from smachpy.durable.position import VERSION as FORMAT
 from smachpy.durable.sql_base import Cursor, places
-from smachpy.durable.sql_queue import SqlQueue, robot_identity
+from smachpy.durable.sql_queue import SqlQueue, robot_identity, shape_of
 from smachpy.durable.store import (
     INTERRUPTED,
     OVER,
@@ -634,9 +634,9 @@ class SqlStore(SqlQueue):
         ready = now if row.due is None else row.due
         self._do(
             cursor,
-            f"INSERT INTO smachpy_missions ({COLUMNS}, waits, ready, fence) "
-            f"VALUES ({places(values)}, ?, ?, 0){end}",
-            *(*values.values(), int(waits), ready),
+            f"INSERT INTO smachpy_missions ({COLUMNS}, waits, ready, shape, fence) "
+            f"VALUES ({places(values)}, ?, ?, ?, 0){end}",
+            *(*values.values(), int(waits), ready, shape_of(row.structure)),
         )
 
     def _known(self, cursor: Cursor, id_: str, columns: str) -> Any:

@@ -19,12 +19,13 @@ from smachpy.durable.store import (
     MissionRow,
     QueueNews,
     check_lease_seconds,
+    digest_of,
     host_and_pid,
 )
 from smachpy.durable.tables import AFTER_BREAK, BREAK, COLUMNS, FREE, HELD, LAST, LATER, ROBOT
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
 MAX_LEFT_ROWS: Final = 500
 MAX_LEFT_SHAPES: Final = 50
@@ -160,7 +161,8 @@ class SqlQueue(SqlBase):
         names = [robot_identity(robot) for robot in robots]
         targets = list(leave_targets)[-MAX_LEFT_ROWS:]
         # The conditions that differ between missions with the same needs, and the others.
-        single, singles = _passed_over(list(leave)[-MAX_LEFT_ROWS:], leave_shapes)
+        shapes = {(target, shape_of(structure)): structure for target, structure in leave_shapes}
+        single, singles = _passed_over(list(leave)[-MAX_LEFT_ROWS:], shapes)
         others = "".join(
             f"AND {column} {word} ({places(given)}) "
             for column, word, given in (
@@ -193,7 +195,7 @@ class SqlQueue(SqlBase):
                 here = single + (late if status == QUEUED else "")
                 # Those of some robots may all be far behind.
                 row = None if names else take(status, _FRONT.format(status, status), here)
-                kinds = [] if row else self._kinds(cursor, status, names, targets)
+                kinds = [] if row else self._kinds(cursor, status, names, targets, shapes)
                 free = f"m.status = '{status}' AND m.waits = 0 AND m.owner IS NULL"
                 for needs in self._by_first(cursor, kinds, f"{free} {here}", singles):
                     row = row or take(status, f"{one_kind} AND {free}", here, needs)
@@ -204,7 +206,12 @@ class SqlQueue(SqlBase):
         return self._transact(work)
 
     def _kinds(
-        self, cursor: Cursor, status: str, robots: Sequence[str], leave_targets: Collection[str]
+        self,
+        cursor: Cursor,
+        status: str,
+        robots: Sequence[str],
+        leave_targets: Collection[str],
+        leave_shapes: Collection[tuple[str, str]],
     ) -> list[str]:
         """Return the different needs of the missions with a status, if these are free.
 
@@ -213,6 +220,7 @@ class SqlQueue(SqlBase):
             status: The missions' status.
             robots: Only missions of these robots; empty: all.
             leave_targets: Targets of missions that are passed over.
+            leave_shapes: Targets and shapes of missions that are passed over.
         """
         needs, end = self.dialect.needs(), self.dialect.bytewise
         following = (
@@ -230,7 +238,7 @@ class SqlQueue(SqlBase):
             *(value for pair in ranges for value in pair),
         )
         found = [row[0] for row in cursor.fetchall()]
-        kinds = {one: words for one in found if len(words := one.split(BREAK, 2)) == 3}  # noqa: PLR2004
+        kinds = {one: words for one in found if len(words := one.split(BREAK, 3)) == 4}  # noqa: PLR2004
         if not kinds:
             return []
         self._do(cursor, _in_use(f"{ROBOT.format('')}, grp", status))
@@ -238,8 +246,11 @@ class SqlQueue(SqlBase):
         used_robots, used_groups = {row[0] for row in used}, {row[1] for row in used}
         return [
             one
-            for one, (robot, group, target) in kinds.items()
-            if robot not in used_robots and group not in used_groups and target not in leave_targets
+            for one, (robot, group, shape, target) in kinds.items()
+            if robot not in used_robots
+            and group not in used_groups
+            and target not in leave_targets
+            and (target, shape) not in leave_shapes
         ]
 
     def _by_first(
@@ -281,15 +292,21 @@ def robot_identity(name: str) -> str:
 
 
 def _passed_over(
-    ids: Sequence[str], shapes: Iterable[tuple[str, bytes]]
+    ids: Sequence[str], shapes: Mapping[tuple[str, str], bytes]
 ) -> tuple[str, list[str | bytes]]:
     """Return the condition that a mission `m` is none of those, and its values."""
     condition = f"AND m.id NOT IN ({places(ids)}) " if ids else ""
     values: list[str | bytes] = [*ids]
-    for shape in list(shapes)[-MAX_LEFT_SHAPES:]:
-        condition += "AND NOT (m.target = ? AND m.structure = ?) "
-        values += shape
+    for (target, shape), structure in list(shapes.items())[-MAX_LEFT_SHAPES:]:
+        same = "m.shape = ? OR (m.shape = '' AND m.structure = ?)"
+        condition += f"AND NOT (m.target = ? AND ({same})) "
+        values += (target, shape, structure)
     return condition, values
+
+
+def shape_of(structure: bytes) -> str:
+    """Return the digest that stands for a structure in a row of the missions."""
+    return digest_of(structure)[:16]
 
 
 def _table(rows: Sequence[Collection[object]]) -> str:

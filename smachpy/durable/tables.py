@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-VERSION: Final = 3
+VERSION: Final = 4
 """Version of the tables; a store with a higher one was written by a newer smachpy.
 
-Versions 2 and 3 only add columns, tables and indexes, and each new column has a default: a process
+Versions 2 to 4 only add columns, tables and indexes, and each new column has a default: a process
 of an older version that has the store open goes on, and one that opens it is refused.
 """
 
@@ -65,7 +65,7 @@ class Dialect:
     bytewise: str = ""
 
     def needs(self, table: str = "") -> str:
-        """Return what a mission needs as one text of SQL: its robot, group and target.
+        """Return what a mission needs as one text of SQL: its robot, group, shape and target.
 
         If a mission cannot begin as these are in use or not allowed, no other one with the same
         needs can.
@@ -74,7 +74,7 @@ class Dialect:
             table: The name of the missions' table in the statement, with a dot.
         """
         robot = f"COALESCE({table}drives, {table}robot, '')"
-        words = (robot, f"COALESCE({table}grp, '')", f"{table}target")
+        words = (robot, f"COALESCE({table}grp, '')", f"{table}shape", f"{table}target")
         text = f" || '{BREAK}' || ".join(words)
         return f"({text}){self.bytewise}"
 
@@ -102,7 +102,7 @@ class Dialect:
         )
 
     def columns(self) -> dict[str, str]:
-        """Return the columns that version 2 adds to the missions: name -> type and default."""
+        """Return the columns that newer versions add to the missions: name -> type and default."""
         return {
             "priority": "INTEGER NOT NULL DEFAULT 0",
             "not_after": self.real,
@@ -120,6 +120,8 @@ class Dialect:
             "lease_clock": "TEXT",
             "beat_clock": "TEXT",
             "beat_ns": self.big,
+            # A digest of `structure`; '' in rows of version 3 and before.
+            "shape": "TEXT NOT NULL DEFAULT ''",
         }
 
     def additions(self) -> tuple[str, ...]:
@@ -144,7 +146,8 @@ class Dialect:
             one_holder,
         )
         changes = (f"UPDATE smachpy_missions {change}" for change in _CHANGES)
-        return (table, *changes, *self.indexes().values(), *held)
+        old = (f"DROP INDEX IF EXISTS smachpy_{name}" for name in _OLD_INDEXES)
+        return (table, *changes, *old, *self.indexes().values(), *held)
 
     def indexes(self) -> dict[str, str]:
         """Return the statements that create the indexes of the missions, by the indexes' names.
@@ -152,7 +155,7 @@ class Dialect:
         One that is new here needs no new version: a store without it gets it when it is opened.
         """
         columns = f"(status, ({self.needs()}), priority DESC, ready, id)"
-        needs = ("needs", "INDEX", columns, f" WHERE {FREE}")
+        needs = ("kinds", "INDEX", columns, f" WHERE {FREE}")
         return {
             f"smachpy_{name}": f"CREATE {kind} IF NOT EXISTS smachpy_{name} "
             f"ON smachpy_missions {columns}{where}"
@@ -188,6 +191,9 @@ _INDEXES: Final = (
 )
 """Name, kind, columns and condition; the two unique ones are what keeps a robot from two missions.
 """
+
+_OLD_INDEXES: Final = ("needs", "targets")
+"""Those of version 3 that others have replaced."""
 
 TABLES: Final = frozenset(
     f"smachpy_{name}" for name in ("missions", "entries", "snapshots", "blobs", "resources")

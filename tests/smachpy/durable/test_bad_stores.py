@@ -191,7 +191,7 @@ def test_an_entry_that_is_gone_is_noticed(place):
 def test_a_journal_from_the_future_is_left_alone(place):
     fill(place)[0].close()
     with sqlite3.connect(place) as raw:
-        raw.execute("PRAGMA user_version = 4")
+        raw.execute("PRAGMA user_version = 5")
     raw.close()
     before = place.read_bytes()
     refused(place, "future")
@@ -490,7 +490,7 @@ def test_a_server_with_journals_from_the_future_is_left_alone(server_store, post
     import psycopg
 
     with psycopg.connect(postgres_url, autocommit=True) as raw:
-        raw.execute("UPDATE smachpy_version SET version = 4")
+        raw.execute("UPDATE smachpy_version SET version = 5")
     with pytest.raises(StoreError) as caught:
         open_store(postgres_url)
     assert caught.value.reason == "future"

@@ -127,6 +127,17 @@ def test_what_a_runner_leaves_of_one_version_hides_no_other(store):
     assert taken(store) == ["a"]
 
 
+def test_a_row_of_an_older_version_is_left_by_its_structure(store):
+    def forget(cursor, _):
+        cursor.execute("UPDATE smachpy_missions SET shape = ''")
+
+    for name, shape in [("a", b"{}"), ("b", b"[]")]:
+        put(store, name, target="m.py", structure=shape)
+    store._transact(forget)
+    assert taken(store, leave_shapes=[("m.py", b"{}")]) == ["b"]
+    assert taken(store) == ["a"]
+
+
 def test_what_can_begin_is_found_behind_a_long_queue_that_cannot(store):
     put(store, "busy", robot="r1", group="lift")
     store.claim("busy", this_runner(), seconds=LONG_S)
@@ -213,6 +224,7 @@ class Steps:
         ({"robot": "r1"}, {}),
         ({"group": "lift"}, {}),
         ({"target": "left.py"}, {"leave_targets": ["left.py"]}),
+        ({"structure": b"old"}, {"leave_shapes": [(ROW.target, b"old")]}),
         ({"robot": "r2"}, {"robots": ["r3"]}),
         ({"robot": "r2", "due": 9e9}, {"robots": ["r3"]}),
         ({"robot": "r3", "due": 9e9}, {"robots": ["r3"]}),
@@ -272,13 +284,34 @@ def test_a_store_without_an_index_gets_it_when_it_is_opened(store_place):
 
     def delete(cursor, _):
         assert set(store.dialect.indexes()) <= store._index_names(cursor)
-        for name in ("smachpy_needs", "smachpy_once"):
+        for name in ("smachpy_kinds", "smachpy_once"):
             cursor.execute(f"DROP INDEX {name}")
 
     for _ in range(2):
         store = open_store(store_place)
         store._transact(delete)
         store.close()
+
+
+def test_a_journal_of_version_3_gets_what_is_new_when_it_is_opened(tmp_path):
+    place = tmp_path / "queue.db"
+    store = open_store(place)
+    put(store, "a")
+    store.close()
+    with contextlib.closing(sqlite3.connect(place)) as raw:
+        raw.execute("DROP INDEX smachpy_kinds")
+        raw.execute("ALTER TABLE smachpy_missions DROP COLUMN shape")
+        raw.execute("CREATE INDEX smachpy_needs ON smachpy_missions (target)")
+        raw.execute("PRAGMA user_version = 3")
+        raw.commit()
+    store = open_store(place)
+    names = store._transact(lambda cursor, _: store._index_names(cursor))
+    assert set(store.dialect.indexes()) <= names
+    assert "smachpy_needs" not in names
+    assert taken(store, leave_shapes=[(ROW.target, ROW.structure)]) == []
+    put(store, "b", structure=b"new")
+    assert taken(store, leave_shapes=[(ROW.target, ROW.structure)]) == ["b"]
+    store.close()
 
 
 def test_more_left_missions_than_a_statement_binds(store):
