@@ -109,6 +109,7 @@ class AskOperator(State):
         answers = (answers,) if isinstance(answers, str) else tuple(answers)
         if not all(isinstance(text, str) for text in (*answers, *words.values())):
             raise MissionError(f"answers: got {words or list(answers)}; expected texts.")
+        answers = tuple(dict.fromkeys(answers))  # one that is there twice could not be meant
         taken = {"", NO_ANSWER, "preempted"}.intersection(answer.strip() for answer in answers)
         if not answers or taken:
             raise MissionError(

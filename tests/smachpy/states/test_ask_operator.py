@@ -52,6 +52,7 @@ def test_the_answer_is_the_outcome(mission, answer, text):
         (("Yes", "yes"), "yes", "yes"),
         (("Yes", "yes"), "Yes", "Yes"),
         (("Yes", "yes"), "YES", "no_answer"),
+        (("retry", "skip", "retry"), "retry", "retry"),
     ],
 )
 def test_answers_may_have_capitals(mission, answer, answers, text, meant):
