@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 
 import pytest
@@ -627,11 +627,12 @@ started.wait()
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)  # busy processes, one after the other
 def test_threads_that_still_send_as_the_interpreter_ends_do_not_abort_the_process():
     """It said 'exception not rethrown': they came back from zenoh after the interpreter's end."""
-    for _ in range(5):
-        with child(LATE) as process:
+    with ExitStack() as left:
+        domains = [str(left.enter_context(_free_domain())) for _ in range(5)]
+        processes = [left.enter_context(child(LATE, SMACHPY_DOMAIN=one)) for one in domains]
+        for process in processes:
             _, errors = process.communicate(timeout=250)
             assert process.returncode == 0, errors
 
