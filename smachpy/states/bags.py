@@ -178,6 +178,11 @@ def _new_bag(path: Path) -> tuple[Path, BagWriter]:
     """
     for number in range(1, MOST_FILES):
         one = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
-        if not one.exists():
+        if one.exists():
+            continue
+        try:
             return one, BagWriter(one)
+        except BagError as error:  # maybe somebody else has just made it
+            if not (isinstance(error.__cause__, FileExistsError) and one.exists()):
+                raise
     raise BagError(path, f"got {MOST_FILES} files of this name; expected fewer.")

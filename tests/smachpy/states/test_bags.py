@@ -94,6 +94,21 @@ def test_a_preempt_completes_the_file(mission, tmp_path, after):
     assert len(list(read_bag(path))) == after / 0.5
 
 
+def test_a_file_that_another_one_makes_at_the_same_time_is_left(mission, tmp_path, monkeypatch):
+    """Of two branches with one path, one ended with 'aborted'."""
+    path = tmp_path / "drive.mcap"
+
+    def make(one):
+        if one == path:
+            path.write_bytes(b"of another")
+        return BagWriter(one)
+
+    monkeypatch.setattr("smachpy.states.bags.BagWriter", make)
+    mission(alone(RecordBag(path, TOPICS, seconds=1.0))).assert_outcome("done")
+    assert path.read_bytes() == b"of another"
+    assert (tmp_path / "drive-2.mcap").exists()
+
+
 def test_a_file_that_exists_is_never_changed(mission, tmp_path):
     path = tmp_path / "drive.mcap"
     path.write_bytes(b"precious")
