@@ -1,4 +1,4 @@
-// What no linter looks at: widths in texts, and which module may import which.
+// What no linter looks at: widths in texts, lengths of modules, and which may import which.
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -20,6 +20,11 @@ test("no line is wider than 120 columns", () => {
         .flatMap((line, i) => (line.length > 120 ? [`${name}:${i + 1}`] : [])),
     );
   assert.deepEqual(wide, []);
+});
+
+test("no module is longer than 350 lines", () => {
+  const long = files.filter((name) => readFileSync(name, "utf-8").split("\n").length > 351);
+  assert.deepEqual(long, []);
 });
 
 test("imports go one way: core, drawing, panels", () => {
