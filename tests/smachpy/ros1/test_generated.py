@@ -192,6 +192,7 @@ class Change(smach.State):
 
     def execute(self, ud):
         client = Client('/arm', timeout=5)
+        client._config = None  # as on a busy computer; asking the node called its callback
         assert client.update_configuration({'force': 7.0}) == {'size': 1, 'force': 1.0}
         assert client.update_configuration({'size': 0}) == {'size': 0, 'force': 0.125}
         assert client.get_configuration() == {'size': 0, 'force': 0.125}

@@ -10,7 +10,8 @@ from smachpy.ros1.names.dynamic_reconfigure import (
     Reconfigure,
 )
 from smachpy.ros1.names.dynamic_reconfigure.encoding import decode_config, encode_config
-from smachpy.ros1.names.rospy.exceptions import ROSException
+from smachpy.ros1.names.rospy.client import wait_for_message
+from smachpy.ros1.names.rospy.exceptions import ROSException, ROSInterruptException
 from smachpy.ros1.names.rospy.service import ServiceProxy
 from smachpy.ros1.names.rospy.topics import Subscriber
 from smachpy.ros1.session import session
@@ -18,6 +19,9 @@ from smachpy.ros1.stubs import Anything
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+
+FIRST_S = 5.0  # longest wait for the configuration that a node latches
 
 
 class Client:
@@ -54,10 +58,26 @@ class Client:
         self.closed = False
 
     def get_configuration(self, timeout: Any = None) -> dict[str, Any]:
-        """Return the last configuration that was received; if there was none, ask for it."""
-        del timeout
+        """Return the last configuration that was received; if there was none, wait for one.
+
+        Args:
+            timeout: Longest wait, seconds or `Duration`; None: 5 s. Then the node is asked for it,
+                which calls the node's callback.
+
+        Raises:
+            ROSInterruptException: the program is to end.
+            ServiceException: the node did not answer.
+        """
         if self._config is None:
-            self._config = decode_config(self._proxy(Config()).config)
+            limit = FIRST_S if timeout is None else timeout
+            try:
+                self._config = decode_config(
+                    wait_for_message(f"{self.name}/parameter_updates", Config, limit)
+                )
+            except ROSInterruptException:
+                raise
+            except ROSException:  # it latches none
+                self._config = decode_config(self._proxy(Config()).config)
         return dict(self._config)
 
     def update_configuration(self, changes: dict[str, Any]) -> dict[str, Any]:
