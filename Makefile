@@ -7,8 +7,8 @@ SLOW_TESTS := -m "slow or browser or ros1 or rclpy or postgres"
 DEFAULT_TESTS := -m "not slow and not browser and not ros1 and not rclpy and not postgres"
 # Continuous integration (CI=true) runs the slow tests, those in a browser, with ROS 1, rclpy and PostgreSQL too.
 TESTS := $(if $(CI),,$(DEFAULT_TESTS))
-# Two workers for each of two cores: tests wait for processes, timers and disks for more than half of their time.
-WORKERS := -n 4 --dist worksteal
+# One worker more than two cores: many tests wait for processes. A fourth takes more CPU time, and no less time.
+WORKERS := -n 3 --dist worksteal
 
 # The commands and the tests start many processes; each is quicker with cached bytecode.
 unexport PYTHONDONTWRITEBYTECODE
