@@ -1,5 +1,6 @@
 """Topics of ROS 1. Each line of standard input is a command, answered with one line."""
 
+import struct
 import sys
 
 import rospy
@@ -16,6 +17,11 @@ print("ready", flush=True)
 
 def hear(message, name):
     heard[name].append(message.data)
+
+
+def last_number(message):
+    """Return the last field of a message of any type, as the number that it is in a goal."""
+    return str(struct.unpack("<i", message._buff[-4:])[0])
 
 
 for line in sys.stdin:
@@ -39,11 +45,11 @@ for line in sys.stdin:
         (name,) = arguments
         heard[name] = []
         subscribers[name] = rospy.Subscriber(
-            name, rospy.AnyMsg, lambda message, name=name: heard[name].append(message._type)
+            name, rospy.AnyMsg, lambda message, name=name: heard[name].append(last_number(message))
         )
     elif word == "connections":
         (name,) = arguments
-        end = publishers.get(name) or subscribers[name]
+        end = publishers[name]
         deadline = rospy.get_time() + LONG_S
         while not end.get_num_connections() and rospy.get_time() < deadline:
             rospy.sleep(0.01)
@@ -52,6 +58,12 @@ for line in sys.stdin:
         texts, count = heard[arguments[0]], int(arguments[1])
         deadline = rospy.get_time() + LONG_S
         while len(texts) < count and rospy.get_time() < deadline:
+            rospy.sleep(0.01)
+        answer = " ".join(texts)
+    elif word == "until":
+        texts, last = heard[arguments[0]], arguments[1]
+        deadline = rospy.get_time() + LONG_S
+        while last not in texts and rospy.get_time() < deadline:
             rospy.sleep(0.01)
         answer = " ".join(texts)
     print(answer, flush=True)
