@@ -142,7 +142,6 @@ class Wait(State):
 
     Args:
         seconds: The time [s], a number or a `Duration`; None for the userdata key `seconds`.
-
         **options: See `smachpy.machines.state.StateOptions`.
 
     Raises:
