@@ -17245,7 +17245,7 @@ function ViewMenu({ page: page2 }) {
     addEventListener("pointerdown", away);
     return () => removeEventListener("pointerdown", away);
   }, []);
-  A2(() => {
+  F2(() => {
     if (!open) return;
     const onKeyDown = (e4) => {
       if (e4.key !== "Escape") return;

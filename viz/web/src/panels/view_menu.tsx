@@ -1,6 +1,6 @@
 // The menu of what the page shows and how: levels, numbers, colours, panels, keys, downloads.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { ALL_LEVELS } from "#core/model.ts";
 import { isFile } from "#core/page_file.ts";
 import { canReproduce } from "#core/reproduction.ts";
@@ -45,7 +45,8 @@ export function ViewMenu({ page }: { page: Page }) {
     addEventListener("pointerdown", away);
     return () => removeEventListener("pointerdown", away);
   }, []);
-  useEffect(() => {
+  // With the drawing, not after it: a menu that has just closed must not take the Escape for what came next.
+  useLayoutEffect(() => {
     if (!open) return;
     const onKeyDown = (e: KeyboardEvent) => {
       if (e.key !== "Escape") return;
