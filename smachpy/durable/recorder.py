@@ -246,26 +246,18 @@ class Recorder(RunJournal):
         path: str,
         facts: dict[str, Any],
         value: str = "",
+        *,
+        at_once: bool = True,
     ) -> bool:
         """Write an entry with the changes in the userdata of `frame`; see `_changes`.
 
-        `value` is the name of the fact that is an encoded value, which may be large.
+        `value` is the name of the fact that is an encoded value, which may be large. `at_once` is
+        False while the run's lock is held: `commit` writes the entry.
         """
-        number = self._note(frame, step, kind, path, facts, value)
-        return self.broken is None if number is None else self._commit(number)
-
-    def _note(
-        self,
-        frame: Frame | None,
-        step: Step | None,
-        kind: str,
-        path: str,
-        facts: dict[str, Any],
-        value: str = "",
-    ) -> int | None:
-        """Queue an entry as `_write_with` writes it; return its number, None if there is none."""
-        if self.broken is not None or is_copy(self._pid):  # a fork of a state: its parent writes
-            return None
+        if is_copy(self._pid):  # a process that a state has forked: the mission is its parent's
+            return True
+        if self.broken is not None:
+            return False
         journal = self._journal
         # The lock covers reading the userdata and queueing the entry: a change that an entry
         # reports must not be older than the one that an earlier entry has reported.
@@ -278,11 +270,14 @@ class Recorder(RunJournal):
                 changes, learn = self._changes(frame, step, path)
                 entry.update(changes)
             if entry.pop("only_changes", False) and "userdata" not in entry:
-                return None
+                return True
             number = journal.put(entry)
             if learn is not None:
                 learn()
-        return number
+            if not at_once:
+                self._noted = number
+                return True
+        return self._commit(number)
 
     def _commit(self, number: int) -> bool:
         # Without the lock: other branches queue their entries meanwhile, see `Journal`.
@@ -295,7 +290,7 @@ class Recorder(RunJournal):
         return True
 
     def _note_request(self, kind: str, path: str, **facts: Any) -> None:
-        self._noted = self._note(None, None, kind, path, facts) or self._noted
+        self._write_with(None, None, kind, path, facts, at_once=False)
 
     def commit(self) -> None:
         if self._noted and self.broken is None and not self._is_suspended:

@@ -558,6 +558,8 @@ def ask_child(frame: Frame, step: Any, override: Override | None = None) -> bool
         step: The child.
         override: What the operator chose for its end; None if it is no operator who asks. See
             `smachpy.engine.visit.choice_after`.
+
+    Blocks: for the journal of a durable mission; the child has been told by then.
     """
     with frame.run.lock:
         asked = ask(frame, step, override=override)
@@ -610,6 +612,8 @@ def request(
 
     Returns:
         The run that was asked, or None.
+
+    Blocks: for the journal of a durable mission; all have been told by then.
     """
     live = container._smachpy.live
     origin = current_origin()
