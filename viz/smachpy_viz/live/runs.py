@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from actionlib_core.clock import RealClock
 from smachpy.events.recording import RecordingError, has_end, read_recording, read_summary
 from smachpy.exceptions import MissionError
 from smachpy_viz.runs.html import MOST_EVENTS
@@ -313,13 +313,13 @@ class Runs:
 
     def _row_of_file(self, path: Path) -> dict[str, Any]:
         stamp = _stamp_of(path)
-        known, now = self._rows.get(path), time.monotonic()
+        known, now = self._rows.get(path), RealClock.now()
         if known is not None and (
             stamp == known[0] or (stamp[1] > LONG and now < known[2] and not has_end(path))
         ):
             return known[1]
         row = _read_row(path, stamp[1])
-        self._rows[path] = stamp, row, now + REST * (time.monotonic() - now)
+        self._rows[path] = stamp, row, now + REST * (RealClock.now() - now)
         return row
 
 
